@@ -15,7 +15,7 @@ build: ## Build the program (release); needs no network once the dependencies ar
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-install: build ## Install program, completions and manual below PREFIX=/usr/local; DESTDIR stands before it
+install: build ## Install program and completions below PREFIX=/usr/local; DESTDIR stands before it
 	@echo "make install: $(DESTDIR)$(or $(PREFIX),/usr/local)"
 	@bash scripts/install.sh "$(TARGET_DIR)/release/pendularm" "$(DESTDIR)$(or $(PREFIX),/usr/local)"
 
@@ -35,13 +35,13 @@ test: ## Run every test that needs Rust alone, but the slow ones
 	$(CARGO) test --locked --test '*'
 	$(CARGO) test --locked --doc
 
-test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
+test-slow: ## Run the tests of faults that take a minute or two; ARGS=faults_slow:: picks some; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
-	$(CARGO) test --locked --test wire -- faults_slow:: memory_slow:: --ignored --nocapture --test-threads 1
+	$(CARGO) test --locked --test wire -- $(or $(ARGS),faults_slow:: memory_slow::) --ignored --nocapture --test-threads 1
 
-check-study: ## Try every answer of the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n
+check-study: ## Try every answer of the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n; PROFILE=dev is the tests' build
 	@echo "make check-study: an optimised build, then some minutes for each 10000"
-	COUNT="$(or $(COUNT),10000)" FROM="$(or $(FROM),0)" $(CARGO) test --locked --release --test study -- properties:: --nocapture
+	COUNT="$(or $(COUNT),10000)" FROM="$(or $(FROM),0)" $(CARGO) test --locked --profile $(or $(PROFILE),release) --test study -- properties:: --nocapture
 
 test-page: node_modules ## Check the page's types and try its logic without a browser; needs node 20 with npm
 	@echo "make test-page: types, then unit tests"
@@ -73,9 +73,9 @@ fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), o
 	@echo "make fuzz: $(if $(RUNS),the same executions everywhere,$(or $(TIME),60) s each), after a build of some minutes"
 	@CARGO="$(CARGO)" TIME="$(TIME)" RUNS="$(RUNS)" bash scripts/fuzz.sh $(ARGS)
 
-fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz
+fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz, or RUNS=n
 	@echo "make fuzz-faults: up to $(or $(TIME),60) s each, after a build of some minutes"
-	@TIME="$(or $(TIME),60)" python3 fuzz/faults/run.py $(ARGS)
+	@TIME="$(or $(TIME),60)" RUNS="$(RUNS)" python3 fuzz/faults/run.py $(ARGS)
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
@@ -106,11 +106,11 @@ report: build ## Measure error against run time and stability: report/index.html
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
 	@[ -z "$(KEEP)" ] || python3 scripts/keep-report.py report
 
-picture: build ## Take the README's picture of the page: docs/page.png; needs chromium
+picture: build ## Take the README's picture of the page: docs/page.png, or OUT=; needs chromium
 	@echo "make picture: docs/page.png"
-	PENDULARM="$(TARGET_DIR)/release/pendularm" python3 scripts/picture.py
+	OUT="$(OUT)" PENDULARM="$(TARGET_DIR)/release/pendularm" python3 scripts/picture.py
 
-features: ## Build with and without each feature and print size, crates and build time; KEEP=1 puts them into the README
+features: ## Build with and without each feature and print size, crates and build time; ARGS=library builds that alone; KEEP=1 puts them into the README
 	@echo "make features: seven release builds from nothing, some minutes"
 	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
 
@@ -120,35 +120,35 @@ wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program in it
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" picks tests
 	@bash scripts/test-python.sh $(ARGS)
 
-ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"
+ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"; PROFILE=dev is the tests' build
 	@echo "make ros2: a build of some minutes the first time; then in the foreground until SIGINT"
-	$(CARGO) build --release --locked --manifest-path ros2/Cargo.toml --target-dir "$(TARGET_DIR)/ros2"
-	@exec "$(TARGET_DIR)/ros2/release/pendularm-ros2" $(ARGS)
+	$(CARGO) build --profile $(or $(PROFILE),release) --locked --manifest-path ros2/Cargo.toml --target-dir "$(TARGET_DIR)/ros2"
+	@exec "$(TARGET_DIR)/ros2/$(if $(filter dev,$(PROFILE)),debug,release)/pendularm-ros2" $(ARGS)
 
 test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router, ROS 2 nodes from PyPI; CLIENT=1 has one of a crate too
 	@echo "make test-ros2: needs python3, and a network the first time"
 	@CLIENT="$(CLIENT)" bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
-bench-ros2: build ## Measure that bridge between two hosts with up to 50 watchers; needs root; KEEP=1 keeps the figures
+bench-ros2: build ## Measure that bridge between two hosts with up to 50 watchers; needs root; ARGS=--quick for a look, KEEP=1 keeps the figures
 	@echo "make bench-ros2: a build of some minutes the first time, then three; the fewer other programs run, the better"
-	@KEEP="$(KEEP)" bash ros2/tests/bench.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
+	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash ros2/tests/bench.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
-mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
+mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors", --check
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"
 	@bash scripts/mutants.sh $(ARGS)
 
-bench: ## Measure our own speed and size; KEEP=1 keeps the figures in benches/results/
+bench: ## Measure our own speed and size; ARGS=--quick for a look, KEEP=1 keeps the figures in benches/results/
 	@echo "make bench: some minutes; the fewer other programs run, the better"
-	@KEEP="$(KEEP)" bash benches/run.sh
+	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/run.sh
 
 bench-load: ## Measure many clients' messages beside redis and mosquitto; ARGS=--quick for a look, KEEP=1 as above
 	@echo "make bench-load: some minutes; installs redis-server and mosquitto from Debian as root if they are missing"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/load/run.sh
 
-bench-peers: ## Measure beside Pinocchio and the C it generates, MuJoCo, scipy, heyoka and ode_solvers, installed into benches/peers/.venv; KEEP=1 as above
+bench-peers: ## Measure beside Pinocchio and the C it generates, MuJoCo, scipy, heyoka and ode_solvers, installed into benches/peers/.venv; ARGS=--quick for a look, KEEP=1 as above
 	@echo "make bench-peers: downloads about 300 MB once, compiles for some minutes, then some ten minutes"
-	@KEEP="$(KEEP)" bash benches/peers/run.sh
-	@KEEP="$(KEEP)" bash benches/equal_error/run.sh
+	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/peers/run.sh
+	@case " $(ARGS) " in *" --quick "*) ;; *) KEEP="$(KEEP)" bash benches/equal_error/run.sh ;; esac
 
 attack: ## Attack the program in a hundred ways and measure what a healthy client has of it; ARGS="--only=pings", --list or --quick
 	@echo "make attack: some ten minutes; installs redis-server and mosquitto as bench-load does, and attacks them too"

@@ -5,6 +5,20 @@ benches=$root/benches
 target=${CARGO_TARGET_DIR:-$root/target}
 built=$target/release
 
+# ARGS=--quick is a form for CI, in which no figure means anything.
+quick=
+case " ${ARGS:-} " in *" --quick "*) quick=1 ;; esac
+
+# Builds our programs, given as --bin NAME: as releases, or for --quick as the tests are built, with the same features. Sets `built`.
+build() {
+    if [ -n "$quick" ]; then
+        built=$target/debug
+        (cd "$root" && cargo build --locked --quiet -p pendularm --test house -p pendularm-benches "$@")
+    else
+        (cd "$benches" && cargo build --release --locked --quiet "$@")
+    fi
+}
+
 # The last core, which interrupts visit least; without taskset, wherever the system likes.
 core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
 pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # `make bench`: every figure of our own, one after another, on the release build. `make bench-peers` compares with others.
-# Ends in a table of figures and bars. KEEP=1 keeps the output, with what it hangs on, in benches/results/<date>-<processor>/.
+# Ends in a table of figures and bars. ARGS=--quick is a short pass for CI. KEEP=1 keeps the output, with what it hangs on, in benches/results/<date>-<processor>/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"
@@ -23,9 +23,16 @@ instructions() {
     done
 }
 
-say "building pendularm and its benchmarks (release)"
-(cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --release --locked --quiet --features echo)
+say "building pendularm and its benchmarks"
+seconds=() runs=() words=()
+if [ -n "$quick" ]; then
+    # Without the echo server, for which Tokio is built anew, and what is counted by Valgrind.
+    build --bin dynamics --bin idle --bin fairness --bin arm_thread --bin reading
+    seconds=(1) runs=(20) words=(spaces)
+else
+    (cd "$root" && cargo build --release --locked --quiet)
+    build --features echo
+fi
 program=$built/pendularm
 folder=$(results_folder)
 environment "make bench" >"$folder/environment.txt"
@@ -82,14 +89,13 @@ part() {
 
 {
     cat "$folder/environment.txt"
-    part dynamics pinned "$built/dynamics"
-    part instructions instructions
-    part roundtrip roundtrips
-    part idle "$built/idle" "$program"
-    part fairness "$built/fairness" "$program"
+    part dynamics pinned "$built/dynamics" "${runs[@]}"
+    [ -n "$quick" ] || { part instructions instructions; part roundtrip roundtrips; }
+    part idle "$built/idle" "$program" "${seconds[@]}"
+    part fairness "$built/fairness" "$program" "${seconds[@]}"
     part arm_thread "$built/arm_thread"
-    part allocations "$built/allocations"
-    part reading pinned "$built/reading"
-    part summary summary
+    [ -n "$quick" ] || part allocations "$built/allocations"
+    part reading pinned "$built/reading" "${words[@]}"
+    [ -n "$quick" ] || part summary summary
 }
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$folder")"

@@ -6,7 +6,7 @@
 import { announce } from "./announce.js";
 import { byId } from "./dom.js";
 import { goLive } from "./playback.js";
-import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams } from "./runtime.js";
+import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { set, state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
@@ -36,7 +36,7 @@ export function startActions() {
     undo.past.length = 0;
     showUndo();
   });
-  for (const key of ["integrator", "params", "gains", "enabled", "setpoint"]) watch(key, showUndo);
+  for (const key of ["integrator", "params", "gains", "period", "enabled", "setpoint"]) watch(key, showUndo);
 }
 
 export async function takeBack() {
@@ -48,13 +48,14 @@ export async function takeBack() {
 }
 
 /** Applies what is given, and gives the refusals. The servo comes last, so that it never acts on half of the settings. */
-export async function apply({ integrator, params, gains, servo, setpoint }) {
+export async function apply({ integrator, params, gains, period, servo, setpoint }) {
   applying = true;
   const answers = [];
   if (servo === false) answers.push(await enable(false));
   if (params) answers.push(await setParams(params));
   if (gains) answers.push(await setGains(gains));
   if (integrator) answers.push(await setIntegrator(integrator));
+  if (period) answers.push(await setPeriod(period));
   if (setpoint) sendSetpoint(setpoint);
   if (servo) answers.push(await enable(true));
   applying = false;
@@ -76,7 +77,7 @@ async function begin(lesson) {
   const refusals = await apply({ ...rest, servo: null, setpoint: null });
   const answer = await reset();
   // A reset takes the setpoint to the starting pose, so it is sent after it.
-  refusals.push(...await apply({ integrator: null, params: null, gains: null, servo, setpoint }));
+  refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, servo, setpoint }));
   if (state.paused) await pause(false);
   announce(`${lesson.name}. ${lesson.text}`);
   return answer.result ? refusals : [...refusals, answer.status];

@@ -1,20 +1,25 @@
 // @ts-check
-// Pointing at the arm's canvas: a drag sends goals for the end effector, with shift it places the setpoint directly.
+// Pointing at the arm's canvas: a drag sends goals for the end effector, places the setpoint, or lifts the arm itself.
 // Arrow keys do the same for those who use no pointer.
-// Invariant: at most ten requests a second leave while aiming, and the last place is always sent.
+// Invariant: one request at a time leaves while aiming, at a bounded rate, and the last place is always sent.
 
 import { warn } from "./announce.js";
 import { endEffector, showAim, toWorld } from "./arm_view.js";
 import { goalOptions, showGoalPlace, showGoalRefusal } from "./goal_panel.js";
 import { latestOnly } from "./latest.js";
-import { nearestTurn } from "./mechanics.js";
-import { cancelGoal, sendGoal, sendSetpoint, solve } from "./runtime.js";
+import { nearestInReach, nearestTurn } from "./mechanics.js";
+import { goLive } from "./playback.js";
+import { cancelGoal, sendGoal, sendSetpoint, setPose, solve } from "./runtime.js";
 import { state } from "./store.js";
 
 const INTERVAL_MS = 100;
+/** Between two requests a lifted arm falls: in so short a time by a few millimetres [ms]. */
+const LIFT_MS = 20;
 const ARROW_M = 0.05;
 /** After the last arrow key the place counts as chosen. */
 const SETTLE_MS = 600;
+
+/** @typedef {"goal" | "setpoint" | "arm"} Mode what a drag moves */
 
 let aim = null;
 let pointer = null;
@@ -22,14 +27,27 @@ let settle = 0;
 let lastPlace = null; // of those sent, or about to be
 
 const send = latestOnly(async (place) => {
-  const answer = place.direct ? await placeSetpoint(place) : await sendGoal({ ...goalOptions(), x: place.x, y: place.y });
+  report(place, place.mode === "setpoint" ? await placeSetpoint(place) : await sendGoal({ ...goalOptions(), x: place.x, y: place.y }));
+}, INTERVAL_MS);
+
+/** Puts the arm where the pointer is, and keeps it there until it is let go. */
+const lift = latestOnly(async (place) => {
+  report(place, await putArm(place));
+  if (aim?.mode === "arm" && !place.refused) lift(lastPlace);
+}, LIFT_MS);
+
+function report(place, answer) {
   place.refused = !answer.result;
   place.answered = true;
   showGoalRefusal(answer.result ? "" : answer.status);
   if (!answer.result) warn(answer.status);
-  if (aim) showAim({ ...aim, refused: place.refused });
-  else if (place === lastPlace) finish(place);
-}, INTERVAL_MS);
+  if (!aim) {
+    if (place === lastPlace) finish(place);
+  } else if (aim.refused !== place.refused) {
+    aim = { ...aim, refused: place.refused };
+    showAim(aim);
+  }
+}
 
 /** A target that was refused stays in sight for a moment, so that one sees what was meant. */
 function finish(place) {
@@ -37,32 +55,57 @@ function finish(place) {
   if (place.refused) setTimeout(() => { if (!aim && lastPlace === place) showAim(null); }, 1500);
 }
 
-async function placeSetpoint({ x, y }) {
+/** The pose with the end effector at a place, within half a turn of where each joint is; a diverged arm has lost count of turns. */
+async function poseAt({ x, y }) {
   const answer = await solve({ x, y });
-  if (answer.result) sendSetpoint(answer.values.positions.map((q, i) => nearestTurn(q, state.position[i])));
+  const diverged = state.diagnostics?.state === "diverged";
+  return { answer, pose: answer.values.positions?.map((q, i) => (diverged ? q : nearestTurn(q, state.position[i]))) };
+}
+
+async function placeSetpoint(place) {
+  const { answer, pose } = await poseAt(place);
+  if (answer.result) sendSetpoint(pose);
   return answer;
 }
 
-function moveTo(place, direct) {
-  aim = { ...place, phi: direct ? undefined : goalOptions().phi, direct, refused: aim?.refused ?? false };
+async function putArm(place) {
+  if (!place.pose) {
+    const { answer, pose } = await poseAt(place);
+    if (!answer.result) return answer;
+    place.pose = pose;
+  }
+  return setPose(place.pose);
+}
+
+/** @param {{x: number, y: number}} wished @param {Mode} mode */
+function moveTo(wished, mode) {
+  const place = mode === "arm" ? nearestInReach(wished, state.params?.lengths ?? []) : wished;
+  aim = { ...place, phi: mode === "goal" ? goalOptions().phi : undefined, mode, refused: aim?.refused ?? false };
   lastPlace = { ...aim };
   showAim(aim);
-  showGoalPlace(place);
-  send(lastPlace);
+  if (mode === "arm") {
+    goLive();
+    lift(lastPlace);
+  } else {
+    showGoalPlace(place);
+    send(lastPlace);
+  }
 }
 
 function end() {
   pointer = null;
+  // Once more at rest, since it has begun to fall.
+  if (aim?.mode === "arm") lift(lastPlace);
   aim = null;
   // Otherwise the answer to the last place, which is still to come, takes the mark away.
   if (lastPlace?.answered) finish(lastPlace);
 }
 
-/** Whether a drag places the setpoint without a key: on a touch screen there is none. */
-function placesSetpoint() {
+/** What is chosen beside the view, since a touch screen has no keys; shift means the setpoint. @returns {Mode} */
+function modeOf(event) {
   /** @type {HTMLInputElement} */
   const chosen = document.querySelector("input[name=drag]:checked");
-  return chosen.value === "setpoint";
+  return event.shiftKey ? "setpoint" : /** @type {Mode} */ (chosen.value);
 }
 
 export function startAim(canvas) {
@@ -74,10 +117,10 @@ export function startAim(canvas) {
     if (event.button !== 0 || state.links === 0) return;
     pointer = event.pointerId;
     canvas.setPointerCapture(pointer);
-    moveTo(place(event), event.shiftKey || placesSetpoint());
+    moveTo(place(event), modeOf(event));
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (event.pointerId === pointer) moveTo(place(event), event.shiftKey || aim?.direct);
+    if (event.pointerId === pointer) moveTo(place(event), event.shiftKey ? "setpoint" : aim.mode);
   });
   canvas.addEventListener("pointerup", (event) => { if (event.pointerId === pointer) end(); });
   canvas.addEventListener("pointercancel", (event) => { if (event.pointerId === pointer) end(); });
@@ -89,9 +132,10 @@ function arrows(event) {
   if (event.key === "Escape") cancelGoal();
   if (!way || state.links === 0 || event.ctrlKey || event.altKey || event.metaKey) return;
   event.preventDefault();
-  const from = aim ?? (state.goal && !event.shiftKey ? state.goal.target : endEffector());
+  const mode = modeOf(event);
+  const from = aim ?? (state.goal && mode === "goal" ? state.goal.target : endEffector());
   const round = (value) => Math.round(value * 1e4) / 1e4;
-  moveTo({ x: round(from.x + ARROW_M * way[0]), y: round(from.y + ARROW_M * way[1]) }, event.shiftKey);
+  moveTo({ x: round(from.x + ARROW_M * way[0]), y: round(from.y + ARROW_M * way[1]) }, mode);
   clearTimeout(settle);
   settle = setTimeout(end, SETTLE_MS);
 }

@@ -41,7 +41,7 @@ let fullEffort = 1; // N m, all that gravity could ask for
 let reachedAt = -Infinity;
 let scale = 100; // pixels per metre
 let arrows = false; // whether velocities are drawn
-/** Where the pointer aims, while it does: { x, y, phi, direct, refused }. */
+/** Where the pointer aims, while it does: { x, y, phi, mode, refused }; see `aim.js`. */
 let aim = null;
 
 export function startArmView(canvas) {
@@ -196,7 +196,7 @@ function drawGhost(paint, n) {
 
 function drawTarget(n, ripple) {
   const { goal } = state;
-  const shown = aim && !aim.direct ? aim : goal?.target;
+  const shown = aim?.mode === "goal" ? aim : goal?.target;
   if (shown) {
     const done = !aim && goal?.outcome !== "active";
     const color = aim?.refused ? colors.bad : done && goal?.outcome === "reached" ? colors.good : colors.target;
@@ -207,7 +207,7 @@ function drawTarget(n, ripple) {
       circle(shown.x, shown.y, 8 + 34 * ripple);
     }
   }
-  if (aim?.direct) drawCross(aim, 0, aim.refused ? colors.bad : colors.ink, 1);
+  if (aim?.mode === "setpoint" || (aim?.mode === "arm" && aim.refused)) drawCross(aim, 0, aim.refused ? colors.bad : colors.ink, 1);
   context.globalAlpha = 1;
 }
 

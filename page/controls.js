@@ -7,12 +7,16 @@ import { byId, el, setText } from "./dom.js";
 import { numberField, option, refusal } from "./field.js";
 import { METHODS, shortName } from "./format.js";
 import { limitLabel } from "./limits_view.js";
-import { disturb, enable, sendSetpoint, setGains, setIntegrator, setParams, suggestGains } from "./runtime.js";
+import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
+import { disturb, enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, suggestGains } from "./runtime.js";
 import { set, state, watch } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
 const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
+
+/** The same for both clocks, so that places on their sliders compare [ms]. */
+const CLOCK = { unit: "ms", low: 0.01, high: 200, log: true };
 
 const SUGGEST = "Suggest gains for this arm";
 const ECHO_MS = 300;
@@ -29,6 +33,7 @@ let suggestSaid;
 
 export function startControls() {
   startIntegrator();
+  startClocks();
   startGravity();
   startServo();
   startPush();
@@ -55,11 +60,31 @@ function startIntegrator() {
   const check = () => {
     for (const radio of radios("method")) radio.checked = radio.value === state.integrator?.method;
   };
-  const timestep = numberField({
-    label: "timestep", unit: "s", low: 1e-5, high: 0.2, log: true, commit: (value) => setIntegrator({ timestep: value }),
+  watch("integrator", check);
+}
+
+/** The timestep and the control period, one above the other, each with its limit. */
+function startClocks() {
+  const timestep = numberField({ label: "timestep", ...CLOCK, commit: (ms) => setIntegrator({ timestep: seconds(ms) }) });
+  const period = numberField({
+    label: "control period", ...CLOCK, zero: true, zeroText: "every step", commit: (ms) => setPeriod({ period: seconds(ms) }),
   });
   byId("timestep-field").append(timestep.element);
-  watch("integrator", ({ timestep: accepted }) => { check(); timestep.accept(accepted); });
+  byId("period-field").append(period.element);
+  watch("integrator", ({ timestep: accepted }) => timestep.accept(1e3 * accepted));
+  watch("period", ({ period: accepted }) => period.accept(1e3 * accepted));
+  const mark = () => {
+    timestep.mark(1e3 * limitInForce(state).limit);
+    period.mark(1e3 * controlPeriodLimit(state));
+    setText(byId("period-text"), periodText(state));
+  };
+  const causes = ["links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "stability", "stabilityMissing"];
+  for (const key of causes) watch(key, mark);
+}
+
+/** Of milliseconds: the nearest number of seconds, without the digits that a division leaves behind. @param {number} ms */
+function seconds(ms) {
+  return Number((ms / 1e3).toPrecision(15));
 }
 
 function startGravity() {
@@ -95,7 +120,6 @@ function startSuggestion() {
   suggestButton = el("button", { type: "button", class: "small", onclick: takeSuggestion }, SUGGEST);
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
-  watch("offersGains", (offered) => { byId("suggest").hidden = !offered; });
 }
 
 /** Asks for gains, and sets them: a change like any other, which can be undone. */
@@ -150,7 +174,6 @@ function presentSetpoint() {
 
 function place(positions) {
   if (state.connection !== "open") return { result: false, status: "not connected" };
-  if (state.replay) return { result: false, status: "a record is replayed: it has no setpoint to be changed" };
   placed = positions;
   placedAt = performance.now();
   sendSetpoint(positions);

@@ -4,7 +4,7 @@
 
 import { warn } from "./announce.js";
 import { el, setText } from "./dom.js";
-import { plain } from "./format.js";
+import { plain, significant } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { watch } from "./store.js";
 
@@ -39,18 +39,23 @@ export function refusal(...describes) {
  * @param {number} options.low left end of the slider @param {number} options.high right end
  * @param {boolean} [options.log] whether the slider goes by ratios; with `low` > 0, or `zero` at its left end
  * @param {boolean} [options.zero] whether the left end means 0
+ * @param {string} [options.zeroText] what 0 means, in words under the left end
  * @param {(value: number) => Promise<{result: boolean, status: string}>} options.commit
  * @param {string} [options.className] of the slider
  */
-export function numberField({ label, short = label, unit, low, high, log = false, zero = false, commit, className = "" }) {
+export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, className = "" }) {
   const id = `field-${nextId}`;
   nextId += 1;
   const input = el("input", { type: "number", step: "any", id, inputmode: "decimal", autocomplete: "off" });
   const slider = el("input", { type: "range", min: "0", max: String(SLIDER_STEPS), step: "1", "aria-label": `${label}, slider`, class: className });
   slider.value = String(SLIDER_STEPS / 2);
+  const limit = el("span", { class: "mark", hidden: true });
+  const track = el("span", { class: "track" }, slider, limit);
+  if (zeroText) track.append(el("small", { class: "left-end", "aria-hidden": "true" }, zeroText));
   input.placeholder = "–"; // until the runtime has said
   const said = refusal(input);
   let accepted = NaN;
+  let marked = NaN;
   let pending = 0;
 
   const fromSlider = (at) => {
@@ -58,15 +63,17 @@ export function numberField({ label, short = label, unit, low, high, log = false
     const part = at / SLIDER_STEPS;
     return Number((log ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3));
   };
-  const toSlider = (value) => {
-    const part = log ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low);
-    return Math.round(SLIDER_STEPS * Math.min(1, Math.max(0, part)));
+  const partOf = (value) => (log ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low));
+  const toSlider = (value) => Math.round(SLIDER_STEPS * Math.min(1, Math.max(0, partOf(value))));
+  const describe = () => {
+    const now = zeroText && accepted === 0 ? zeroText : `${plain(accepted)} ${unit}`;
+    slider.setAttribute("aria-valuetext", limit.hidden ? now : `${now}, ${limit.title}`);
   };
   const show = () => {
     if (pending > 0) return;
     input.value = plain(accepted);
     slider.value = String(toSlider(accepted));
-    slider.setAttribute("aria-valuetext", `${plain(accepted)} ${unit}`);
+    describe();
   };
   const submit = async (value) => {
     pending += 1;
@@ -101,7 +108,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
   return {
     element: el("div", { class: "field" },
       el("label", { for: id, title: label }, el("span", { class: "visually-hidden" }, label), el("span", { "aria-hidden": "true" }, short)),
-      slider, input, el("span", { class: "unit" }, unit), said.element),
+      track, input, el("span", { class: "unit" }, unit), said.element),
     input,
     /** The runtime's value. Not shown while its own change is under way or somebody types. */
     accept(value) {
@@ -111,6 +118,17 @@ export function numberField({ label, short = label, unit, low, high, log = false
       if (typing) return;
       said.show("");
       show();
+    },
+    /** Marks the limit of what is stable on the slider, where there is one within its ends. */
+    mark(value) {
+      if (Object.is(value, marked)) return;
+      marked = value;
+      limit.hidden = !(value >= low && value <= high);
+      if (!limit.hidden) {
+        limit.title = `stable up to ${significant(value, 3)} ${unit}`;
+        limit.style.setProperty("--at", String(partOf(value)));
+      }
+      describe();
     },
     value: () => accepted,
     refuse: said.show,

@@ -1,7 +1,6 @@
 // @ts-check
 // The last five minutes of the arm, one row per joint state: what the plots draw and the CSV file holds.
-// Invariant: rows are in order of simulation time, without repeats; a reset begins anew, and a record that goes back
-// keeps what was before.
+// Invariant: rows are in order of simulation time, without repeats; a reset begins anew.
 
 import { gravityLoad, kinetic, potential } from "./mechanics.js";
 import { Ring } from "./ring.js";
@@ -54,9 +53,4 @@ export function firstAfter(time) {
     else high = middle;
   }
   return low;
-}
-
-/** Forgets the rows at and after `time` [s]. @param {number} time */
-export function forgetFrom(time) {
-  record.keep(firstAfter(time));
 }

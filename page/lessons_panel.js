@@ -2,7 +2,7 @@
 // The lessons' row: a button for each, and the two sentences of the one that was chosen.
 // Invariant: a lesson changes the arm only when it is clicked.
 
-import { announce, warn } from "./announce.js";
+import { announce } from "./announce.js";
 import { startLesson } from "./actions.js";
 import { byId, el, setText } from "./dom.js";
 import { LESSONS } from "./lessons.js";
@@ -10,7 +10,6 @@ import { set, state, watch } from "./store.js";
 
 /** Here the lessons' buttons are far from the arm; as in `small.css`. */
 const SMALL = "(max-width: 779px)";
-const RECORD = "A record is replayed, and nothing of it can be changed: lessons are for a live arm.";
 
 export function startLessons() {
   const welcome = [...byId("lesson-text").childNodes].map((one) => one.cloneNode(true));
@@ -28,16 +27,10 @@ export function startLessons() {
     byId("lesson-text").replaceChildren(...(chosen ? [chosen.text] : welcome.map((one) => one.cloneNode(true))));
   };
   watch("lesson", show);
-  watch("replay", show);
 }
 
 async function choose(lesson) {
   if (state.links === 0) return;
-  if (state.replay) {
-    setText(byId("lesson-text"), RECORD);
-    warn(RECORD);
-    return;
-  }
   if (lesson === state.lesson) {
     set("lesson", null);
     announce("The lesson is over; its settings stay.");

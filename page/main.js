@@ -18,14 +18,13 @@ import { startLimits } from "./limits_view.js";
 import { startMap } from "./map_view.js";
 import { startModes } from "./modes_view.js";
 import { follow, goLive } from "./playback.js";
-import { startPlayerBar } from "./player_bar.js";
 import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
-import { forgetFrom, take } from "./history.js";
+import { record, take } from "./history.js";
 import { start } from "./runtime.js";
 import { startSave } from "./save.js";
 import { startShare } from "./share.js";
-import { state, watch, watchAll } from "./store.js";
+import { watch, watchAll } from "./store.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
@@ -59,7 +58,6 @@ startModes();
 startLadder();
 startCompare();
 startHistory();
-startPlayerBar();
 startLessons();
 startActions();
 startSave();
@@ -72,9 +70,9 @@ if (matchMedia("(max-width: 779px)").matches) {
   for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 
-/** Forgets what was before a reset, or, of a record that goes back, what comes after `time` [s]. */
-function forget(time = 0) {
-  forgetFrom(state.replay ? time : 0);
+/** Forgets the recording: a reset begins anew. */
+function forget() {
+  record.clear();
   goLive();
   redrawPlots();
 }
@@ -84,7 +82,7 @@ watch("version", () => {
   follow();
   if (hasMoved()) wake();
 });
-watch("links", () => forget());
+watch("links", forget);
 start(forget, remember);
 
 let beats = 0;

@@ -77,6 +77,15 @@ export function innerReach(lengths) {
   return Math.max(0, 2 * Math.max(...lengths) - reach(lengths));
 }
 
+/** The place nearest to the given one that the end effector can reach [m]; `lengths` are those of the links. */
+export function nearestInReach({ x, y }, lengths) {
+  const distance = Math.hypot(x, y);
+  const near = Math.min(reach(lengths), Math.max(innerReach(lengths), distance));
+  if (near === distance) return { x, y };
+  // All directions are as near from the base itself.
+  return distance > 0 ? { x: x * (near / distance), y: y * (near / distance) } : { x: near, y: 0 };
+}
+
 /** `angle` shifted by whole turns to within pi of `near`. */
 export function nearestTurn(angle, near) {
   return angle + 2 * Math.PI * Math.round((near - angle) / (2 * Math.PI));

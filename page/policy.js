@@ -15,18 +15,20 @@ import { isFree, noGains } from "./loop.js";
  * @property {number} limit largest stable timestep [s]: 0 none, Infinity any, NaN not known
  * @property {number} advised timestep to offer [s]; NaN where there is none
  * @property {string} where what pose or speed the limit is about
+ * @property {boolean} slow whether the verdict is about a control period longer than the timestep
  */
 
 /** Share of a limit that is advised, as the runtime does. */
 const SHARE = 0.8;
 
 /** The question whose answer is about the loop in force: with the servo off that is the arm left to itself. */
-export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown }) {
+export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
   if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
   return {
     integrator: integrator.method,
     params,
     gains: enabled ? gains : noGains(links),
+    ...(enabled && period?.period > 0 ? { control_period: period.period } : {}),
     ...(enabled && setpointKnown ? { setpoint: Array.from(setpoint.subarray(0, links)) } : {}),
   };
 }
@@ -79,12 +81,38 @@ export function limitInForce(/** @type {any} */ state) {
   };
 }
 
+/**
+ * The largest stable control period [s]: 0 none, Infinity any, NaN not known, as while no controller acts.
+ * An answer that names none is about a control law that runs at every step, without a delay: there it is the timestep's limit.
+ */
+export function controlPeriodLimit(/** @type {any} */ state) {
+  const answer = answerInForce(state);
+  if (!answer || !state.enabled || isFree(state.gains)) return NaN;
+  if (answer.control_period_limit !== undefined) return open(answer.control_period_limit);
+  return state.period?.delay ? NaN : open(answer.timestep_limit_held);
+}
+
+/** Timesteps from one control update to the next, as the runtime counts them: at least 1. */
+function stepsPerUpdate(/** @type {any} */ { period, integrator }) {
+  return Math.max(1, Math.round((period?.period ?? 0) / integrator.timestep));
+}
+
+/** The control period in force, in few words; empty where the control law runs at every step without a delay. */
+export function periodText(/** @type {any} */ state) {
+  const { period, integrator } = state;
+  if (!period || !integrator) return "";
+  const steps = stepsPerUpdate(state);
+  const often = steps > 1 ? [`${steps} steps`, duration(steps * integrator.timestep)] : [];
+  return [...often, ...(period.delay ? ["delayed"] : [])].join(", ");
+}
+
 /** The pose that bears least, how surely that is known, and what shakes there first; empty where nothing limits. */
 export function worstText(/** @type {any} */ answer) {
-  const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound } = answer ?? {};
+  const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound, bound_is_proven: proven } = answer ?? {};
   if (!(least > 0) || !pose || !critical) return "";
-  const sure = certified ? "proven to 1 %"
-    : `the least that a search found${bound > 0 ? `; proven is ${duration(bound)}` : ", not proven"}`;
+  const kind = proven ? "proven" : "bounded by an estimate";
+  const sure = certified ? `${kind} to 1 %`
+    : `the least that a search found${bound > 0 ? `; ${kind} is ${duration(bound)}` : ", without a bound"}`;
   const way = critical.frequency > 0 ? `at ${significant(critical.frequency, 3)} Hz` : "without swinging";
   return `The pose that bears least, ${duration(least)} (${sure}), is (${pose.map((/** @type {number} */ q) => fixed(q, 2)).join(", ")}) rad: 10 % beyond it joint ${critical.joint + 1} `
     + `moves most, ${way}, ${significant(critical.growth_per_step, 3)} times further at every step.`;
@@ -92,20 +120,26 @@ export function worstText(/** @type {any} */ answer) {
 
 /** @returns {Verdict} */
 export function verdict(/** @type {any} */ state) {
-  const { limit, where, everyPose, advised } = limitInForce(state);
-  const timestep = state.integrator?.timestep ?? NaN;
-  const offered = advised > 0 && advised < timestep ? advised : NaN;
-  const known = { limit, where, advised: offered };
-  const at = `${duration(timestep)}`;
+  const { limit: timestepLimit, where, everyPose, advised } = limitInForce(state);
+  const { timestep = NaN } = state.integrator ?? {};
+  const steps = state.enabled && state.integrator ? stepsPerUpdate(state) : 1;
+  const slow = steps > 1;
+  const longest = steps * timestep;
+  const limit = slow || (state.enabled && state.period?.delay) ? Math.min(timestepLimit, controlPeriodLimit(state)) : timestepLimit;
+  // A smaller timestep makes no control period shorter.
+  const offered = !slow && advised > 0 && advised < timestep ? advised : NaN;
+  const known = { limit, where, advised: offered, slow };
+  const at = slow ? `A control period of ${duration(longest)}` : duration(timestep);
+  const above = excess(at, longest, limit, where);
   if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
   if (state.diagnostics?.state === "diverged") {
-    return { kind: "diverged", pill: "diverged", sentence: excess(timestep, limit, where), ...known };
+    return { kind: "diverged", pill: "diverged", sentence: above, ...known };
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
-  if (timestep > limit) {
-    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: excess(timestep, limit, where), ...known };
+  if (longest > limit) {
+    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: above, ...known };
   }
-  if (timestep > everyPose) {
+  if (longest > everyPose) {
     const others = everyPose > 0 ? `other poses bear only ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: there the gains themselves are at fault";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
@@ -113,11 +147,11 @@ export function verdict(/** @type {any} */ state) {
   return { kind: "stable", pill: "stable", sentence: `${at} is within the limit ${limitText(limit)}, ${where}.`, ...known };
 }
 
-/** Why the timestep is too long; empty if it is not. @param {number} timestep @param {number} limit @param {string} where */
-function excess(timestep, limit, where) {
-  if (!(timestep > limit)) return "";
+/** Why a time is too long; empty if it is not. @param {string} at the time in words @param {number} time @param {number} limit @param {string} where */
+function excess(at, time, limit, where) {
+  if (!(time > limit)) return "";
   return limit > 0
-    ? `${duration(timestep)} is above the limit ${duration(limit)}, ${where}.`
+    ? `${at} is above the limit ${duration(limit)}, ${where}.`
     : `No timestep is stable, ${where}.`;
 }
 

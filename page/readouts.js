@@ -29,7 +29,7 @@ export function startReadouts() {
     pill.className = `pill ${now}`;
     setText(byId("connection-text"), { open: "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
   });
-  const causes = ["connection", "stability", "stabilityMissing", "integrator", "gains", "params", "setpoint", "enabled", "diagnostics"];
+  const causes = ["connection", "stability", "stabilityMissing", "integrator", "gains", "params", "period", "setpoint", "enabled", "diagnostics"];
   for (const key of causes) watch(key, showLimit);
   watch("integrator", () => estimates.clear());
   watch("estimate", (estimate) => {
@@ -67,7 +67,7 @@ function runState() {
   return state.paused ? "paused" : "running";
 }
 
-/** The verdict on the timestep: in a word on the arm, in a sentence under it, and beside the timestep as a bar. */
+/** The verdict on the timestep: in a word on the arm, in a sentence under it; and under the clocks what to use. */
 function showLimit() {
   const said = verdict(state);
   const { limit, everyPose } = limitInForce(state);
@@ -84,15 +84,8 @@ function showLimit() {
   setText(byId("out-every"), state.enabled === false || state.stabilityMissing ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
-  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found");
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "proven" : "bounded" : "found");
   byId("out-every").classList.toggle("warn", said.kind === "here");
-  const known = Number.isFinite(limit) && limit > 0;
-  const bar = byId("limit-bar");
-  bar.hidden = !known || state.integrator == null;
-  const used = state.integrator ? state.integrator.timestep / limit : 0;
-  bar.style.setProperty("--used", `${Math.min(100, 100 * used)}%`);
-  bar.className = `limit-bar ${used > 1 ? "bad" : said.kind === "here" || used > 0.7 ? "warn" : "good"}`;
-  bar.setAttribute("aria-label", `timestep is ${fixed(100 * used, 0)} percent of the stability limit`);
   setText(byId("limit-text"), adviceText(state));
 }
 

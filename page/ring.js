@@ -13,13 +13,7 @@ export class Ring {
   }
 
   clear() {
-    this.keep(0);
-  }
-
-  /** Forgets all rows but the oldest `count`. @param {number} count */
-  keep(count) {
-    this.head = (this.head + this.capacity - this.length + count) % this.capacity;
-    this.length = count;
+    this.length = 0;
   }
 
   /** Makes room for one row, and gives the index in `data` where it begins. */

@@ -40,10 +40,10 @@ let missingPolls = 0;
 let lastTrajectory = -Infinity;
 let lastReset = -Infinity;
 let touched = -Infinity;
-let onReset = (_time) => {};
+let onReset = () => {};
 let beforeChange = () => {};
 
-/** `whenReset` is called at a reset of the arm, or where a record goes back, with the time that it is then [s], `whenChanging` before the page changes a setting. */
+/** `whenReset` is called at a reset of the arm, `whenChanging` before the page changes a setting. */
 export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
@@ -106,10 +106,6 @@ function connection(now) {
     set("trial", null);
     set("estimate", null);
     poll();
-    whatIsOffered().then((services) => {
-      set("offersGains", services.includes("/study/gains"));
-      set("replay", services.includes("/rosbag2_player/seek"));
-    });
     announce("Connected to the arm.");
   } else if (now === "lost" && before === "open") {
     warn("The connection is lost. The page reconnects by itself.");
@@ -134,11 +130,10 @@ function jointStates(msg) {
   if (time < state.time) {
     const now = performance.now();
     const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
-    // A record that goes back has its setpoint in its diagnostics.
-    if (lastTrajectory < resetAt && !state.replay) keepSetpoint(new Array(n).fill(0));
+    if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
     set("goal", null);
-    onReset(time);
+    onReset();
   }
   state.time = time;
   for (let i = 0; i < n; i += 1) {
@@ -200,8 +195,7 @@ function diagnostics(msg) {
     }
   }
   const before = state.diagnostics?.state;
-  // A record's diagnostics say how the arm was; whether the record itself goes on its bar asks.
-  if (report.state !== "diverged" && !state.replay) keep("paused", report.state === "paused");
+  if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
   if (motionHasChanged(state) && question(state)) askNow(question(state));
   if (before === report.state) return;
@@ -243,6 +237,7 @@ function poll() {
   setParams({});
   setIntegrator({});
   setGains({});
+  setPeriod({});
   pause();
   enable();
   if (!state.stabilityMissing || (missingPolls += 1) % MISSING_POLLS === 0) askStability();
@@ -270,6 +265,7 @@ function keep(key, value) {
 export const setParams = (args) => settings("/arm_sim/set_params", args, (values) => keep("params", values));
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
+export const setPeriod = (args) => settings("/pid_controller/set_period", args, (values) => keep("period", values));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
@@ -277,15 +273,7 @@ export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
 export const trialStart = (args) => bridge.call("/ik_trial/start", args);
 export const trialSkip = () => bridge.call("/ik_trial/skip");
 export const trialStop = () => bridge.call("/ik_trial/stop");
-/** Drives a record that is replayed. */
-export const player = (how, args = {}) => bridge.call(`/rosbag2_player/${how}`, args);
-/** The services that anybody provides. */
-async function whatIsOffered() {
-  const answer = await bridge.call("/rosapi/services");
-  return answer.result ? answer.values.services : [];
-}
-
-/** Gains for the present arm, where the runtime offers to find some. */
+/** Gains for the present arm. */
 export const suggestGains = () => bridge.call("/study/gains", {}, LONG_CALL_MS);
 /** Offline motion of the same arm. */
 export const rollout = (args) => bridge.call("/study/rollout", args, LONG_CALL_MS);
@@ -302,6 +290,17 @@ export async function reset() {
     lastReset = performance.now();
     touch();
     keepSetpoint(new Array(state.links).fill(0));
+  }
+  return answer;
+}
+
+/** Puts the arm into another pose [rad], at rest, running or paused. It is no setting, so there is nothing to undo. */
+export async function setPose(position) {
+  const answer = await bridge.call("/arm_sim/set_state", { position, velocity: position.map(() => 0) });
+  if (answer.result) {
+    touch();
+    state.pushed = false; // energy is counted anew
+    if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
   }
   return answer;
 }

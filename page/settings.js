@@ -12,6 +12,7 @@ import { METHODS, exact } from "./format.js";
  * @property {{method?: string, timestep?: number} | null} integrator
  * @property {Partial<Arm> | null} params
  * @property {Partial<Gains> | null} gains
+ * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
  * @property {boolean | null} servo
  * @property {number[] | null} setpoint
  */
@@ -27,6 +28,7 @@ export const DEFAULTS = {
     integrator: { method: "rk4", timestep: 0.001 },
     params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
     gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
+    period: { period: 0, delay: false },
     servo: false,
     setpoint: [0, 0],
   },
@@ -34,30 +36,33 @@ export const DEFAULTS = {
     integrator: { method: "rk4", timestep: 0.001 },
     params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
     gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
+    period: { period: 0, delay: false },
     servo: false,
     setpoint: [0, 0, 0],
   },
 };
 
 /** The settings in force; null until the runtime has said them all. @returns {Settings | null} */
-export function presentSettings(/** @type {any} */ { links, integrator, params, gains, enabled, setpoint, setpointKnown }) {
-  if (!integrator || !params || !gains || enabled == null) return null;
+export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, enabled, setpoint, setpointKnown }) {
+  if (!integrator || !params || !gains || !period || enabled == null) return null;
   return {
     integrator,
     params,
     gains,
+    period: { period: period.period, delay: period.delay },
     servo: enabled,
     setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
   };
 }
 
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, servo, setpoint }, links) {
+export function toFragment({ integrator, params, gains, period, servo, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
   const parts = [
     ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
     ["gravity", exact(params?.gravity ?? NaN)], ["masses", list(params?.masses ?? [])], ["lengths", list(params?.lengths ?? [])],
-    ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])], ["servo", servo ? "on" : "off"],
+    ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])],
+    ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["servo", servo ? "on" : "off"],
   ];
   if (setpoint) parts.push(["setpoint", list(setpoint)]);
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
@@ -73,11 +78,13 @@ export function fromFragment(/** @type {string} */ hash) {
   };
   const single = (/** @type {string} */ name) => (given.has(name) ? Number(given.get(name)) : undefined);
   const method = given.get("method") ?? "";
+  const onOff = (/** @type {string} */ name) => (given.has(name) ? given.get(name) === "on" : undefined);
   return {
     integrator: pick(["method", "timestep"], (name) => (name === "method" ? (METHODS.some(([known]) => known === method) ? method : undefined) : single(name))),
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
-    servo: given.has("servo") ? given.get("servo") === "on" : null,
+    period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
+    servo: onOff("servo") ?? null,
     setpoint: numbers("setpoint") ?? null,
   };
 }

@@ -20,14 +20,13 @@ export const state = {
   params: null, // { gravity, masses, lengths }
   integrator: null, // { method, timestep }
   gains: null, // { kp, ki, kd }
+  period: null, // { period, effective_period, delay }: how often the control law runs [s]
   paused: null,
   enabled: null, // is PID on
   diagnostics: null, // { level, message, state, ...numbers }
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   stabilityMissing: false,
-  replay: false, // whether the runtime plays a record in the arm's place
-  offersGains: false, // whether /study/gains is served
   estimate: null, // message of /arm_sim/error_estimate
   pushed: false, // whether an effort has acted with the servo off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }

@@ -10,7 +10,7 @@ import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
 import { limitInForce, verdict } from "./policy.js";
 import { nobodyProvides } from "./rosbridge.js";
-import { pause, step } from "./runtime.js";
+import { pause, setPeriod, step } from "./runtime.js";
 import { state, watch } from "./store.js";
 
 /** Below this real-time factor a warning of the runtime is about its pace. */
@@ -30,7 +30,7 @@ export function startTransport() {
     byId("pause").classList.toggle("is-paused", paused === true);
     announce(paused ? "Paused." : "Running.");
   });
-  const causes = ["diagnostics", "connection", "enabled", "goal", "integrator", "gains", "params", "setpoint", "stability", "trial", "offersGains"];
+  const causes = ["diagnostics", "connection", "enabled", "goal", "integrator", "gains", "params", "period", "setpoint", "stability", "trial"];
   for (const key of causes) watch(key, showNotice);
 }
 
@@ -76,20 +76,21 @@ function showNotice() {
 
 function choose() {
   const { diagnostics, goal } = state;
-  const { kind, sentence, advised } = verdict(state);
+  const { kind, sentence, advised, slow } = verdict(state);
   if (kind === "offline") {
     return state.links === 0
       ? { key: "connecting", kind: "calm", text: "Looking for the arm…", buttons: [] }
       : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
   }
-  const smaller = advised > 0 ? [[`Reset with ${duration(advised)}`, () => report(recover(advised))]] : [];
+  const smaller = slow ? [["Control at every step", () => report(setPeriod({ period: 0 }))]]
+    : advised > 0 ? [[`Reset with ${duration(advised)}`, () => report(recover(advised))]] : [];
   // No timestep helps where the gains are at fault.
-  const other = state.enabled && state.offersGains && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
+  const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
     return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Begin anew", () => report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
-  if (diagnostics?.level === 1 && diagnostics.real_time_factor < SLOW) {
+  if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {

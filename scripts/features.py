@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Builds the program with and without its features and prints the README's table: size, crates, processor time of a build.
 
-Each build starts from nothing in a folder that is deleted after it. `--crates` leaves the builds out. `--keep` writes the table into
+Each build starts from nothing in a folder that is deleted after it. `library` or `program` picks those. `--crates` leaves the builds out. `--keep` writes the table into
 README.md, between its two marks.
 """
 
@@ -57,7 +57,10 @@ def build(features, kind):
 def table(builds):
     head = ["build", "features", "crates"] + (["program", "processor time"] if builds else [])
     rows = [head, ["---"] * len(head)]
+    chosen = [word for word in sys.argv[1:] if not word.startswith("-")]
     for name, features, kind in BUILDS:
+        if chosen and kind not in chosen:
+            continue
         measured = build(features, kind) if builds else ()
         rows.append([name, f"`{features}`" if features else "", str(crates(features)), *measured])
     return "".join("| " + " | ".join(row) + " |\n" for row in rows)

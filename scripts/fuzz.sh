@@ -18,7 +18,7 @@ cd "$(dirname "$0")/.."
 seconds=${TIME:-60}
 runs=${RUNS:-}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
-all="frame series op fields expression inverse_kinematics simulation study outbox cbor http connection websocket runtime"
+all="frame series op fields expression inverse_kinematics simulation study cbor http connection websocket runtime"
 
 say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }
@@ -46,7 +46,7 @@ table=$folder/table.txt
 # The words that a target's inputs are made of, where they are text.
 dictionary() {
     case $1 in
-        inverse_kinematics | simulation | study | outbox) ;;
+        inverse_kinematics | simulation | study) ;;
         expression | http) echo "-dict=fuzz/dictionaries/$1.dict" ;;
         *) echo "-dict=fuzz/dictionaries/json.dict" ;;
     esac

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs the program, its completions and its manual: install.sh PROGRAM PREFIX. Without the feature cli the program alone.
+# Installs the program and its completions: install.sh PROGRAM PREFIX. Without the feature cli the program alone.
 set -euo pipefail
 program=$1
 prefix=$2
@@ -7,7 +7,7 @@ prefix=$2
 mkdir -p "$prefix/bin"
 cp "$program" "$prefix/bin/pendularm"
 chmod 755 "$prefix/bin/pendularm"
-"$program" man --help >/dev/null 2>&1 || exit 0
+"$program" completions --help >/dev/null 2>&1 || exit 0
 
 completions() { # shell, folder, file
     mkdir -p "$prefix/share/$2"
@@ -16,5 +16,3 @@ completions() { # shell, folder, file
 completions bash bash-completion/completions pendularm
 completions fish fish/vendor_completions.d pendularm.fish
 completions zsh zsh/site-functions _pendularm
-mkdir -p "$prefix/share/man/man1"
-"$program" man "$prefix/share/man/man1"

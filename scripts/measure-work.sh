@@ -155,7 +155,7 @@ if [ -e "$scratch/bare" ]; then
     for variant in bare whole; do
         binary=$scratch/bare
         [ $variant = bare ] || binary=$program
-        put "web-symbols-$variant" "$(nm -C "$binary" 2>/dev/null | grep -ciE 'tungstenite|httparse|websocket' || true)" symbols
+        put "web-symbols-$variant" "$(nm -C "$binary" 2>/dev/null | grep -ciE 'tungstenite|hyper|websocket' || true)" symbols
     done
 fi
 

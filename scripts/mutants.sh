@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
 # Changes src/math, src/protocol, src/actors and src/web one small thing at a time (cargo-mutants) and counts how many changes a test notices: the
 # mutation score.
-# usage: scripts/mutants.sh [--fresh] [math|protocol|actors] [--sample N] [--near] [options of cargo mutants, such as --file src/math/pid.rs]
+# usage: scripts/mutants.sh [--fresh] [math|protocol|actors] [--sample N] [--near] [--check] [options of cargo mutants, such as --file src/math/pid.rs]
 #
 # `--sample N` takes N mutants out of all, drawn by their names, so that the same ones come again when other lines have moved theirs.
 #
 # `actors`, only when it is asked for, is src/actors with src/web; what they are made of (src/math, src/protocol, src/study and so on) is a crate
 # below, compiled once. What their own tests miss is tried again, unless `--near` is given: with the simulation's seeds, and on the wire, against the
 # built program. A mutant that is noticed only there is `elsewhere`.
+#
+# `--check` only lays the layers out and checks that each compiles alone; it needs no cargo-mutants.
 #
 # The whole project would take minutes per mutant. So a layer is laid out alone, as a crate of its own under target/mutants (or MUTANTS_DIR),
 # with its integration tests as modules: one file to compile, incrementally, and one program to link and run. It ends at its first failed test.
@@ -37,7 +39,9 @@ sample=
 [ "${1:-}" != --sample ] || { sample=$2; shift 2; }
 near=0
 [ "${1:-}" != --near ] || { near=1; shift; }
-cargo mutants --version >/dev/null 2>&1 || fail "needs cargo-mutants: cargo install --locked cargo-mutants"
+check=0
+[ "${1:-}" != --check ] || { check=1; shift; }
+[ "$check" = 1 ] || cargo mutants --version >/dev/null 2>&1 || fail "needs cargo-mutants: cargo install --locked cargo-mutants"
 
 # The dependencies that the layer or its tests name, as Cargo.toml has them.
 dependencies() { # layer, section of Cargo.toml
@@ -93,7 +97,10 @@ lay_out() { # layer, folder
                 if [ "$test" = simulate ]; then echo 'harness = false'; fi
             done
         else
-            echo '[dependencies]'; dependencies "$1" dependencies
+            # The whole layer, with all features and what they depend on.
+            section features | sed -nE 's/^([a-z]+) = .*/\1 = []/p' | sed -e '1i[features]' -e '/^default/d'
+            echo 'default = ["batch", "cli", "record", "report", "runtime", "web"]'
+            echo '[dependencies]'; dependencies "$1" dependencies | sed 's/, optional = true//'
             echo '[dev-dependencies]'; dependencies "$1" dev-dependencies
         fi
         echo '[profile.dev]'; echo 'debug = false'; echo 'lto = "off"'
@@ -114,7 +121,7 @@ lay_out() { # layer, folder
             if [ "$name" = default_gains ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
             # Tests run in the order of their names: unit tests come first, those that take a second last.
             case $name in
-                expression | arm_turns | memory | memory_kinds | pacing | player | recorder | replay | slow | study) order=zz ;;
+                expression | arm_turns | memory | memory_kinds | pacing | recorder | replay | slow | study) order=zz ;;
                 *) order=z ;;
             esac
             test="../tests/$1/$name"
@@ -228,6 +235,7 @@ for layer in "${layers[@]}"; do
     keep_outcomes "$folder" caught
     lay_out "$layer" "$folder"
     touch "$folder/known.tsv"
+    if [ "$check" = 1 ]; then (cd "$folder" && cargo check --quiet --tests); continue; fi
     PROPTEST_CASES=64 RUST_TEST_THREADS=1 try_mutants "$layer" "$folder" 'open|missed' caught --lib "$@"
     if [ "$layer" = actors ] && [ "$near" = 0 ]; then
         try_mutants "$layer" "$folder" missed elsewhere '--test=*' "$@"

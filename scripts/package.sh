@@ -23,9 +23,12 @@ trap 'rm -rf "$work"' EXIT
 stage=$work/stage
 mkdir "$stage"
 
+commit=
 # 1. Our own files: what git tracks; without git, everything but what .gitignore lists.
 if [ "$(git rev-parse --show-toplevel 2>/dev/null)" = "$root" ]; then
     git ls-files -z >"$work/own"
+    commit=$(git rev-parse --short=12 HEAD)
+    [ -z "$(git status --porcelain --untracked-files=no)" ] || commit=$commit.modified
     [ -z "$(git status --porcelain)" ] || say "note: the tree differs from the last commit; tracked files go in as they are"
 else
     say "no git here: taking every file but the generated ones"
@@ -33,6 +36,8 @@ else
         -o -name node_modules -o -path "./submission.tar.gz" \) -prune -o -type f -printf '%P\0' >"$work/own"
 fi
 tar -c --null --verbatim-files-from -T "$work/own" | tar -x -C "$stage"
+# The commit, which `--version` prints. An extracted archive has the file already.
+[ -z "$commit" ] || echo "$commit" >"$stage/COMMIT"
 say "$(tr -cd '\0' <"$work/own" | wc -c) files of our own"
 
 # 2. The dependencies: from vendor/ if it is up to date, so that an extracted archive can be packed again offline.

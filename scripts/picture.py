@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Takes the picture of the page that the README shows: docs/page.png. Needs chromium and the built program (PENDULARM).
+"""Takes the picture of the page that the README shows: docs/page.png, or the file OUT. Needs chromium and the built program (PENDULARM).
 
 A lesson is on, the servo holds the arm at its setpoint, and the map of stability is there. The picture is written with a
 palette of 256 colours, which a screenshot of flat colours and grey text loses next to nothing by.
 """
 
+import os
 import pathlib
 import struct
 import sys
@@ -18,7 +19,7 @@ from chromium import Browser  # noqa: E402
 from png import Image  # noqa: E402
 from runtime import Runtime  # noqa: E402
 
-PICTURE = ROOT / "docs" / "page.png"
+PICTURE = ROOT / (os.environ.get("OUT") or "docs/page.png")
 LESSON = "Held or continuous"
 LIMIT = 150_000  # bytes: whoever opens the README loads it
 
@@ -81,7 +82,7 @@ def main():
     if len(picture) > LIMIT:
         sys.exit(f"picture: {len(picture)} bytes are more than {LIMIT}")
     PICTURE.write_bytes(picture)
-    print(f"picture: {PICTURE.relative_to(ROOT)}, {len(picture)} bytes")
+    print(f"picture: {PICTURE}, {len(picture)} bytes")
 
 
 main()

@@ -13,7 +13,7 @@
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: runs on record, read back and replayed |
-//! | `cli` | yes | `command`: commands that ask a running one, completions and manual |
+//! | `cli` | yes | `command`: commands that ask a running one, completions |
 //!
 //! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
 //! no more, and compiles `glam` and `thiserror` beside it. With `batch`, and `fearless_simd`, a step of Runge-Kutta on
@@ -33,6 +33,8 @@
 
 #[cfg(feature = "runtime")]
 pub mod actors;
+#[cfg(feature = "runtime")]
+pub mod address;
 #[cfg(feature = "cli")]
 pub mod command;
 #[cfg(feature = "runtime")]
@@ -51,5 +53,7 @@ pub mod record;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod study;
+#[cfg(feature = "runtime")]
+mod value;
 #[cfg(feature = "web")]
 pub mod web;

@@ -2,24 +2,22 @@
 //!
 //! **Invariant:** nothing here panics, also with standard output or standard error closed, full or broken.
 
-use std::fmt::Display;
 #[cfg(feature = "record")]
 use std::fs::File;
 #[cfg(feature = "record")]
 use std::io::BufReader;
-use std::io::{self, Write};
+#[cfg(feature = "record")]
+use std::path::Path;
 use std::process::ExitCode;
 
-use pendularm::actors::{panics, runtime};
+use pendularm::actors::{panics, runtime, signals};
 #[cfg(feature = "cli")]
 use pendularm::command::{self, CommandError};
 use pendularm::logging::{self, LogFormat};
 #[cfg(feature = "cli")]
-use pendularm::options;
-#[cfg(feature = "record")]
-use pendularm::options::ReplayOptions;
+use pendularm::options::completions;
 use pendularm::options::{Options, Parsed};
-use pendularm::output;
+use pendularm::output::{self, complain};
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
@@ -48,7 +46,9 @@ fn main() -> ExitCode {
     for key in ["arenas.dirty_decay_ms\0", "arena.0.dirty_decay_ms\0"] {
         let _ = key.name().write(FREED_KEPT_MS);
     }
-    match Options::parse(std::env::args_os(), |variable| std::env::var_os(variable)) {
+    // Without the handler a file that is too long kills the process, which nothing else depends on.
+    let _ = signals::survive_file_size_limit();
+    match Options::parse(std::env::args_os()) {
         Ok(Parsed::Serve(options)) => serve(&options),
         #[cfg(feature = "report")]
         Ok(Parsed::Report(options)) => match report::run(&options) {
@@ -66,11 +66,11 @@ fn main() -> ExitCode {
             }
         },
         #[cfg(feature = "record")]
-        Ok(Parsed::Replay(options)) => replay(&options),
+        Ok(Parsed::Replay { file }) => replay(&file),
         #[cfg(feature = "cli")]
-        Ok(Parsed::Ask(asked)) => end(command::run(&asked)),
+        Ok(Parsed::Ask(subject)) => end(command::run(&subject)),
         #[cfg(feature = "cli")]
-        Ok(Parsed::WriteManual(folder)) => end(command::pages(options::command_line(), &folder)),
+        Ok(Parsed::Completions { shell }) => show(&completions(shell)),
         Ok(Parsed::Show(text)) => show(&text),
         Err(error) => {
             complain(&error);
@@ -104,9 +104,9 @@ fn end(outcome: Result<(), CommandError>) -> ExitCode {
 
 /// Says whether the recorded steps can be taken again.
 #[cfg(feature = "record")]
-fn replay(options: &ReplayOptions) -> ExitCode {
-    let file = options.file.display();
-    let verdict = File::open(&options.file)
+fn replay(path: &Path) -> ExitCode {
+    let file = output::line(&path.display());
+    let verdict = File::open(path)
         .map_err(|error| error.to_string())
         .and_then(|file| record::replay(BufReader::new(file)).map_err(|error| error.to_string()));
     match verdict {
@@ -158,9 +158,4 @@ fn serve(options: &Options) -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// One line on standard error. If that is broken there is nobody left to tell.
-fn complain(error: &dyn Display) {
-    let _ = writeln!(io::stderr(), "pendularm: {error}");
 }

@@ -4,17 +4,65 @@
 
 use std::fmt::Write;
 
+use clap::Args;
+
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::shown::Shown;
-use crate::options::{Links, PlanOptions};
 use crate::study::control_loop::ControlLoop;
-use crate::study::planner::{PlanError, Planned, Planning, Task};
+use crate::study::planner::{MAX_DURATION, PlanError, Planned, Planning, Task};
+use crate::value::{Links, ValueReader, needed, read_links};
 
-/// How long an arm swings unless it is said \[s\].
-const SWING: f64 = 10.0;
 /// How long a move under control is watched \[s\]: with the default gains it has settled.
 const MOVE: f64 = 4.0;
+
+/// Find the cheapest method and timestep for an allowed error, and run them against the truth
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct PlanOptions {
+    /// Largest error of the end effector
+    #[arg(long, value_name = "METRES")]
+    #[arg(value_parser = ValueReader(read_positive))]
+    pub error: f64,
+    /// How long the arm swings from its starting pose, or `servo` for a move under control
+    #[arg(long, value_name = "SECONDS", default_value = "10")]
+    #[arg(value_parser = ValueReader(read_motion))]
+    pub duration: PlannedMotion,
+    /// Number of links of the arm, 2 or 3, whatever `ARM_SIM_LINKS` says
+    #[arg(long, value_name = "N", default_value = "2")]
+    #[arg(value_parser = ValueReader(read_links))]
+    pub links: Links,
+    /// Where a servo moves the joints, with commas between; 0.8,-0.6,0 unless given
+    #[arg(long, value_name = "RADIANS", value_delimiter = ',')]
+    #[arg(allow_hyphen_values = true, value_parser = ValueReader(read_angle))]
+    pub setpoint: Vec<f64>,
+}
+
+/// The motion for which method and timestep are planned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PlannedMotion {
+    /// The arm swings freely for so long \[s\].
+    Swing(f64),
+    /// The arm is under control, with the default gains.
+    Servo,
+}
+
+impl PlanOptions {
+    /// Checks the options against each other.
+    pub(crate) fn checked(mut self) -> Result<Self, String> {
+        let joints = self.setpoint.len();
+        if joints == 0 {
+            self.setpoint = vec![0.8, -0.6, 0.0];
+        } else if self.duration != PlannedMotion::Servo {
+            // A free arm has none: it would be left out of account.
+            return Err("--setpoint must be left out without --duration servo".to_owned());
+        } else if joints != self.links.count() {
+            return Err(format!(
+                "--setpoint must be a number for each joint, got {joints}"
+            ));
+        }
+        Ok(self)
+    }
+}
 
 /// Makes the plan, and answers it as text for a terminal.
 ///
@@ -30,16 +78,17 @@ pub fn run(options: &PlanOptions) -> Result<String, PlanError> {
 fn plan<const N: usize>(options: &PlanOptions, gains: Gains<N>) -> Result<String, PlanError> {
     let arm = Arm::<N>::default();
     let joint = |i: usize| options.setpoint.get(i).copied().unwrap_or_default();
-    let (control, usual) = if options.is_servo {
-        let setpoint = Setpoint::at(std::array::from_fn(joint));
-        (ControlLoop::new(arm, gains, setpoint), MOVE)
-    } else {
-        (ControlLoop::free(arm), SWING)
+    let (control, duration) = match options.duration {
+        PlannedMotion::Swing(duration) => (ControlLoop::free(arm), duration),
+        PlannedMotion::Servo => {
+            let setpoint = Setpoint::at(std::array::from_fn(joint));
+            (ControlLoop::new(arm, gains, setpoint), MOVE)
+        }
     };
     let task = Task {
         control,
         start: State::rest(),
-        duration: options.duration.unwrap_or(usual),
+        duration,
         error: options.error,
     };
     let mut planning = Planning::new(task)?;
@@ -91,4 +140,25 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         );
     }
     out
+}
+
+fn read_positive(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok();
+    let positive = number.filter(|number| number.is_finite() && *number > 0.0);
+    needed(positive, "a number greater than 0", text)
+}
+
+fn read_motion(text: &str) -> Result<PlannedMotion, String> {
+    if text == "servo" {
+        return Ok(PlannedMotion::Servo);
+    }
+    let duration = Some(read_positive(text)?).filter(|duration| *duration <= MAX_DURATION);
+    let duration = needed(duration, &format!("at most {MAX_DURATION} s"), text)?;
+    Ok(PlannedMotion::Swing(duration))
+}
+
+fn read_angle(text: &str) -> Result<f64, String> {
+    let angle: Option<f64> = text.trim().parse().ok();
+    let needs = "a number for each joint, with commas between";
+    needed(angle.filter(|angle| angle.is_finite()), needs, text)
 }

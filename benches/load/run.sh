@@ -63,7 +63,7 @@ chmod 644 "$scratch/mosquitto.conf"
 mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
 mosquitto=$!
 pids+=("$mosquitto")
-"$program" --bind 127.0.0.1:0 --log warn >"$scratch/listening" 2>"$scratch/pendularm.log" &
+"$program" --bind 127.0.0.1:0 --clients 1100 --log warn >"$scratch/listening" 2>"$scratch/pendularm.log" &
 pendularm=$!
 pids+=("$pendularm")
 for _ in $(seq 600); do

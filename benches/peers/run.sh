@@ -4,12 +4,13 @@
 #
 # Installs the peers' headers and libraries from PyPI into benches/peers/.venv (nothing outside it is touched), compiles the programs
 # of this folder against them, compares all results, and only then times: every program in turn, PASSES times, on one
-# core. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++ (or CC, CXX).
+# core. ARGS=--quick makes one pass without the programs that compile Pinocchio themselves, which takes ten minutes. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++ (or CC, CXX).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
 here=$benches/peers
 passes=${PASSES:-5}
+[ -z "$quick" ] || passes=1
 cc=${CC:-gcc}
 cxx=${CXX:-g++}
 
@@ -20,7 +21,7 @@ done
 say "installing the peers into benches/peers/.venv"
 [ -x "$here/.venv/bin/python" ] || python3 -m venv "$here/.venv"
 if ! cmp -s "$here/requirements.txt" "$here/.venv/installed.txt"; then
-    "$here/.venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all: --no-deps \
+    "$here/.venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --only-binary :all: --no-deps \
         -r "$here/requirements.txt"
     cp "$here/requirements.txt" "$here/.venv/installed.txt"
 fi
@@ -46,30 +47,33 @@ pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBO
     -isystem "$prefix/include" -isystem "$prefix/include/eigen3")
 libraries=(-L"$prefix/lib" -lpinocchio_default -Wl,-rpath,"$prefix/lib")
 program pinocchio-wheel pinocchio.cpp "${pinocchio[@]}" -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION
-libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
-program pinocchio-native pinocchio.cpp "${pinocchio[@]}" -march=native
 libraries=("$mujoco" -Wl,-rpath,"$(dirname "$mujoco")")
 program mujoco mujoco.c "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L \
     -isystem "$packages/mujoco/include"
-# The C that Pinocchio generates, for each number of links: compiled as ours is, for any x86-64; for this machine; and with the flags
-# that Pinocchio gives its own, which let the compiler reorder sums and take sines side by side.
-libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
-program generate generate.cpp "${pinocchio[@]}" -O0
-for links in 2 3; do
-    forward=$target/peers/forward-$links.h
-    "$target/peers/generate" "$links" >"$forward"
-    generated() { # name, flags
-        local name=$1
-        shift
-        "$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
-            "$here/generated.c" -o "$target/peers/generated-$name-$links" -lm
-    }
-    generated plain -O3
-    generated native -O3 -march=native
-    generated fast -Ofast -march=native
-done
-say "building ours (release)"
-(cd "$benches" && cargo build --release --locked --quiet --bin peers)
+systems=(pendularm "pinocchio wheel" mujoco "mujoco bare")
+if [ -z "$quick" ]; then
+    systems+=("pinocchio native" "generated plain" "generated native" "generated fast")
+    libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
+    program pinocchio-native pinocchio.cpp "${pinocchio[@]}" -march=native
+    # The C that Pinocchio generates, for each number of links: compiled as ours is, for any x86-64; for this machine; and with the flags
+    # that Pinocchio gives its own, which let the compiler reorder sums and take sines side by side.
+    program generate generate.cpp "${pinocchio[@]}" -O0
+    for links in 2 3; do
+        forward=$target/peers/forward-$links.h
+        "$target/peers/generate" "$links" >"$forward"
+        generated() { # name, flags
+            local name=$1
+            shift
+            "$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
+                "$here/generated.c" -o "$target/peers/generated-$name-$links" -lm
+        }
+        generated plain -O3
+        generated native -O3 -march=native
+        generated fast -Ofast -march=native
+    done
+fi
+say "building ours"
+build --bin peers
 
 folder=$(results_folder)/peers
 rm -rf "$folder"
@@ -83,26 +87,24 @@ cd "$folder"
     echo "passes:    $passes, one pinned core, every program in turn"
 } >environment.txt
 
-# Runs a system by its name in the tables: $1 name, $2 links, $3 check or time.
+# Sets `command` to what runs a system, by its name in the tables: $1 name, $2 links, $3 check or time.
 system() {
     local states=states-$2.txt
     case $1 in
-        pendularm) "$built/peers" "$3" "$2" "$states" ;;
-        "pinocchio wheel") "$target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3" ;;
-        "pinocchio native") "$target/peers/pinocchio-native" "$1" "$2" "$states" "$3" ;;
-        generated*) "$target/peers/${1/ /-}-$2" "$1" "$2" "$states" "$3" ;;
-        mujoco) "$target/peers/mujoco" "$1" "$2" "$states" "$3" ;;
-        "mujoco bare") "$target/peers/mujoco" "$1" "$2" "$states" "$3" bare ;;
+        pendularm) command=("$built/peers" "$3" "$2" "$states") ;;
+        "pinocchio wheel") command=("$target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3") ;;
+        "pinocchio native") command=("$target/peers/pinocchio-native" "$1" "$2" "$states" "$3") ;;
+        generated*) command=("$target/peers/${1/ /-}-$2" "$1" "$2" "$states" "$3") ;;
+        mujoco) command=("$target/peers/mujoco" "$1" "$2" "$states" "$3") ;;
+        "mujoco bare") command=("$target/peers/mujoco" "$1" "$2" "$states" "$3" bare) ;;
     esac
 }
-export -f system
-export built benches
-systems=(pendularm "pinocchio wheel" "pinocchio native" "generated plain" "generated native" "generated fast" mujoco "mujoco bare")
 
 for links in 2 3; do
     "$built/peers" states "$links" >"states-$links.txt"
     for name in "${systems[@]}"; do
-        system "$name" "$links" check >"check-$links-$name.txt"
+        system "$name" "$links" check
+        "${command[@]}" >"check-$links-$name.txt"
     done
 done
 echo 'system,links,"what",shortest_ns,median_ns' >times.csv
@@ -110,8 +112,8 @@ for ((pass = 1; pass <= passes; pass++)); do
     say "pass $pass of $passes, core $core"
     for links in 2 3; do
         for name in "${systems[@]}"; do
-            # shellcheck disable=SC2016 # expanded by the inner shell
-            pinned bash -c 'system "$@"' bash "$name" "$links" time >>times.csv
+            system "$name" "$links" time
+            pinned "${command[@]}" >>times.csv
         done
     done
 done

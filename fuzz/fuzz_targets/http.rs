@@ -1,7 +1,7 @@
-//! The first bytes of a connection, and HTTP behind them: one request, with and without a token to be shown.
+//! The first bytes of a connection, and HTTP behind them, with and without a token to be shown.
 //!
-//! Asserted: the answer is lines of JSON, or one well-formed HTTP answer of known headers, as long as it says, and then the
-//! end, whatever follows the request; a file is never one from outside the report's folder; who is let in, and who is not, is
+//! Asserted: the answer is lines of JSON, or well-formed HTTP answers of known headers, as long as they say, and then the
+//! end; a file is never one from outside the report's folder; who is let in with the first request, and who is not, is
 //! what a [second opinion](pendularm_fuzz::admission) says; whoever speaks JSON and does not show the token hears one line.
 //!
 //! Input: a byte of settings, a byte that says in which pieces the rest is sent, the rest.
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
 use pendularm::actors::gateway::connection::admission::{Admission, Newcomers};
-use pendularm::actors::resources::budget::Memory;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Site;
 use pendularm::web::access::Access;
@@ -80,7 +80,12 @@ fn check(input: &[u8]) {
     let answer = run(converse(admission(rules), bytes, piece.max(1).into()));
     let expected = judge(bytes, rules);
     if answer.starts_with(b"HTTP/") {
-        check_answer(&answer, expected);
+        let mut answers = answer.as_slice();
+        let mut first = Some((expected, bytes.starts_with(b"HEAD ")));
+        let asks_head = bytes.windows(5).any(|window| window == b"HEAD ");
+        while !answers.is_empty() {
+            answers = check_answer(answers, first.take(), asks_head);
+        }
         return;
     }
     let is_certain = expected.is_some_and(|(_, is_certain)| is_certain);
@@ -169,19 +174,43 @@ async fn converse(admission: Admission, bytes: &[u8], piece: usize) -> Vec<u8> {
     answer
 }
 
-fn check_answer(answer: &[u8], expected: Option<(Opinion, bool)>) {
+/// Whether the answer whose head ends before `behind` has no body.
+fn is_bodyless(
+    behind: &[u8],
+    first: Option<(Option<(Opinion, bool)>, bool)>,
+    asks_head: bool,
+) -> bool {
+    let at_end = behind.is_empty() || behind.starts_with(b"HTTP/");
+    match first {
+        Some((Some((_, true)), is_head)) => is_head,
+        Some((_, is_head)) => is_head && at_end,
+        None => asks_head && at_end,
+    }
+}
+
+/// Checks an answer. The `first` one is checked against an opinion of its request, and whether that is a HEAD request.
+/// The answer to such a request has no body; `asks_head` says whether a later request may be one. Returns the bytes
+/// behind the answer.
+fn check_answer(
+    answer: &[u8],
+    first: Option<(Option<(Opinion, bool)>, bool)>,
+    asks_head: bool,
+) -> &[u8] {
     let end = answer
         .windows(4)
         .position(|window| window == b"\r\n\r\n")
-        .expect("a head");
+        .unwrap_or_else(|| panic!("a head: {}", String::from_utf8_lossy(answer)));
     let head = std::str::from_utf8(&answer[..end]).expect("a head is text");
-    let body = &answer[end + 4..];
+    let behind = &answer[end + 4..];
     let mut lines = head.split("\r\n");
-    let first = lines
+    let status_line = lines
         .next()
-        .and_then(|line| line.strip_prefix("HTTP/1.1 "))
+        .and_then(|line| {
+            line.strip_prefix("HTTP/1.1 ")
+                .or(line.strip_prefix("HTTP/1.0 "))
+        })
         .expect("a status line");
-    let status: u16 = first
+    let status: u16 = status_line
         .get(..3)
         .and_then(|code| code.parse().ok())
         .expect("a status");
@@ -199,15 +228,22 @@ fn check_answer(answer: &[u8], expected: Option<(Opinion, bool)>) {
             );
         }
     }
-    if status == 101 {
+    let (body, rest) = if status == 101 {
         let mut frames = Codec::opened(Framing::WebSocket);
-        frames.push(body);
+        frames.push(behind);
         while frames.next_event().expect("frames of a server").is_some() {}
+        (behind, &[][..])
+    } else if is_bodyless(behind, first, asks_head) {
+        (&[][..], behind)
     } else {
-        assert_eq!(length, Some(body.len()), "{head}");
-    }
+        let body = behind.split_at_checked(length.expect("a length"));
+        body.unwrap_or_else(|| panic!("too short: {head}"))
+    };
     let shown = String::from_utf8_lossy(body);
     assert!(!shown.contains(SECRET), "a file from outside the report");
+    let Some((expected, _)) = first else {
+        return rest;
+    };
     let opinion = expected.map(|(opinion, _)| opinion);
     // However odd a request is otherwise, nobody is let in who may not.
     match status {
@@ -228,4 +264,5 @@ fn check_answer(answer: &[u8], expected: Option<(Opinion, bool)>) {
         };
         assert!(fitting.contains(&status), "{opinion:?}: {head}");
     }
+    rest
 }

@@ -1,6 +1,6 @@
 //! Frames into operations: any text that the frame reader lets through.
 //!
-//! Asserted: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object gives an
+//! Asserted: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object, and the start of an answer that then fails, gives an
 //! operation; names and numbers are those of the frame, bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
 //! JSON in which nothing but numbers that overflow has changed.
 //!
@@ -53,11 +53,16 @@ fn judge(frame: &str) {
     let incoming = op::read(frame);
     let id = incoming.id.as_ref();
     let Some(json) = json else {
-        assert!(incoming.op.is_err() && id.is_none(), "{frame:?} is no JSON");
+        // Only an answer to a call or a goal counts in spite of its fault: that ends.
+        let is_refused = incoming.op.is_err() && id.is_none();
+        let ends_a_call = matches!(incoming.op, Ok(Op::BadAnswer { .. }));
+        assert!(is_refused || ends_a_call, "{frame:?} is no JSON");
         return;
     };
-    // A key that is no text makes a frame that is taken for no JSON.
-    if !matches!(incoming.op, Err(OpError::Status(Problem::NotJson(_)))) {
+    // A key that is no text makes a frame that is taken for no JSON; what stands behind it in an answer is not read.
+    let is_no_json = matches!(incoming.op, Err(OpError::Status(Problem::NotJson(_))));
+    let is_cut = id.is_none() && matches!(incoming.op, Ok(Op::BadAnswer { .. }));
+    if !is_no_json && !is_cut {
         let echoed = id.and_then(|id| Json::read(id.get()));
         assert_eq!(echoed.as_ref(), json.get("id"), "{frame:?}");
     }
@@ -141,9 +146,9 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             let milliseconds = number("throttle_rate").unwrap_or_default();
             assert_eq!(one.throttle, duration(milliseconds / 1000.0, MAX_THROTTLE));
             // A number beyond every count is as good as the largest.
-            let length = number("queue_length").unwrap_or(1.0);
+            let length = number("queue_length").unwrap_or_default();
             let longest = MAX_QUEUE_LENGTH as f64;
-            assert_eq!(one.queue_length as f64, length.clamp(1.0, longest));
+            assert_eq!(one.queue_length as f64, length.min(longest));
             assert_ne!(one.encoding.fragment_size, Some(0));
             if let Some(size) = one.encoding.fragment_size {
                 assert_eq!(Some(size as f64), number("fragment_size"));
@@ -175,6 +180,10 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
                     check_line(&line);
                 }
             }
+        }
+        Op::BadAnswer { problem, .. } => {
+            let why = problem.to_string();
+            assert!(why.len() < LONGEST_COMPLAINT && !why.contains(char::is_control));
         }
         Op::Fragment(_) | Op::SetLevel { .. } | Op::Auth { .. } => {}
     }

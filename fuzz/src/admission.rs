@@ -31,8 +31,6 @@ pub enum Opinion {
     Socket,
 }
 
-const PORT: u16 = 9095;
-
 /// A head, taken apart as far as the rules need it.
 struct Head {
     target: String,
@@ -43,7 +41,7 @@ struct Head {
 }
 
 /// The fate that a request must have, and whether that is certain: a request may be too odd to be read by anybody, and then must
-/// not be let in for what this makes of it. `None` if it is no whole GET request.
+/// not be let in for what this makes of it. `None` if it is no whole GET or HEAD request.
 #[must_use]
 pub fn judge(bytes: &[u8], rules: Rules<'_>) -> Option<(Opinion, bool)> {
     let head = read(bytes)?;
@@ -68,11 +66,19 @@ fn read(bytes: &[u8]) -> Option<Head> {
         .split(|&byte| byte == b'\n')
         .map(|line| String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)));
     let first = lines.next()?;
-    let first = first.strip_prefix("GET ")?;
+    let (method, first) = first.split_once(' ')?;
+    if !matches!(method, "GET" | "HEAD") {
+        return None;
+    }
     let (target, version) = first.split_once(' ').unwrap_or((first, ""));
     is_plain &= matches!(version, "HTTP/1.1" | "HTTP/1.0");
     is_plain &= target.starts_with('/') && target.bytes().all(|byte| byte.is_ascii_graphic());
     is_plain &= !target.contains(['"', '<', '>', '\\', '^', '`', '{', '|', '}']);
+    // A fragment is not part of a request, and is not looked at.
+    let target = target.split_once('#').map_or(target, |(before, _)| {
+        is_plain = false;
+        before
+    });
     let mut headers = Vec::new();
     for line in lines.filter(|line| !line.is_empty()) {
         let is_text = matches!(line, Cow::Borrowed(_));
@@ -90,6 +96,9 @@ fn read(bytes: &[u8]) -> Option<Head> {
         headers.push((name.to_ascii_lowercase(), value.to_owned()));
     }
     is_plain &= headers.len() <= 32;
+    // A request with a body is refused, whoever asks.
+    let has_body = |name: &str| ["content-length", "transfer-encoding"].contains(&name);
+    is_plain &= !headers.iter().any(|(name, _)| has_body(name));
     Some(Head {
         target: target.to_owned(),
         headers,
@@ -161,8 +170,8 @@ fn is_this_machine(host: &str) -> bool {
 }
 
 fn is_ours((host, port): &Place, rules: Rules<'_>) -> bool {
-    (is_this_machine(host) && *port == PORT)
-        || (rules.has_name && host == "arm.example" && *port == 80)
+    let name = host.strip_suffix('.').unwrap_or(host);
+    is_this_machine(host) || (rules.has_name && name == "arm.example" && *port == 80)
 }
 
 fn may_open(origins: &[&str], own: &Place, rules: Rules<'_>) -> bool {

@@ -20,8 +20,8 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Interest, Publish};
-use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::Arm;
@@ -82,7 +82,7 @@ struct NodeState {
 /// Little room for all clients together: what a few of them can fill in one execution.
 #[must_use]
 pub fn scarce() -> Memory {
-    Memory::of(1 << 21)
+    Memory::of(1, 1 << 20)
 }
 
 /// The runtime's side.
@@ -151,7 +151,7 @@ impl Stage {
     /// Whether nobody is connected, and nothing is held for anybody.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.gauges.connections() == 0 && self.gauges.memory().held() == 0
+        self.gauges.connections() == 0 && self.gauges.memory().taken() == 0
     }
 
     /// How the node treats calls from now on.

@@ -57,6 +57,10 @@ def vector(env: gymnasium.vector.VectorEnv) -> Callable[[], int]:
     return run
 
 
+def many(name: str) -> gymnasium.vector.VectorEnv:
+    return gymnasium.make_vec(name, ARMS, threads=1, timestep=0.025)
+
+
 def batch() -> Callable[[], int]:
     """The library alone: no observation, no reward."""
     arms = pendularm.Batch(ARMS, threads=1)
@@ -116,9 +120,9 @@ def main() -> None:
         "Acrobot-v1, 8 in a SyncVectorEnv": vector(gymnasium.make_vec("Acrobot-v1", 8, vectorization_mode="sync")),
         "MuJoCo, mj_step with nstep=2": mujoco_step(),
         "MuJoCo, rollout of 64 arms": mujoco_rollout(),
-        "Pendularm-v0": single(gymnasium.make("Pendularm-v0")),
-        f"Pendularm-v0, {ARMS} in its vector environment": vector(gymnasium.make_vec("Pendularm-v0", ARMS, threads=1)),
-        f"PendularmReach-v0, {ARMS} likewise": vector(gymnasium.make_vec("PendularmReach-v0", ARMS, threads=1)),
+        "Pendularm-v0": single(gymnasium.make("Pendularm-v0", timestep=0.025)),
+        f"Pendularm-v0, {ARMS} in its vector environment": vector(many("Pendularm-v0")),
+        f"PendularmReach-v0, {ARMS} likewise": vector(many("PendularmReach-v0")),
         f"pendularm.Batch of {ARMS}": batch(),
     }
     best = dict.fromkeys(rows, 0.0)

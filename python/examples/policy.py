@@ -2,8 +2,8 @@
 
 CMA-ES (the package `cma`) draws some dozens of small networks, 300 times unless told otherwise; a vector environment
 tries each of them on several arms at once, and the best half shapes the next draw. Needs
-`pip install "$(ls python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, 0.85,
-on starts that were not trained on, and keeps the network in `policy.npz`.
+`pip install "$(ls python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, more
+than 0.5, on starts that were not trained on, and keeps the network in `policy.npz`.
 """
 
 import sys

@@ -2,12 +2,12 @@
 //!
 //! **Invariant:** an arm that exists is valid, and never changes.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use pendularm::math::arm::Arm as Rods;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::arrays::joints_or;
+use crate::arrays::{joints_or, property};
 use crate::fields::{self, Bound, Handed, Held, Meant, Object, Real, Whole, refused};
 
 /// Rods of 2 or 3 links.
@@ -68,14 +68,14 @@ impl Arm {
 
     /// Link lengths [m], (links,).
     #[getter]
-    fn lengths<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
-        for_either!(Chain, &self.chain, arm => arm.lengths().to_pyarray(py))
+    fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
+        for_either!(Chain, &self.chain, arm => property(py, arm.lengths()))
     }
 
     /// Link masses [kg], (links,).
     #[getter]
-    fn masses<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
-        for_either!(Chain, &self.chain, arm => arm.masses().to_pyarray(py))
+    fn masses<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
+        for_either!(Chain, &self.chain, arm => property(py, arm.masses()))
     }
 
     /// Gravity along -y [m/s²].
@@ -106,8 +106,8 @@ impl Arm {
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((usize,), Held<'py, PyDict>)> {
         let given = PyDict::new(py);
-        given.set_item("lengths", self.lengths(py))?;
-        given.set_item("masses", self.masses(py))?;
+        given.set_item("lengths", self.lengths(py)?)?;
+        given.set_item("masses", self.masses(py)?)?;
         given.set_item("gravity", self.gravity())?;
         Ok(((self.links(),), given))
     }

@@ -1,4 +1,4 @@
-//! Arrays of numbers that Python hands in, and their rows.
+//! Arrays of numbers that Python hands in, and their rows; and arrays that Python gets.
 //!
 //! **Invariant:** numbers are read in the order that their indices have, however they lie in memory.
 
@@ -6,14 +6,52 @@ use std::borrow::Cow;
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods, ToPyArray,
 };
-use pyo3::exceptions::PyOverflowError;
+use pyo3::exceptions::{PyMemoryError, PyOverflowError};
 use pyo3::intern;
-use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python};
 use pyo3::types::PyDict;
 
-use crate::fields::{Bound, Held, Object, Real, beyond, held, is_masked, refused, shown};
+use crate::fields::{
+    Bound, Held, MOST_LISTED, Object, Real, beyond, held, is_masked, is_too_long, refused, shown,
+};
+
+/// An empty vector with room for `count` entries.
+///
+/// # Errors
+/// `MemoryError`. Every allocation whose size depends on the caller is made here or by NumPy.
+pub(crate) fn room<T>(count: usize) -> PyResult<Vec<T>> {
+    let mut room = Vec::new();
+    match room.try_reserve_exact(count) {
+        Ok(()) => Ok(room),
+        Err(_) => Err(PyMemoryError::new_err(format!(
+            "no memory for {count} entries of {} bytes",
+            size_of::<T>()
+        ))),
+    }
+}
+
+/// The items in a vector. `count` is how many there are.
+pub(crate) fn collected<T>(count: usize, items: impl Iterator<Item = T>) -> PyResult<Vec<T>> {
+    let mut all = room(count)?;
+    all.extend(items.take(count));
+    Ok(all)
+}
+
+/// Makes an array read-only. Every array that a property returns is: writing into it would not change the object.
+pub(crate) fn read_only<'py, T: Element, D: Dimension>(
+    array: Held<'py, PyArray<T, D>>,
+) -> PyResult<Held<'py, PyArray<T, D>>> {
+    drop(array.try_readwrite()?.make_nonwriteable());
+    Ok(array)
+}
+
+/// The value of a property that is an array.
+pub(crate) fn property<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Held<'py, PyArray1<f64>>> {
+    read_only(values.to_pyarray(py))
+}
 
 /// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
 /// row.
@@ -30,11 +68,20 @@ impl<'py> Numbers<'py> {
                 shown(value)
             )));
         }
+        if is_too_long(value)? {
+            return Err(refused(format_args!(
+                "{field} must be a NumPy array if it has more than {MOST_LISTED} entries, got {}",
+                shown(value)
+            )));
+        }
         let array = match value.cast::<PyArrayDyn<f64>>() {
             Ok(array) => array.clone(),
             Err(_) => converted(value).map_err(|why| {
                 if why.is_instance_of::<PyOverflowError>(value.py()) {
                     return beyond(field);
+                }
+                if why.is_instance_of::<PyMemoryError>(value.py()) {
+                    return why;
                 }
                 refused(format_args!(
                     "{field} must be an array of numbers, got {}",

@@ -8,7 +8,7 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Chain, Given, for_either};
-use crate::arrays::{Numbers, Rows, joints_or};
+use crate::arrays::{Numbers, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
 
 /// The form of a function's answer for one state.
@@ -75,18 +75,18 @@ fn all_rows<'py, const K: usize>(
     let rows: [Rows<'_>; K] = rows
         .try_into()
         .map_err(|_| refused("as many rows as fields"))?;
-    let mut flat = Vec::new();
-    match count {
-        // Less work than to hand the interpreter's lock to another thread.
-        None => function(&rows, 1, &mut flat),
-        Some(count) => py.detach(|| function(&rows, count, &mut flat)),
-    }
     let mut shape: Vec<usize> = count.into_iter().collect();
     match answer {
         Shape::One => {}
         Shape::Point => shape.push(2),
         Shape::Joints => shape.push(links),
         Shape::Square => shape.extend([links, links]),
+    }
+    let mut flat = room(shape.iter().product())?;
+    match count {
+        // Less work than to hand the interpreter's lock to another thread.
+        None => function(&rows, 1, &mut flat),
+        Some(count) => py.detach(|| function(&rows, count, &mut flat)),
     }
     if shape.is_empty() {
         return Ok(flat
@@ -174,7 +174,6 @@ fn forward_dynamics_of_rows<const N: usize>(
 ) {
     let mut given = [[[0.0; BLOCK]; N]; 3];
     let mut found = [[0.0; BLOCK]; N];
-    out.reserve(count * N);
     for start in (0..count).step_by(BLOCK) {
         let block = start..count.min(start + BLOCK);
         for (columns, rows) in given.iter_mut().zip(rows) {

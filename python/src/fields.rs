@@ -9,11 +9,17 @@ use numpy::PyUntypedArray;
 use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
+use pyo3::intern;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
-use pyo3::types::{PyBool, PyFloat, PyList, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyStringMethods, PyTuple};
+
+use crate::arrays::room;
 
 /// Dimensions that an array has at most, and so the depth of lists that may stand for one.
 const MOST_DIMENSIONS: usize = 2;
+
+/// Most entries of a sequence that is no NumPy array. NumPy would allocate all of a range.
+pub(crate) const MOST_LISTED: usize = 10_000_000;
 
 /// The numbers that a field may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,14 +62,13 @@ pub(crate) type Object<'py> = pyo3::Bound<'py, PyAny>;
 /// An object as an error shows it: not all of a long array.
 pub(crate) fn shown(value: &Object<'_>) -> String {
     // Python writes out no whole number of thousands of digits.
-    let text = value.repr().map_or_else(
-        |_| format!("an object of {}", value.get_type()),
-        |text| text.to_string(),
-    );
-    if text.chars().count() > 60 {
-        format!("{}...", text.chars().take(60).collect::<String>())
-    } else {
-        text
+    let Ok(text) = value.repr() else {
+        return format!("an object of {}", value.get_type());
+    };
+    let text = text.to_string_lossy();
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{}...", text.get(..end).unwrap_or_default()),
+        None => text.into_owned(),
     }
 }
 
@@ -107,6 +112,53 @@ fn is_masked_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
         }
     }
     Ok(false)
+}
+
+/// Whether this, or a part of it, has more than [`MOST_LISTED`] entries and would be copied entry by entry.
+pub(crate) fn is_too_long(value: &Object<'_>) -> PyResult<bool> {
+    is_too_long_within(value, MOST_DIMENSIONS)
+}
+
+fn is_too_long_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
+    let (py, has) = (value.py(), |name| value.hasattr(name));
+    if value.is_exact_instance_of::<PyFloat>()
+        || value.is_exact_instance_of::<PyInt>()
+        || !has(intern!(py, "__len__"))?
+        || has(intern!(py, "__array__"))?
+    {
+        return Ok(false);
+    }
+    match value.len() {
+        Ok(length) if length <= MOST_LISTED => {}
+        Ok(_) => return Ok(true),
+        Err(why) => return Ok(why.is_instance_of::<PyOverflowError>(py)),
+    }
+    let has_parts = value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>();
+    if has_parts && depth > 0 {
+        for one in value.try_iter()? {
+            if is_too_long_within(&one?, depth - 1)? {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
+}
+
+/// The entries of a sequence of `count`; `None` where it is none, or has another number of them.
+pub(crate) fn entries<'py>(
+    value: &Object<'py>,
+    count: usize,
+) -> PyResult<Option<Vec<Object<'py>>>> {
+    let is_sequence = !value.is_instance_of::<PyDict>() && value.hasattr("__getitem__")?;
+    if !is_sequence || !value.len().is_ok_and(|length| length == count) {
+        return Ok(None);
+    }
+    // An object may have more entries than its length says.
+    let mut all = room(count + 1)?;
+    for one in value.try_iter()?.take(count + 1) {
+        all.push(one?);
+    }
+    Ok((all.len() == count).then_some(all))
 }
 
 /// Holds numbers to a bound; `place` says which of them it is.
@@ -185,6 +237,10 @@ impl Meant<'_, '_> for f64 {
     /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
     fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
         let is_real = || {
+            // NumPy would allocate all of a range before it is known to be no number.
+            if !value.hasattr("__float__")? && !value.hasattr("__index__")? {
+                return Ok(false);
+            }
             let numpy = value.py().import("numpy")?;
             let is_complex = numpy.call_method1("iscomplexobj", (value,))?;
             PyResult::Ok(!is_complex.is_truthy()? && !is_masked(&value)?)

@@ -4,19 +4,19 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::dynamics::energy;
 use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation as Loop;
+use pendularm::math::simulation::{ControlPeriod, Simulation as Loop};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMappingProxy};
 
 use crate::arm::{Arm, Chain, Given, for_either, or_default};
-use crate::arrays::{joints, joints_or};
+use crate::arrays::{joints, joints_or, property};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
 use crate::patience::{hold, until_done};
@@ -69,10 +69,11 @@ impl Divergence {
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
 /// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`,
-/// `midpoint`, `verlet` or `rk4`; `timestep` [s] is the control period too; `gains` is `{"kp": [N m/rad], "ki": [N
-/// m/(rad s)], "kd": [N m s/rad]}`, (links,) each, and what is left out of it is as in a fresh runtime. Threads may
-/// share one. It can be neither copied nor pickled, and a process that is forked while another thread steps it must not
-/// use it.
+/// `midpoint`, `verlet` or `rk4`; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each,
+/// and what is left out of it is as in a fresh runtime. The controller runs once per `control_period` [s], rounded to a
+/// whole number of timesteps, at least 1, and its effort is held in between; with `control_delay` it is applied one
+/// period later. Threads may share one. It can be neither copied nor pickled, and a process that is forked while
+/// another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
@@ -84,6 +85,7 @@ fn begin<const N: usize>(
     arm: Rods<N>,
     method: Method,
     timestep: f64,
+    period: ControlPeriod,
     gains: Option<&Object<'_>>,
 ) -> PyResult<Mutex<Loop<N>>>
 where
@@ -92,6 +94,7 @@ where
     let mut one = Loop::new(arm, gains::read(gains, Gains::default())?);
     one.set_method(method);
     one.set_timestep(timestep);
+    one.set_control_period(period);
     Ok(Mutex::new(one))
 }
 
@@ -99,44 +102,48 @@ where
 impl Simulation {
     #[new]
     #[pyo3(
-        signature = (arm=None, *, method=Name::Is("rk4".to_owned()), timestep=Real::Is(0.001), gains=None),
-        text_signature = "(arm=None, *, method=\"rk4\", timestep=0.001, gains=None)"
+        signature = (
+            arm=None, *, method=Name::Is("rk4".to_owned()), timestep=Real::Is(0.001), gains=None,
+            control_period=Real::Is(0.0), control_delay=Flag::Is(false)
+        ),
+        text_signature = "(arm=None, *, method=\"rk4\", timestep=0.001, gains=None, control_period=0.0, \
+                          control_delay=False)"
     )]
     fn new(
         arm: Option<Given<'_>>,
         method: Name,
         timestep: Real,
         gains: Option<&Object<'_>>,
+        control_period: Real,
+        control_delay: Flag,
     ) -> PyResult<Self> {
         let method = method.method("method")?;
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+        let period = ControlPeriod {
+            period: fields::number("control_period", control_period, Bound::NotNegative)?,
+            delay: control_delay.read("control_delay")?,
+        };
         let own = match or_default(arm)? {
-            Chain::Two(arm) => Either::Two(begin(arm, method, timestep, gains)?),
-            Chain::Three(arm) => Either::Three(begin(arm, method, timestep, gains)?),
+            Chain::Two(arm) => Either::Two(begin(arm, method, timestep, period, gains)?),
+            Chain::Three(arm) => Either::Three(begin(arm, method, timestep, period, gains)?),
         };
         Ok(Self { own })
     }
 
     /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The
-    /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
-    #[pyo3(signature = (steps=Whole::Is(1)), text_signature = "($self, steps=1)")]
-    fn step(&self, py: Python<'_>, steps: Whole) -> PyResult<u64> {
-        let mut left = steps.read("steps")?;
-        let mut taken = 0;
-        until_done(py, || {
-            // Held for a piece only: a signal's handler may want to look at the arm.
-            let piece = left.min(STEPS_PER_LOOK);
-            let advanced = for_either!(Either, &self.own, one => {
-                one.lock().unwrap_or_else(PoisonError::into_inner).advance(piece)
-            });
-            taken += advanced;
-            left = if advanced < piece { 0 } else { left - piece };
-            (left == 0).then_some(taken)
+    /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps. With an `effort` [N m], (links,),
+    /// the controller does not run in these steps, and that effort is applied instead.
+    #[pyo3(signature = (steps=Whole::Is(1), effort=None), text_signature = "($self, steps=1, effort=None)")]
+    fn step(&self, py: Python<'_>, steps: Whole, effort: Option<&Object<'_>>) -> PyResult<u64> {
+        let steps = steps.read("steps")?;
+        for_either!(Either, &self.own, one => {
+            let effort = effort.map(|effort| joints("effort", effort, Bound::Finite)).transpose()?;
+            take(py, one, steps, effort)
         })
     }
 
     /// Back to the starting pose at rest, at time 0: setpoint and integral with it, disturbance ended, divergence
-    /// cleared. On or off, gains, arm, method and timestep stay.
+    /// cleared, and a control period begins. On or off, gains, arm, method, timestep and control period stay.
     fn reset(&self, py: Python<'_>) {
         for_either!(Either, &self.own, one => hold(py, one).reset());
     }
@@ -188,7 +195,7 @@ impl Simulation {
     }
 
     /// Puts the arm into another state, `position` [rad] and `velocity` [rad/s] (zeros unless given), (links,) each.
-    /// Clock and controller stay.
+    /// A divergence ends; clock and controller stay.
     #[pyo3(signature = (position, velocity=None))]
     fn set_state(
         &self,
@@ -248,50 +255,50 @@ impl Simulation {
 
     /// Joint positions [rad], (links,), never wrapped.
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        for_either!(Either, &self.own, one => hold(py, one).state().position.to_pyarray(py))
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+        for_either!(Either, &self.own, one => property(py, &hold(py, one).state().position))
     }
 
     /// Joint rates [rad/s], (links,).
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        for_either!(Either, &self.own, one => hold(py, one).state().velocity.to_pyarray(py))
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+        for_either!(Either, &self.own, one => property(py, &hold(py, one).state().velocity))
     }
 
     /// Effort of the latest step [N m], (links,), the controller's and the disturbance's together.
     #[getter]
-    fn effort<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        for_either!(Either, &self.own, one => hold(py, one).effort().to_pyarray(py))
+    fn effort<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+        for_either!(Either, &self.own, one => property(py, hold(py, one).effort()))
     }
 
     /// Integral of the position error [rad s], (links,).
     #[getter]
-    fn integral<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        for_either!(Either, &self.own, one => hold(py, one).pid().integral().to_pyarray(py))
+    fn integral<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+        for_either!(Either, &self.own, one => property(py, hold(py, one).pid().integral()))
     }
 
     /// The setpoint: positions [rad] and velocities [rad/s], (links,) each.
     #[getter]
-    fn setpoint<'py>(&self, py: Python<'py>) -> (Numbers<'py>, Numbers<'py>) {
+    fn setpoint<'py>(&self, py: Python<'py>) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
         for_either!(Either, &self.own, one => {
             let one = hold(py, one);
             let Setpoint { position, velocity } = one.pid().setpoint();
-            (position.to_pyarray(py), velocity.to_pyarray(py))
+            Ok((property(py, position)?, property(py, velocity)?))
         })
     }
 
-    /// The gains in force, by name; what is written into the answer changes nothing.
+    /// The gains in force, by name, in a read-only mapping; `set_gains` changes them.
     #[getter]
-    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyDict>> {
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyMappingProxy>> {
         let found = PyDict::new(py);
         for_either!(Either, &self.own, one => {
             let one = hold(py, one);
             let Gains { kp, ki, kd } = one.pid().gains();
             for (name, gain) in [("kp", kp), ("ki", ki), ("kd", kd)] {
-                found.set_item(name, gain.to_pyarray(py))?;
+                found.set_item(name, property(py, gain)?)?;
             }
         });
-        Ok(found)
+        Ok(PyMappingProxy::new(py, found.as_mapping()))
     }
 
     /// Whether the controller is on.
@@ -313,7 +320,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Length of a step [s], and the control period.
+    /// Length of a step [s].
     #[getter]
     fn timestep(&self, py: Python<'_>) -> f64 {
         for_either!(Either, &self.own, one => hold(py, one).timestep())
@@ -323,6 +330,50 @@ impl Simulation {
     fn set_timestep(&self, py: Python<'_>, timestep: Real) -> PyResult<()> {
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
         for_either!(Either, &self.own, one => hold(py, one).set_timestep(timestep));
+        Ok(())
+    }
+
+    /// Time between two runs of the controller [s], as asked for; 0 stands for every step. A change of it, of
+    /// `control_delay` or of the timestep begins a period.
+    #[getter]
+    fn control_period(&self, py: Python<'_>) -> f64 {
+        for_either!(Either, &self.own, one => hold(py, one).control_period()).period
+    }
+
+    #[setter]
+    fn set_control_period(&self, py: Python<'_>, control_period: Real) -> PyResult<()> {
+        let period = fields::number("control_period", control_period, Bound::NotNegative)?;
+        for_either!(Either, &self.own, one => {
+            let mut one = hold(py, one);
+            let present = one.control_period();
+            one.set_control_period(ControlPeriod { period, ..present });
+        });
+        Ok(())
+    }
+
+    /// The control period in whole timesteps [s]: the nearest number of them, at least 1.
+    #[getter]
+    fn effective_control_period(&self, py: Python<'_>) -> f64 {
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            one.control_period().effective(one.timestep())
+        })
+    }
+
+    /// Whether the controller's effort is applied one control period after the state that it was computed from.
+    #[getter]
+    fn control_delay(&self, py: Python<'_>) -> bool {
+        for_either!(Either, &self.own, one => hold(py, one).control_period()).delay
+    }
+
+    #[setter]
+    fn set_control_delay(&self, py: Python<'_>, control_delay: Flag) -> PyResult<()> {
+        let delay = control_delay.read("control_delay")?;
+        for_either!(Either, &self.own, one => {
+            let mut one = hold(py, one);
+            let present = one.control_period();
+            one.set_control_period(ControlPeriod { delay, ..present });
+        });
         Ok(())
     }
 
@@ -349,10 +400,11 @@ impl Simulation {
 
     /// Position of the end effector [m], (2,).
     #[getter]
-    fn end_effector<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+    fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
         for_either!(Either, &self.own, one => {
             let one = hold(py, one);
-            forward(one.arm().lengths(), &one.state().position).position.to_array().to_pyarray(py)
+            let tip = forward(one.arm().lengths(), &one.state().position);
+            property(py, &tip.position.to_array())
         })
     }
 
@@ -375,6 +427,31 @@ impl Simulation {
             )
         })
     }
+}
+
+/// Takes up to so many steps, with this effort or the controller's, and answers how many.
+fn take<const N: usize>(
+    py: Python<'_>,
+    one: &Mutex<Loop<N>>,
+    steps: u64,
+    effort: Option<[f64; N]>,
+) -> PyResult<u64> {
+    let mut left = steps;
+    until_done(py, || {
+        // Held for a piece only: a signal's handler may want to look at the arm.
+        let piece = left.min(STEPS_PER_LOOK);
+        let mut one = one.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_driven = effort.is_some() && piece > 0;
+        if is_driven {
+            one.drive(effort);
+        }
+        let advanced = one.advance(piece);
+        if is_driven {
+            one.drive(None);
+        }
+        left -= advanced;
+        (left == 0 || advanced < piece).then_some(steps - left)
+    })
 }
 
 fn read_setpoint<const N: usize>(

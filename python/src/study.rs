@@ -7,17 +7,19 @@ use std::time::{Duration, Instant};
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::ControlPeriod;
+use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::{ControlLoop, no_control};
 use pendularm::study::gains::{GainsRequirements, GainsSearch};
-use pendularm::study::motion::Motion;
+use pendularm::study::motion::{FREE_SECONDS, Motion};
 use pendularm::study::planner::{Planned, Planning, Task};
-use pendularm::study::rollout::{Deviation, Rollout, RolloutRequest};
-use pendularm::study::stability::{ADVISED_PART, LimitSearch, Limits};
+use pendularm::study::rollout::{Rollout, RolloutRequest};
+use pendularm::study::stability::{LimitSearch, Limits};
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Chain, Given, for_either, or_default};
-use crate::arrays::joints_or;
+use crate::arrays::{joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
 use crate::patience::until_done;
@@ -30,9 +32,15 @@ const EVALUATIONS_PER_LOOK: u64 = 2000;
 #[pyfunction]
 #[pyo3(
     signature = (
-        arm=None, *, integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, q=None, qd=None
+        arm=None, *, integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, q=None, qd=None,
+        control_period=Real::Is(0.0)
     ),
-    text_signature = "(arm=None, *, integrator=\"rk4\", gains=None, setpoint=None, q=None, qd=None)"
+    text_signature = "(arm=None, *, integrator=\"rk4\", gains=None, setpoint=None, q=None, qd=None, \
+                      control_period=0.0)"
+)]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "they are the fields of the service, by name"
 )]
 pub(crate) fn stability<'py>(
     py: Python<'py>,
@@ -42,30 +50,30 @@ pub(crate) fn stability<'py>(
     setpoint: Option<Object<'py>>,
     q: Option<Object<'py>>,
     qd: Option<Object<'py>>,
+    control_period: Real,
 ) -> PyResult<Held<'py, PyDict>> {
     let method = integrator.method("integrator")?;
+    let period = read_period(control_period)?;
     for_either!(Chain, or_default(arm)?, arm => {
         let gains = gains::read(gains.as_ref(), Gains::default())?;
         let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
-        let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
+        let control = ControlLoop::new(arm, gains, setpoint).with_method(method).with_period(period);
         let start = read_state(("q", q.as_ref()), ("qd", qd.as_ref()))?;
         let motion = Motion::ahead(&control, &start);
         let mut search = LimitSearch::new(&control);
         let limits = until_done(py, || search.advance())?;
-        listed_limits(py, &limits, motion)
+        listed_limits(py, &limits, clock_limits(&control), motion, control.is_free())
     })
 }
 
 fn listed_limits<'py, const N: usize>(
     py: Python<'py>,
     limits: &Limits<N>,
+    clocks: ClockLimits,
     motion: Motion,
+    is_free: bool,
 ) -> PyResult<Held<'py, PyDict>> {
     let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
-    let advised = [
-        limits.advised,
-        bears.map(|timestep| ADVISED_PART * timestep),
-    ];
     let critical = limits.critical.map(|critical| {
         let found = PyDict::new(py);
         found.set_item("growth_per_step", critical.growth_per_step)?;
@@ -74,6 +82,8 @@ fn listed_limits<'py, const N: usize>(
         PyResult::Ok(found)
     });
     let found = PyDict::new(py);
+    found.set_item("control_period_limit", clocks.period)?;
+    found.set_item("timestep_limit", clocks.timestep)?;
     found.set_item("timestep_limit_held", limits.held)?;
     found.set_item("timestep_limit_continuous", limits.continuous)?;
     found.set_item("equilibrium", limits.equilibrium.to_pyarray(py))?;
@@ -81,6 +91,7 @@ fn listed_limits<'py, const N: usize>(
     found.set_item("minimum_over_poses_held", limits.minimum_held)?;
     found.set_item("minimum_over_poses_continuous", limits.minimum_continuous)?;
     found.set_item("minimum_over_poses_bound", limits.bound)?;
+    found.set_item("bound_is_proven", limits.bound_is_proven)?;
     found.set_item("certified", limits.certified)?;
     found.set_item(
         "worst_pose",
@@ -89,11 +100,17 @@ fn listed_limits<'py, const N: usize>(
     found.set_item("critical", critical.transpose()?)?;
     found.set_item("timestep_limit_motion", bears)?;
     found.set_item("motion_speed", motion.speed)?;
-    found.set_item(
-        "advised_timestep",
-        advised.into_iter().flatten().reduce(f64::min),
-    )?;
+    found.set_item("advised_timestep", limits.advised_for(&motion))?;
+    found.set_item("advised_duration", is_free.then_some(FREE_SECONDS))?;
     Ok(found)
+}
+
+/// The time between two runs of the control law, without a delay.
+fn read_period(period: Real) -> PyResult<ControlPeriod> {
+    Ok(ControlPeriod {
+        period: fields::number("control_period", period, Bound::NotNegative)?,
+        delay: false,
+    })
 }
 
 fn read_state<const N: usize>(
@@ -113,10 +130,10 @@ fn read_state<const N: usize>(
     signature = (
         arm=None, *, q0=None, qdot0=None, duration=Real::Is(10.0), timestep=Real::Is(0.001),
         integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, samples=Whole::Is(1001),
-        reference=Flag::Is(false)
+        reference=Flag::Is(false), control_period=Real::Is(0.0)
     ),
     text_signature = "(arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator=\"rk4\", \
-                      gains=None, setpoint=None, samples=1001, reference=False)"
+                      gains=None, setpoint=None, samples=1001, reference=False, control_period=0.0)"
 )]
 #[expect(
     clippy::too_many_arguments,
@@ -134,14 +151,19 @@ pub(crate) fn rollout<'py>(
     setpoint: Option<Object<'py>>,
     samples: Whole,
     reference: Flag,
+    control_period: Real,
 ) -> PyResult<Held<'py, PyDict>> {
     let (duration, timestep) = (duration.read("duration")?, timestep.read("timestep")?);
     let samples = samples.read("samples")?;
     let reference = reference.read("reference")?;
+    let period = read_period(control_period)?;
     let method = integrator.method("integrator")?;
     for_either!(Chain, or_default(arm)?, arm => {
         run(py, RolloutRequest {
-            control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_method(method).with_timestep(timestep),
+            control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?
+                .with_method(method)
+                .with_timestep(timestep)
+                .with_period(period),
             start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
             duration,
             samples,
@@ -157,6 +179,9 @@ fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<H
         ..request
     })
     .map_err(refused)?;
+    // More than two runs and the answer take, since a run's own vectors abort where there is no memory.
+    let samples = usize::try_from(request.samples.min(alone.steps() + 1)).unwrap_or(usize::MAX);
+    drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
     until_done(py, || {
         let began = Instant::now();
@@ -185,10 +210,8 @@ fn listed_run<'py, const N: usize>(
             .into_pyarray(py)
             .reshape([rows.len(), N])
     };
-    // As in the service: an error that is known for a part of the samples only is none.
-    let followed = run
-        .deviation()
-        .filter(|deviation| deviation.errors.len() == run.times().len());
+    let (error, uncertainty) = run.known(run.deviation());
+    let (sampling, sampling_uncertainty) = run.known(run.from_ideal());
     let divergence = run.divergence().map(|found| (found.step, found.time));
     let found = PyDict::new(py);
     found.set_item("times", run.times().to_pyarray(py))?;
@@ -198,11 +221,10 @@ fn listed_run<'py, const N: usize>(
     found.set_item("energy", run.energy().to_pyarray(py))?;
     found.set_item("evaluations", run.evaluations())?;
     found.set_item("wall_time", took.as_secs_f64())?;
-    found.set_item("error", followed.and_then(Deviation::known))?;
-    found.set_item(
-        "error_uncertainty",
-        followed.map(Deviation::largest_uncertainty),
-    )?;
+    found.set_item("error", error)?;
+    found.set_item("error_uncertainty", uncertainty)?;
+    found.set_item("sampling_error", sampling)?;
+    found.set_item("sampling_error_uncertainty", sampling_uncertainty)?;
     found.set_item("divergence", divergence)?;
     Ok(found)
 }
@@ -256,7 +278,14 @@ pub(crate) fn suggest_gains<'py>(
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
 #[pyfunction]
-#[pyo3(signature = (error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None))]
+#[pyo3(
+    signature = (
+        error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None,
+        control_period=Real::Is(0.0)
+    ),
+    text_signature = "(error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None, \
+                      control_period=0.0)"
+)]
 #[expect(
     clippy::too_many_arguments,
     reason = "they are the fields of the service, by name"
@@ -270,10 +299,12 @@ pub(crate) fn plan<'py>(
     qdot0: Option<Object<'py>>,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
+    control_period: Real,
 ) -> PyResult<Held<'py, PyDict>> {
     let error = fields::number("error", error, Bound::Positive)?;
+    let period = read_period(control_period)?;
     for_either!(Chain, or_default(arm)?, arm => {
-        let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?;
+        let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let mut planning = Planning::new(Task {
             control,
@@ -282,7 +313,7 @@ pub(crate) fn plan<'py>(
             error,
         }).map_err(refused)?;
         let planned = until_done(py, || planning.advance())?.map_err(refused)?;
-        listed_plan(py, &planned, !control.is_free())
+        listed_plan(py, &planned, (!control.is_free()).then_some(period.period))
     })
 }
 
@@ -306,14 +337,15 @@ fn read_loop<const N: usize>(
 fn listed_plan<'py>(
     py: Python<'py>,
     planned: &Planned,
-    is_controlled: bool,
+    period: Option<f64>,
 ) -> PyResult<Held<'py, PyDict>> {
     let best = planned.best().ok_or_else(|| refused("no plan was found"))?;
     let all = || planned.candidates.iter().rev();
     let found = PyDict::new(py);
     found.set_item("integrator", best.method.name())?;
     found.set_item("timestep", best.timestep)?;
-    found.set_item("control_period", is_controlled.then_some(best.timestep))?;
+    let given = |period: f64| if period > 0.0 { period } else { best.timestep };
+    found.set_item("control_period", period.map(given))?;
     found.set_item(
         "evaluations_per_second",
         f64::from(best.method.evaluations()) / best.timestep,

@@ -67,6 +67,11 @@ class Runtime:
         self.process.stdout.close()
 
 
+@pytest.fixture(autouse=True)
+def windows_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+
+
 @pytest.fixture(params=[2, 3], ids=["2 links", "3 links"])
 def links(request: pytest.FixtureRequest) -> int:
     return request.param

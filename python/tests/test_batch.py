@@ -25,6 +25,9 @@ def settings(links, arms, seed=1):
         "velocity": rows(-2, 2),
         "method": [METHODS[arm % 4] for arm in range(arms)],
         "timestep": random.uniform(1e-4, 2e-3, arms),
+        # Every third controller runs in every step.
+        "control_period": np.where(np.arange(arms) % 3 == 0, 0, random.uniform(0, 1e-2, arms)),
+        "control_delay": np.arange(arms) % 3 == 2,
     }
     singles = []
     for arm in range(arms):
@@ -34,6 +37,8 @@ def settings(links, arms, seed=1):
             ),
             method=given["method"][arm],
             timestep=given["timestep"][arm],
+            control_period=given["control_period"][arm],
+            control_delay=given["control_delay"][arm],
         )
         one.set_gains(given["kp"][arm], given["ki"][arm], given["kd"][arm])
         one.set_setpoint(given["positions"][arm], given["velocities"][arm])
@@ -47,6 +52,7 @@ def batch_of(given, links, arms, threads):
     batch = pendularm.Batch(arms, links, threads=threads)
     batch.set_params(given["gravity"], given["masses"], given["lengths"])
     batch.set_integrator(given["method"], given["timestep"])
+    batch.set_control_period(given["control_period"], given["control_delay"])
     batch.set_gains(given["kp"], given["ki"], given["kd"])
     batch.set_setpoint(given["positions"], given["velocities"])
     batch.set_state(given["position"], given["velocity"])
@@ -99,6 +105,25 @@ def test_every_lane_is_a_single_arm(links, threads):
         if one.position[0] > 0:
             one.reset()
     compare(batch, singles)
+
+
+def test_one_control_period_for_all_and_what_is_left_out_stays():
+    batch, one = pendularm.Batch(3, threads=1), pendularm.Simulation(control_period=0.01, control_delay=True)
+    batch.set_control_period(0.01, [True] * 3)
+    batch.set_control_period(control_delay=np.False_)
+    batch.set_control_period(control_delay=True)
+    batch.set_control_period()
+    for each in [batch, one]:
+        each.enable()
+        each.set_setpoint([0.3, -0.5])
+        each.step(333)
+    assert batch.position.tolist() == [one.position.tolist()] * 3
+    batch.set_control_period([0, 0.01, 0.01], [False, True, True])
+    one.control_period, one.control_delay = 0, False
+    batch.step(7)
+    one.step(7)
+    assert batch.position[0].tolist() == one.position.tolist()
+    assert batch.position[0].tolist() != batch.position[1].tolist()
 
 
 def test_an_arm_that_diverges_leaves_the_others_alone():
@@ -228,6 +253,21 @@ def test_a_mask_may_be_a_view_or_of_objects():
             lambda batch: batch.set_integrator(timestep=[1, 1]),
             "timestep must be a number or have the shape (3,), got [2]",
         ),
+        (
+            lambda batch: batch.set_control_period([0, 1, -1]),
+            "control_period[2] must be finite and at least 0, got -1",
+        ),
+        (
+            lambda batch: batch.set_control_period([1, 1]),
+            "control_period must be a number or have the shape (3,), got [2]",
+        ),
+        *[
+            (
+                lambda batch, wrong=wrong: batch.set_control_period(control_delay=wrong),
+                "control_delay must be True or False, or one of them for each of 3 arms",
+            )
+            for wrong in [1, [True], [True, 1, True], "yes", np.ma.array([True] * 3, mask=[1, 0, 0])]
+        ],
         (lambda batch: batch.set_integrator("leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
         (lambda batch: batch.enable("yes"), "data must be True or False, got 'yes'"),

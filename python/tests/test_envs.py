@@ -185,10 +185,47 @@ def test_swinging_up_pays():
     assert (env._task.efforts < load).all()
 
 
+@pytest.mark.parametrize("method", ["euler", "midpoint", "verlet", "rk4"])
+@pytest.mark.parametrize("timestep", [0.05, 0.05 / 7, np.float32(0.0125), 0.001])
+def test_method_and_timestep_can_be_set(name, method, timestep):
+    """And a step takes 0.05 s by any."""
+    one = gymnasium.make(name, method=method, timestep=timestep).unwrapped
+    many = gymnasium.make_vec(name, 2, method=method, timestep=timestep)
+    found, among = one.reset(seed=3)[0], many.reset(seed=3)[0]
+    for _ in range(4):
+        found = one.step(np.zeros(2, np.float32))[0]
+        among = many.step(np.zeros((2, 2), np.float32))[0]
+    assert np.array_equal(found, among[0])
+    assert np.isclose(one._task.batch.time[0], 0.2, rtol=1e-6)
+
+
 @pytest.mark.parametrize("kind", [pendularm.envs.PendularmEnv, pendularm.envs.PendularmReachVectorEnv])
-def test_there_is_no_rendering(kind):
-    with pytest.raises(ValueError, match="render_mode must be None, got 'human'"):
-        kind(render_mode="human")
+@pytest.mark.parametrize("timestep", [0, -0.01, 0.03, 0.1, 1e-7, 5e-324, np.nan, np.inf, "1", None, True, [0.01, 0.02]])
+def test_a_timestep_that_does_not_divide_a_step_is_refused(kind, timestep):
+    with pytest.raises(ValueError, match="^timestep must be "):
+        kind(timestep=timestep)
+
+
+@pytest.mark.parametrize("method", ["RK4", "", None, 4, ["rk4"]])
+def test_a_method_that_is_none_is_refused(method):
+    with pytest.raises(ValueError, match="^method must be "):
+        pendularm.envs.PendularmEnv(method=method)
+
+
+def test_a_free_arm_keeps_its_energy(name, links):
+    """To 0.1 % of that between hanging and upright, from any pose, as long as no episode ends."""
+    env = gymnasium.make_vec(name, 500, links=links).unwrapped
+    env.reset(seed=1)
+    batch, arm = env._task.batch, pendularm.Arm(links)
+    batch.set_state(np.random.default_rng(1).uniform(-np.pi, np.pi, (500, links)))
+    before, kept = batch.energy.copy(), np.ones(500, bool)
+    hanging = np.eye(1, links)[0] * -np.pi / 2
+    span = -2 * pendularm.dynamics.potential_energy(arm, hanging)
+    for _ in range(env._task.most_steps):
+        env._task.go_on(np.zeros((500, links), np.float32))
+        kept &= ~env._task.lost()
+        assert (np.abs(batch.energy - before)[kept] < 0.001 * span).all()
+    assert kept.sum() > 50
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The examples do what their heads say."""
 
 import importlib.util
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-@pytest.mark.parametrize("name", ["lesson.ipynb", "live_client.py", "policy.py"])
+@pytest.mark.parametrize("name", ["closed_loop.py", "lesson.ipynb", "live_client.py", "policy.py"])
 def test_an_example_needs_the_wheel_and_not_an_index_that_has_it(name):
     said = (EXAMPLES / name).read_text(encoding="utf-8").split("pip install ")[1:]
     assert all(".whl" in command.split("`")[0] for command in said)
@@ -41,7 +42,7 @@ def test_a_policy_learns():
     spec = importlib.util.spec_from_file_location("policy", EXAMPLES / "policy.py")
     policy = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(policy)
-    shown = float(policy.__doc__.split("what is found, ")[1].split(",")[0])
+    shown = float(" ".join(policy.__doc__.split()).split("what is found, more than ")[1].split(",")[0])
     random = np.random.default_rng(0).normal(size=(8, policy.SIZE))
     found = policy.train(generations=40)
     before = policy.rewards(random, seed=10**8).max()
@@ -64,3 +65,34 @@ def test_roslibpy_moves_the_live_arm(runtime):
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert run.stdout.endswith("it is there\n")
+
+
+# Runs the example in this process, and then the same loop with the offline arm: the two must agree to the bit.
+OFFLINE = """
+import json, runpy, sys, numpy as np, pendularm
+sys.argv = sys.argv[1:]
+live = runpy.run_path(sys.argv[0])
+arm = pendularm.Simulation(live["arm"], **live["settings"])
+while arm.time < 4:
+    error = np.concatenate([live["goal"] - arm.position, -arm.velocity])
+    arm.step(live["steps"], live["load"] + live["gains"] @ error)
+print(json.dumps([arm.time, arm.position.tolist(), arm.velocity.tolist()]))
+"""
+
+
+def test_a_loop_that_is_closed_over_the_wire_is_that_of_the_offline_arm_to_the_bit(runtime, links):
+    away = {}
+    for law in ["pd", "lqr"]:
+        # The client finds the arm as somebody left it.
+        runtime.call("/arm_sim/set_state", position=[0.1] * links)
+        example = [str(EXAMPLES / "closed_loop.py"), law, *runtime.address.rsplit(":", 1)]
+        run = subprocess.run(
+            [sys.executable, "-c", OFFLINE, *example], capture_output=True, text=True, timeout=120
+        )
+        assert run.returncode == 0, run.stdout + run.stderr
+        live, offline = map(json.loads, run.stdout.splitlines())
+        assert live == offline
+        time, position, _ = live
+        assert time == 4
+        away[law] = np.abs(np.array([0.8, -0.6, 0.4][:links]) - position).max()
+    assert away["lqr"] < away["pd"] < 0.02

@@ -1,6 +1,7 @@
 """The program that comes with the wheel: on the path, as a module, with its arguments and its signals."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -8,6 +9,8 @@ import sys
 import sysconfig
 import time
 import urllib.request
+import venv
+import zipfile
 from importlib.metadata import files
 from pathlib import Path
 
@@ -15,14 +18,22 @@ import pytest
 
 import pendularm
 
+HERE = Path(__file__).parent
+PAPER = HERE.parent.parent / "docs" / "python.md"
 PROGRAM = str(Path(sysconfig.get_path("scripts")) / "pendularm")
 WAYS = [[PROGRAM], [sys.executable, "-m", "pendularm"]]
+
+
+def is_of_the_library(said: str) -> bool:
+    """Whether a program says the library's version, behind which a release build has its commit."""
+    version = re.escape(pendularm.__version__)
+    return re.fullmatch(rf"pendularm {version}(\+[0-9a-f]{{12}}(\.modified)?)? \(web\)\n", said) is not None
 
 
 @pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
 def test_it_is_the_version_of_the_library(way):
     said = subprocess.run([*way, "--version"], capture_output=True, text=True, check=True).stdout
-    assert said == f"pendularm {pendularm.__version__} (web)\n"
+    assert is_of_the_library(said)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
@@ -51,15 +62,33 @@ def test_a_module_in_a_folder_of_its_own_finds_the_program_beside_it(tmp_path, t
         text=True,
     )
     if there:
-        assert run.stdout == f"pendularm {pendularm.__version__} (web)\n"
+        assert is_of_the_library(run.stdout)
     else:
         assert "FileNotFoundError: this installation of pendularm has no program" in run.stderr
 
 
-def test_it_comes_with_completions_and_a_manual():
+def test_it_comes_with_completions():
     share = Path(sysconfig.get_path("data")) / "share"
-    assert "pendularm\\-topic(1)" in (share / "man/man1/pendularm.1").read_text()
     assert (share / "bash-completion/completions/pendularm").is_file()
+
+
+def test_a_rebuilt_wheel_replaces_the_installed_one(tmp_path):
+    (wheel,) = (HERE.parent / "target" / "wheels").glob("*.whl")
+    [command] = re.findall(r"^\$ pip (install --force-reinstall .*) \S+\.whl$", PAPER.read_text(), re.MULTILINE)
+    venv.create(tmp_path / "venv", symlinks=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    for content in ["1", "2"]:
+        made = tmp_path / content / wheel.name
+        made.parent.mkdir()
+        with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(made, "w") as new:
+            for name in old.namelist():
+                # Without hashes, which the new content would not have.
+                text = re.sub(rb",sha256=[^,]*,\d*", b",,", old.read(name)) if name.endswith("/RECORD") else old.read(name)
+                new.writestr(name, content if name.endswith("/py.typed") else text)
+        pip = [sys.executable, "-m", "pip", "--python", python, *command.split(), "--no-index", "--quiet", made]
+        subprocess.run(pip, check=True, env={**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1"})
+        (installed,) = (tmp_path / "venv").glob("lib/python3*/site-packages/pendularm/py.typed")
+        assert installed.read_text() == content
 
 
 def test_the_licences_are_in_the_wheel():

@@ -9,6 +9,7 @@ import pickle
 import signal
 import threading
 import types
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -61,6 +62,82 @@ def test_the_same_calls_give_the_same_bits_as_the_live_arm(runtime, links, metho
     assert live["effort"] == ours.effort.tolist()
 
 
+def test_a_control_period_and_steps_with_an_effort_have_the_live_bits(runtime, links):
+    ours = pendularm.Simulation(pendularm.Arm(links))
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    runtime.call("/pid_controller/enable", data=True)
+    ours.enable()
+    ours.control_period, ours.control_delay = 0.0031, True
+    found = runtime.call("/pid_controller/set_period", period=0.0031, delay=True)
+    assert found == {"period": 0.0031, "effective_period": ours.effective_control_period, "delay": True}
+    setpoint, effort = [0.7, -0.4, 0.2][:links], [2.0, -1.0, 0.5][:links]
+    runtime.send(op="publish", topic="/joint_trajectory", msg={"points": [{"positions": setpoint}]})
+    ours.set_setpoint(setpoint)
+
+    def step_both(steps, **given):
+        assert runtime.call("/arm_sim/step", steps=steps, **given) == {
+            "steps": ours.step(steps, **given),
+            "time": ours.time,
+            "position": ours.position.tolist(),
+            "velocity": ours.velocity.tolist(),
+            "effort": ours.effort.tolist(),
+        }
+
+    step_both(17)
+    step_both(1, effort=effort)
+    step_both(20)
+    runtime.call("/arm_sim/disturb", effort=effort, duration=0.02)
+    ours.disturb(effort, 0.02)
+    # More than are taken in a row.
+    step_both(2500, effort=effort)
+    step_both(20)
+    runtime.call("/arm_sim/set_integrator", timestep=0.0007)
+    ours.timestep = 0.0007
+    assert runtime.call("/pid_controller/set_period")["effective_period"] == ours.effective_control_period == 4 * 0.0007
+    step_both(50)
+    runtime.call("/pid_controller/enable", data=False)
+    ours.enable(False)
+    step_both(3, effort=effort)
+    step_both(1)
+    assert not ours.effort.any()
+
+
+def test_a_control_period_is_a_whole_number_of_timesteps():
+    arm = pendularm.Simulation(timestep=0.003, control_period=0.01, control_delay=np.True_)
+    assert (arm.control_period, arm.effective_control_period, arm.control_delay) == (0.01, 3 * 0.003, True)
+    arm.timestep = 0.004
+    assert (arm.control_period, arm.effective_control_period) == (0.01, 3 * 0.004)
+    arm.control_period, arm.control_delay = 1e-9, False
+    assert (arm.control_period, arm.effective_control_period, arm.control_delay) == (1e-9, 0.004, False)
+    fresh = pendularm.Simulation()
+    assert (fresh.control_period, fresh.effective_control_period, fresh.control_delay) == (0, 0.001, False)
+
+
+def test_an_effort_is_held_for_its_steps_and_the_controller_stands_still():
+    arm = pendularm.Simulation()
+    arm.enable()
+    arm.set_setpoint([0.3, -0.5])
+    arm.step(10)
+    integral = arm.integral.tolist()
+    assert arm.step(7, [1, -2]) == 7
+    assert arm.effort.tolist() == [1, -2]
+    assert arm.integral.tolist() == integral
+    # No step, no change: the next one is the controller's, in the same period.
+    assert arm.step(0, effort=[5, 5]) == 0
+    assert arm.effort.tolist() == [1, -2]
+    arm.step()
+    assert arm.effort.tolist() != [1, -2]
+    assert arm.integral.tolist() != integral
+    # A state that is set ends a divergence.
+    arm.set_state([0, 0], [1e200, 1e200])
+    assert arm.step(5, [1, 1]) == 0
+    assert arm.divergence is not None
+    arm.set_state([0, 0])
+    assert arm.divergence is None
+    assert arm.step(5, [1, 1]) == 5
+
+
 def test_a_fresh_simulation_is_a_fresh_runtime(runtime, links):
     ours = pendularm.Simulation(pendularm.Arm(links))
     params = runtime.call("/arm_sim/set_params")
@@ -72,6 +149,39 @@ def test_a_fresh_simulation_is_a_fresh_runtime(runtime, links):
     assert gains == {name: values.tolist() for name, values in ours.gains.items()}
     assert gains == {name: values.tolist() for name, values in pendularm.default_gains(links).items()}
     assert runtime.call("/pid_controller/enable") == {"data": ours.enabled}
+
+
+def arrays_of(thing):
+    """The arrays that the properties of an object return, also inside of tuples and mappings."""
+    for name in dir(type(thing)):
+        if not name.startswith("_") and not callable(value := getattr(thing, name)):
+            parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else [value]
+            yield from ((name, part) for part in parts if isinstance(part, np.ndarray))
+
+
+@pytest.mark.parametrize(
+    ("thing", "count"), [(pendularm.Arm(), 2), (pendularm.Simulation(), 10), (pendularm.Batch(3), 7)]
+)
+def test_no_array_of_a_property_can_be_written(thing, count):
+    found = list(arrays_of(thing))
+    assert len(found) == count
+    for name, array in found:
+        for write in [lambda: array.fill(1), lambda: np.add(array, 1, out=array), lambda: array.sort()]:
+            with pytest.raises(ValueError, match="read-only"):
+                write()
+        assert (array == array.copy()).all(), name
+
+
+def test_the_mapping_of_the_gains_can_be_handed_in_but_not_written():
+    arm = pendularm.Simulation()
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        arm.gains["kp"] = [1, 1]
+    with pytest.raises(AttributeError):
+        arm.gains.update(kp=[1, 1])
+    other = pendularm.Simulation(gains={**arm.gains, "kp": 2 * arm.gains["kp"]})
+    arm.set_gains(**other.gains)
+    assert arm.gains["kp"].tolist() == other.gains["kp"].tolist() == (2 * pendularm.default_gains()["kp"]).tolist()
+    assert pendularm.rollout(duration=0.1, gains=arm.gains).evaluations == 400
 
 
 def test_a_settled_arm_carries_its_gravity_load(links):
@@ -163,6 +273,19 @@ def test_arms_are_values():
             'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"',
         ),
         (lambda arm: setattr(arm, "timestep", 0.0), "timestep must be finite and greater than 0, got 0"),
+        (
+            lambda arm: setattr(arm, "control_period", -1e-3),
+            "control_period must be finite and at least 0, got -0.001",
+        ),
+        (
+            lambda arm: pendularm.Simulation(control_period=math.inf),
+            "control_period must be finite and at least 0, got inf",
+        ),
+        (lambda arm: pendularm.Simulation(control_period=None), "control_period must be a number, got None"),
+        (lambda arm: setattr(arm, "control_delay", 1), "control_delay must be True or False, got 1"),
+        (lambda arm: pendularm.Simulation(control_delay="yes"), "control_delay must be True or False, got 'yes'"),
+        (lambda arm: arm.step(1, [1]), "effort must be an array of 2 numbers, got [1]"),
+        (lambda arm: arm.step(1, [1, math.nan]), "effort[1] must be finite, got NaN"),
         (lambda arm: setattr(arm, "arm", pendularm.Arm(3)), "arm must have as many links as the one before"),
         (lambda arm: pendularm.Simulation(gains={"kx": [1, 1]}), "gains has kp, ki and kd, got 'kx'"),
         (lambda arm: pendularm.Simulation(gains={"kp": [1]}), "gains.kp must be an array of 2 numbers, got [1]"),

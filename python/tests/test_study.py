@@ -46,6 +46,7 @@ def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
         "setpoint": [0.1, 0.2, 0.3][:links],
         "samples": 41,
         "reference": True,
+        "control_period": 0.006,
     }
     theirs = runtime.call("/study/rollout", **asked)
     run = pendularm.rollout(pendularm.Arm(links), **asked)
@@ -55,7 +56,9 @@ def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
     del ours["wall_time"], theirs["wall_time"]
     assert ours == theirs
 
-    arm = pendularm.Simulation(pendularm.Arm(links), method="midpoint", timestep=0.002, gains=gains)
+    arm = pendularm.Simulation(
+        pendularm.Arm(links), method="midpoint", timestep=0.002, gains=gains, control_period=0.006
+    )
     arm.set_state(asked["q0"], asked["qdot0"])
     arm.set_setpoint(asked["setpoint"])
     arm.enable()
@@ -69,6 +72,44 @@ def test_a_rollout_that_diverges_says_where():
     step, moment = run.divergence
     assert run.times[-1] <= moment == (step - 1) * 0.5
     assert len(run.times) < 201
+
+
+@pytest.mark.parametrize(
+    ("duration", "timestep", "steps"),
+    [
+        (1, 0.6, 2),
+        (1, 0.4, 3),
+        (1, 0.3, 3),
+        (0.3, 0.2, 2),
+        (0.3, 0.1, 3),
+        (0.1 + 0.2, 0.1, 3),
+        (sum([0.1] * 10), 0.1, 10),
+        (0.7, 0.001, 700),
+        (0.6, 0.1 + 0.2, 2),
+    ],
+)
+def test_a_run_has_the_nearest_number_of_steps(duration, timestep, steps):
+    for samples in [2, 3]:
+        run = pendularm.rollout(duration=duration, timestep=timestep, samples=samples)
+        assert run.times[-1] == steps * timestep
+        # The same rule, and the same samples, in a sweep.
+        swept = []
+        pendularm.sweep(
+            {"timestep": [timestep]},
+            lambda run: swept.append(run) or run.times[-1],
+            duration=duration,
+            samples=samples,
+            servo=False,
+        )
+        assert swept[0].times[:, 0].tolist() == run.times.tolist()
+        assert swept[0].positions[:, 0].tolist() == run.positions.tolist()
+    planned = pendularm.plan(1e-2, duration=duration)
+    assert round(duration / planned.timestep) * planned.timestep == pytest.approx(duration, rel=1e-12)
+
+
+def test_a_duration_that_is_a_sum_is_planned_as_the_number():
+    one, other = pendularm.plan(1e-3, duration=0.1 + 0.2), pendularm.plan(1e-3, duration=0.3)
+    assert one.evaluations.tolist() == other.evaluations.tolist()
 
 
 def test_a_plan_is_the_services(runtime, links):

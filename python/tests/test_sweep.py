@@ -45,6 +45,21 @@ def test_every_setting_is_a_run_of_its_own():
         assert found["final_error"][place] == error
 
 
+def test_a_control_period_and_its_delay_are_settings():
+    grid = {"control_period": [0, 0.004, 0.006], "control_delay": [False, np.True_]}
+    found = pendularm.sweep(grid, "final_error", **FIXED)["final_error"]
+    assert len(set(found.flat)) == 6
+    for place in np.ndindex(3, 2):
+        one = pendularm.Simulation(
+            timestep=0.002, control_period=grid["control_period"][place[0]], control_delay=grid["control_delay"][place[1]]
+        )
+        one.set_setpoint([0.6, -0.4])
+        one.enable()
+        one.step(500)
+        error = np.abs(one.position - [0.6, -0.4]).max() if one.divergence is None else np.inf
+        assert found[place] == error
+
+
 def test_neither_workers_nor_pieces_change_a_bit():
     expected = pendularm.sweep(GRID, "settling_time", **FIXED)["settling_time"]
     assert np.isfinite(expected).any()

@@ -44,6 +44,7 @@ def test_a_notebook_shows_the_progress(wanted, play_notebook):
     play_notebook(book)
     shown = [output for output in book.cells[0].outputs if "(64," not in str(output)]
     assert ("/64 " in str(shown)) is wanted
+    assert "Warning" not in str(shown)
 
 
 def test_nothing_is_shown_off_a_terminal(capfd):

@@ -22,6 +22,11 @@ def among_objects(*values):
     [
         (lambda: pendularm.sweep({}), "grid must have at least one setting"),
         (lambda: pendularm.sweep({"kp": []}), "grid['kp'] must have at least one value"),
+        (
+            lambda: pendularm.sweep({"control_period": [0.01, -1]}),
+            "control_period[1] must be finite and at least 0, got -1",
+        ),
+        (lambda: pendularm.sweep({"control_delay": [1]}), "every control_delay must be True or False, got 1"),
         (lambda: pendularm.sweep({"kq": [1]}), "there is no setting 'kq'; there are lengths, masses, kp"),
         (lambda: pendularm.sweep({"kp": [1]}, kp=2), "kp is both in the grid and fixed"),
         (lambda: pendularm.sweep({"kp": [1, -2]}), "kp[1][0] must be finite and at least 0, got -2"),

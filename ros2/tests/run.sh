@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
 # the first time. It installs into the build folder. CLIENT=1 builds a node of the crate ros2-client too, which takes
-# minutes; BENCH=1 measures instead, with a release build.
+# minutes; BENCH=1 measures instead, with a release build, and BENCH=quick only tries that the two hosts work.
 set -euo pipefail
 program=$(realpath "$1")
 target=$(realpath -m "${2:-target/ros2}")
@@ -21,6 +21,10 @@ if [ "${BENCH:-}" = 1 ]; then
     exec timeout 900 "$environment/bin/python" tests/hosts.py "$program" "$target/release/pendularm-ros2" --bench
 fi
 ! has_jazzy || "$environment/bin/pip" install --quiet --disable-pip-version-check --no-deps --requirement tests/jazzy.txt
+if [ "${BENCH:-}" = quick ]; then
+    cargo build --quiet --locked --target-dir "$target"
+    exec timeout 300 "$environment/bin/python" tests/hosts.py "$program" "$target/debug/pendularm-ros2"
+fi
 echo "test-ros2: the bridge, and its own tests"
 cargo test --quiet --locked --target-dir "$target"
 cargo build --quiet --locked --target-dir "$target"

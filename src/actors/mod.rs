@@ -18,14 +18,13 @@
 //! To the registry, from a connection:
 //!
 //! - [`Connect`], [`Disconnect`]: a client is there, is gone.
-//! - [`Ended`]: the client's stream has ended: it only waits now, and may give way to one that comes.
+//! - [`CountRefusal`]: no place was free for a client.
 //! - [`Retire`]: the client has stopped sending: its registrations go, its answers still come.
 //! - [`Request`]: one rosbridge op of that client.
 //!
 //! To the registry, from nodes:
 //!
-//! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what nodes
-//!   say; what the player has from a record comes written.
+//! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes both as JSON.
 //! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
 //! - [`SetTap`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
@@ -44,7 +43,7 @@
 //! - [`node::Call`] of [`SetIntegrator`], [`SetParams`], [`SetGains`], [`Pause`], [`Enable`], [`Reset`], [`Step`],
 //!   [`Disturb`], from the registry, `rosapi` and `parameters`: changes the arm; the answer echoes the values as they
 //!   are.
-//! - [`SetSetpoint`], from the registry: a client's setpoint.
+//! - [`SetSetpoint`], [`CommandEffort`], from the registry: a client's setpoint, and its effort.
 //! - [`ArmPose`], from `ik`, `ik_trial` and `tf_web`: lengths, positions and time, asked for every time.
 //! - [`ArmSettings`], from `study`: method, timestep, arm, gains and setpoint, asked for at every call.
 //! - [`TrackGoal`], [`CommandGoal`], [`EndGoal`], from `ik_action`: a goal; its setpoint, from which on it is judged at
@@ -85,14 +84,9 @@
 //! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and
 //! `EndRecord`, from the runtime: the beginning and the end of a record.
 //!
-//! `player` is there in the arm's place when a record is replayed. To it: [`node::Call`] of `DriveRecord`, from the
-//! registry, and of the questions to `arm_sim` that ask for settings. From it to the registry: [`PublishInTurn`], whose
-//! end it waits for.
-//!
 //! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
 //!
 //! [`ArmMotion`]: arm::sim::ArmMotion
-//! [`PublishInTurn`]: gateway::messages::PublishInTurn
 //! [`MoveSetpoint`]: arm::sim::MoveSetpoint
 //! [`FollowPath`]: arm::follow::FollowPath
 //! [`StopFollowing`]: arm::follow::StopFollowing
@@ -100,8 +94,8 @@
 //! [`WishFrames`]: ros::tf_web::WishFrames
 //! [`ForgetFrames`]: ros::tf_web::ForgetFrames
 //! [`Connect`]: gateway::messages::Connect
+//! [`CountRefusal`]: gateway::messages::CountRefusal
 //! [`Disconnect`]: gateway::messages::Disconnect
-//! [`Ended`]: gateway::messages::Ended
 //! [`Retire`]: gateway::messages::Retire
 //! [`Request`]: gateway::messages::Request
 //! [`SetTap`]: gateway::messages::SetTap
@@ -121,6 +115,7 @@
 //! [`Reset`]: arm::sim::Reset
 //! [`Step`]: arm::sim::Step
 //! [`Disturb`]: arm::sim::Disturb
+//! [`CommandEffort`]: arm::sim::CommandEffort
 //! [`SetSetpoint`]: arm::sim::SetSetpoint
 //! [`ArmPose`]: arm::sim::ArmPose
 //! [`ArmSettings`]: arm::sim::ArmSettings
@@ -159,8 +154,6 @@ pub mod compute;
 pub mod gateway;
 pub mod node;
 pub mod panics;
-#[cfg(feature = "record")]
-pub mod player;
 #[cfg(feature = "record")]
 pub mod recorder;
 pub mod resources;

@@ -14,7 +14,7 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::actors::resources::budget::NoRoom;
+use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::payload::Payload;
@@ -61,9 +61,6 @@ pub enum Unserved {
     /// Nobody waits for the answer.
     #[error("the caller is gone")]
     CallerGone,
-    /// There is no room for the answer.
-    #[error(transparent)]
-    NoRoom(#[from] NoRoom),
     /// No question is taken, or not so many.
     #[error("{0}")]
     Refused(
@@ -123,10 +120,13 @@ pub trait Asker<T>: Send {
         false
     }
 
+    /// Hears, before the answer, why what it asked for has no effect yet. A node finds that in the answer.
+    fn warn(&self, _why: &str) {}
+
     /// Takes room for an answer of at most so many bytes before it is computed.
     ///
     /// # Errors
-    /// If there is none.
+    /// While there is none.
     fn reserve(&mut self, _bytes: usize) -> Result<(), NoRoom> {
         Ok(())
     }
@@ -167,11 +167,18 @@ impl<T> Reply<T> {
     /// Takes room for an answer of at most so many bytes before it is computed. Small ones need none to be taken.
     ///
     /// # Errors
-    /// If there is none.
+    /// While there is none.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
         match &mut self.asker {
             Some(asker) => asker.reserve(bytes),
             None => Ok(()),
+        }
+    }
+
+    /// Tells a client by a status, before the answer, why what it asked for has no effect yet.
+    pub fn warn(&self, why: &str) {
+        if let Some(asker) = &self.asker {
+            asker.warn(why);
         }
     }
 
@@ -329,13 +336,19 @@ impl Respond {
     /// An error status that says why; `id` is that of the frame at fault.
     #[must_use]
     pub fn error(connection: ConnectionId, why: &str, id: Option<&Payload>) -> Self {
-        let (why, id) = (why.to_owned(), id.cloned());
-        let write = move || messages::status(Level::Error, &why, id.as_ref());
+        Self::status(connection, Level::Error, why, id)
+    }
+
+    /// A status of this level; `id` is that of the frame that it is about.
+    #[must_use]
+    pub fn status(connection: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) -> Self {
+        let (msg, id) = (msg.to_owned(), id.cloned());
+        let write = move || messages::status(level, &msg, id.as_ref());
         Self {
             connection,
             frame: FrameOut::unwritten(write),
             service: None,
-            status: Some(Level::Error),
+            status: Some(level),
             done: None,
         }
     }

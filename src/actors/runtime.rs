@@ -9,12 +9,13 @@
 
 use std::io::Write;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
 use actix::prelude::*;
 use tokio::net::TcpListener;
-use tokio::runtime::Builder;
+use tokio::runtime::{Builder, Runtime};
 use tokio::time::{Instant, sleep, timeout_at};
 
 use super::signals::Signals;
@@ -28,10 +29,14 @@ use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Newcomers};
 use crate::actors::gateway::files;
-use crate::actors::gateway::listener::{Listener, StopListening};
+use crate::actors::gateway::listener::{self, Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
+use crate::actors::gateway::unbound;
 use crate::actors::node::ShutDown;
+use crate::actors::panics::contain;
+#[cfg(feature = "record")]
+use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::give_way;
 use crate::actors::ros::parameters::Parameters;
@@ -41,18 +46,17 @@ use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
-use crate::options::{Links, Options};
-#[cfg(feature = "record")]
-use crate::{
-    actors::player::{self, NotReplayed},
-    actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder},
-};
+use crate::options::{DEFAULT_BIND, Links, Options};
 #[cfg(feature = "web")]
 use crate::{
     options::WebOptions,
     web::{Site, access::Access, authority::Host},
 };
 
+/// Most threads for long work of the gateway.
+const THREADS_ASIDE: usize = 4;
+/// Longer than any program runs.
+const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
 /// The answer to waiting calls when the runtime ends.
 const SHUTTING_DOWN: &str = "shutting down";
 /// How long computations may take to answer that they were refused, and outboxes to empty, when the runtime ends:
@@ -67,7 +71,7 @@ const RECORD_TIME: Duration = Duration::from_millis(250);
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The address can't be listened on.
-    #[error("cannot listen on {address}: {source}")]
+    #[error("cannot listen on {address}: {}", unbound::remedy(source))]
     Bind {
         /// The address.
         address: SocketAddr,
@@ -78,16 +82,12 @@ pub enum RunError {
     #[cfg(feature = "record")]
     #[error("cannot record: {0}")]
     Record(#[from] NotRecorded),
-    /// The record can't be played.
-    #[cfg(feature = "record")]
-    #[error(transparent)]
-    Replay(#[from] NotReplayed),
     /// A thread or a signal handler was refused.
     #[error("cannot start: {0}")]
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on
+/// Serves clients until a signal ends it. Should the end that it asks for take too long, `last_resort` is called, on
 /// another thread; it should not return. It is boxed because a generic runtime would be compiled anew, with all of its
 /// actors, in every crate that runs one.
 ///
@@ -95,24 +95,39 @@ pub enum RunError {
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
-    // The threads that it starts are those for long work of the gateway.
     let tokio = Builder::new_current_thread()
         .enable_all()
         .on_thread_start(give_way)
+        .max_blocking_threads(THREADS_ASIDE)
+        .thread_keep_alive(FOR_EVER)
         .build()?;
+    start_threads_aside(&tokio)?;
     // Answers that clients were owed are dropped here, which is part of the end.
     System::with_tokio_rt(move || tokio).block_on(serve(options, &mut signals))
 }
 
+/// Starts the threads for long work of the gateway, all at once: as many as there will be, and none ends. Where the
+/// system refuses a further one, work waits for those that there are.
+fn start_threads_aside(tokio: &Runtime) -> std::io::Result<()> {
+    let all_are_busy = Arc::new(Mutex::new(()));
+    let _until_all_are_there = all_are_busy.lock();
+    for _ in 0..THREADS_ASIDE {
+        let wait = Arc::clone(&all_are_busy);
+        contain(|| drop(tokio.spawn_blocking(move || drop(wait.lock()))))
+            .map_err(|panic| std::io::Error::other(panic.to_string()))?;
+    }
+    Ok(())
+}
+
 async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError> {
-    let sockets = bind(options).await?;
+    let sockets = bind(options)?;
     let address = sockets
         .first()
         .and_then(|socket| socket.local_addr().ok())
         .unwrap_or(options.bind);
 
-    let gauges = Arc::new(Gauges::default());
-    let room = files::make_room(options.token.is_some());
+    let room = files::make_room(options.clients, options.token.is_some());
+    let gauges = Arc::<Gauges>::default();
     let registry = Registry::new(Arc::clone(&gauges))
         .serving_at_most(room.clients)
         .start();
@@ -122,30 +137,21 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
     let seed = options.seed.unwrap_or_else(|| fastrand::u64(..));
-    #[cfg(feature = "record")]
-    let is_replay = start_replay(options, &registry, &arm_thread, &mut nodes)?;
-    #[cfg(not(feature = "record"))]
-    let is_replay = false;
-    let ends = if is_replay {
-        NodeEnds::default()
-    } else {
-        let start = match options.links {
-            Links::Two => start_nodes::<2>,
-            Links::Three => start_nodes::<3>,
-        };
-        let ends = start(
-            options,
-            seed,
-            &registry,
-            &gauges,
-            &arm_thread,
-            &workers,
-            &mut nodes,
-        );
-        let integration = Integration::new(workers.clone()).start();
-        Integration::attach(&integration, &mut nodes);
-        ends
+    let start = match options.links {
+        Links::Two => start_nodes::<2>,
+        Links::Three => start_nodes::<3>,
     };
+    let ends = start(
+        options,
+        seed,
+        &registry,
+        &gauges,
+        &arm_thread,
+        &workers,
+        &mut nodes,
+    );
+    let integration = Integration::new(workers.clone()).start();
+    Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
     #[cfg(feature = "record")]
@@ -200,14 +206,13 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
 }
 
 /// The ways by which the nodes that know the number of links are told of the end.
-#[derive(Default)]
 struct NodeEnds {
     /// The nodes that have something under way for clients.
     busy: Vec<Recipient<ShutDown>>,
     #[cfg(feature = "record")]
-    record: Option<Recipient<RecordTo>>,
+    record: Recipient<RecordTo>,
     #[cfg(feature = "record")]
-    end_record: Option<Recipient<EndRecord>>,
+    end_record: Recipient<EndRecord>,
 }
 
 #[cfg(feature = "record")]
@@ -216,20 +221,22 @@ impl NodeEnds {
     async fn record(&self, options: &Options) -> Result<(), RunError> {
         let folder = options.record.folder.as_deref();
         folder.map(recorder::look_into).transpose()?;
-        if let (Some(file), Some(recorder)) = (&options.record.file, &self.record) {
+        if let Some(file) = &options.record.file
             // The recorder lives as long as the registry: it can't be gone.
-            if let Ok(begun) = recorder.send(RecordTo(file.clone())).await {
-                begun?;
-            }
+            && let Ok(begun) = self.record.send(RecordTo(file.clone())).await
+        {
+            begun?;
         }
         Ok(())
     }
 
     /// Ends the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
-        if let Some(recorder) = &self.end_record {
-            let _ = timeout_at(Instant::now() + RECORD_TIME, recorder.send(EndRecord)).await;
-        }
+        let _ = timeout_at(
+            Instant::now() + RECORD_TIME,
+            self.end_record.send(EndRecord),
+        )
+        .await;
     }
 }
 
@@ -248,8 +255,9 @@ where
 {
     let publish = registry.clone().recipient();
     let gauges = Arc::clone(gauges);
+    let period = options.control_period;
     let arm = ArmSim::<N>::start_in_arbiter(&arm_thread.handle(), move |_| {
-        ArmSim::new(Arm::default(), Gains::default(), publish, gauges)
+        ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
@@ -302,49 +310,39 @@ where
     NodeEnds {
         busy,
         #[cfg(feature = "record")]
-        record: Some(recorder.clone().recipient()),
+        record: recorder.clone().recipient(),
         #[cfg(feature = "record")]
-        end_record: Some(recorder.recipient()),
+        end_record: recorder.recipient(),
     }
 }
 
-/// Starts the player of the record that is to be replayed, if there is one.
-#[cfg(feature = "record")]
-fn start_replay(
-    options: &Options,
-    registry: &Addr<Registry>,
-    thread: &Arbiter,
-    nodes: &mut Nodes,
-) -> Result<bool, RunError> {
-    let Some(file) = &options.record.replay else {
-        return Ok(false);
-    };
-    player::start(file, registry, &thread.handle(), nodes)?;
-    Ok(true)
-}
-
 /// The address asked for; for the default one also its IPv6 twin, where that is to be had.
-async fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
+fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
     let address = options.bind;
-    let first = TcpListener::bind(address)
-        .await
-        .map_err(|source| RunError::Bind { address, source })?;
+    let first = listener::bind(address).map_err(|source| RunError::Bind { address, source })?;
     let mut sockets = vec![first];
-    if options.is_default_bind {
+    if address == DEFAULT_BIND {
         let twin = SocketAddr::new(IpAddr::V6(Ipv6Addr::LOCALHOST), address.port());
-        match TcpListener::bind(twin).await {
+        match listener::bind(twin) {
             Ok(socket) => sockets.push(socket),
-            Err(error) => tracing::info!(address = %twin, %error, "not listening on IPv6"),
+            Err(error) => unbound::report_twin(twin, &error),
         }
     }
     Ok(sockets)
 }
 
-/// The one line on stdout. Nobody may be reading it: that is no reason to end.
+/// Prints the one line on standard output. A full pipe would block, so a thread does it that nothing waits for.
 fn announce(address: SocketAddr) {
-    let mut stdout = std::io::stdout();
-    if let Err(error) = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush()) {
-        tracing::warn!(%address, %error, "standard output can't be told where this listens");
+    let print = move || {
+        let mut stdout = std::io::stdout();
+        writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush())
+    };
+    let warn = move |error| {
+        tracing::warn!(%address, %error, "the address cannot be written to standard output");
+    };
+    let thread = thread::Builder::new().name("stdout".into());
+    if let Err(error) = thread.spawn(move || print().unwrap_or_else(warn)) {
+        warn(error);
     }
     tracing::info!(%address, "serving rosbridge clients");
 }

@@ -1,60 +1,91 @@
-//! Commands that ask a running pendularm, in the words of `ros2`: one file per subject.
+//! Commands that ask a running pendularm, in the words of `ros2`: each connects, calls or subscribes, and prints.
 //!
-//! They are a client as any other, over TCP; nothing here knows more of the runtime than what is on the wire.
+//! A command is a client like any other, over TCP. It uses nothing of the runtime but the protocol.
 //!
-//! **Invariant:** no answer, no closed pipe and no signal makes a command panic, and its exit status says how it went.
+//! **Invariant:** no answer, no closed pipe and no signal makes a command panic, and its exit status says how it ended.
 
-mod action;
-mod asked;
-mod diagnostics;
-mod error;
-mod field;
+pub mod arguments;
+mod call;
+mod graph;
 mod output;
-mod package;
-mod param;
-mod service;
+mod parameters;
 mod session;
-mod spelling;
-mod timed;
 mod topic;
-mod verbs;
-mod yaml;
+pub mod yaml;
 
-use clap::Command;
+use clap::{Args, Subcommand};
+use tokio::runtime::Builder;
 
-pub use self::asked::Asked;
-pub use self::error::CommandError;
-pub use self::package::{COMPLETIONS, MAN, complete, folder, pages, shell, tools};
+pub(crate) use self::arguments::UNQUOTED;
+use self::call::{ActionVerb, ServiceVerb};
+use self::graph::GraphVerb;
+pub use self::output::CommandError;
+use self::parameters::ParamVerb;
+use self::session::RuntimeOptions;
+use self::topic::TopicVerb;
 
-/// The subjects, each with its commands, as `clap` is to read them.
-#[must_use]
-pub fn subjects() -> [Command; 5] {
-    [
-        topic::command(),
-        service::command(),
-        action::command(),
-        param::command(),
-        diagnostics::command(),
-    ]
+/// Ends the help of each subject.
+const STATUS: &str = "\
+Exit status: 0 if it was done, 1 if the runtime refused (it says why) or did not succeed, 2 for bad usage, 3 without an
+answer: no connection, one that ended, or nothing within --timeout.";
+
+/// The subjects of the commands, each with its verbs.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum CommandSubject {
+    /// Watch topics of a running pendularm, and publish
+    Topic(Subject<TopicVerb>),
+    /// Call services of a running pendularm
+    Service(Subject<ServiceVerb>),
+    /// Send goals to actions of a running pendularm
+    Action(Subject<ActionVerb>),
+    /// Look at the nodes of a running pendularm
+    Node(Subject<GraphVerb>),
+    /// Read and set parameters of a running pendularm
+    Param(Subject<ParamVerb>),
+    /// Show the state, warnings, energy, timestep and limits of a running pendularm
+    #[command(after_help = "\
+Example:
+  pendularm diagnostics || echo 'all is not well'
+
+It waits for one message of /diagnostics, a second at most while the arm runs. The status is 1 if some part is not OK.
+With --json the message is one line.")]
+    Diagnostics(RuntimeOptions),
 }
 
-/// Does what was asked, and prints what comes of it.
+/// The verbs of a subject, and how to reach the runtime.
+#[derive(Debug, Clone, PartialEq, Args)]
+#[command(after_help = STATUS)]
+pub struct Subject<V: Subcommand> {
+    #[command(flatten)]
+    runtime: RuntimeOptions,
+    #[command(subcommand)]
+    verb: V,
+}
+
+/// Does a command, and prints its result. Values are read before it connects: a wrong one changes nothing.
 ///
 /// # Errors
 /// [`CommandError`], which has the exit status.
-pub fn run(asked: &Asked) -> Result<(), CommandError> {
-    match asked.path() {
-        ("topic", "list") => topic::list(asked),
-        ("topic", "echo") => topic::echo(asked),
-        ("topic", "hz") => topic::hz(asked),
-        ("topic", _) => topic::publish(asked),
-        ("service", "list") => service::list(asked),
-        ("service", _) => service::call(asked),
-        ("action", "list") => action::list(asked),
-        ("action", _) => action::send_goal(asked),
-        ("param", "list") => param::list(asked),
-        ("param", "get") => param::get(asked),
-        ("param", _) => param::set(asked),
-        _ => diagnostics::show(asked),
-    }
+pub fn run(subject: &CommandSubject) -> Result<(), CommandError> {
+    let system = Builder::new_current_thread().enable_all().build()?;
+    system.block_on(async {
+        match subject {
+            CommandSubject::Topic(Subject { runtime, verb }) => topic::run(verb, runtime).await,
+            CommandSubject::Service(Subject { runtime, verb }) => {
+                call::run_service(verb, runtime).await
+            }
+            CommandSubject::Action(Subject { runtime, verb }) => {
+                call::run_action(verb, runtime).await
+            }
+            CommandSubject::Node(Subject { runtime, verb }) => {
+                graph::run(verb, "node", &mut runtime.open().await?).await
+            }
+            CommandSubject::Param(Subject { runtime, verb }) => {
+                parameters::run(verb, runtime).await
+            }
+            CommandSubject::Diagnostics(runtime) => {
+                parameters::diagnostics(&mut runtime.open().await?).await
+            }
+        }
+    })
 }

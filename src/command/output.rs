@@ -1,28 +1,84 @@
-//! Standard output and standard error, either of which may be closed.
+//! The output of a command, and its end.
 //!
-//! **Invariant:** a reader that goes away ends the command quietly.
+//! **Invariant:** a complaint is one line on which nothing acts on a terminal. A reader that closes standard output
+//! ends the command quietly.
 
 use std::io::{self, Write};
+use std::time::Duration;
 
-use super::error::{CommandError, plain};
-use crate::output;
+use serde_json::value::RawValue;
 
-/// Prints to standard output, at once.
-///
-/// # Errors
-/// [`CommandError::Closed`] if nobody reads it any more, or the system's word.
-pub(super) fn print(text: &str) -> Result<(), CommandError> {
-    match output::print(text) {
-        Ok(true) => Ok(()),
-        Ok(false) => Err(CommandError::Closed),
-        Err(why) => Err(CommandError::System {
-            what: "standard output",
-            why,
-        }),
+use crate::protocol::wire::text::push_plain;
+
+/// Why a command was not done.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// The runtime refused, or the command did not succeed.
+    #[error("{0}")]
+    Refused(String),
+    /// An argument is not as it should be.
+    #[error("{0}")]
+    Usage(String),
+    /// No runtime listens at the address.
+    #[error("cannot connect to {0}: {1}")]
+    NoConnection(String, io::Error),
+    /// The connection ended.
+    #[error("the connection ended: {0}")]
+    Lost(String),
+    /// No awaited frame came in time.
+    #[error("nothing that was awaited came within {} s", .0.as_secs_f64())]
+    Late(Duration),
+    /// The system refused a thread or a descriptor.
+    #[error("the system refused: {0}")]
+    System(#[from] io::Error),
+    /// Standard output cannot be written.
+    #[error("standard output: {0}")]
+    Output(io::Error),
+    /// The reader of standard output is gone: it has read enough.
+    #[error("standard output is closed")]
+    Closed,
+}
+
+impl CommandError {
+    /// A refusal in words of the runtime or of another client.
+    pub(super) fn refused(words: &str) -> Self {
+        Self::Refused(plain(words))
+    }
+
+    pub(super) fn output(why: io::Error) -> Self {
+        match why.kind() {
+            io::ErrorKind::BrokenPipe => Self::Closed,
+            _ => Self::Output(why),
+        }
+    }
+
+    /// The exit status.
+    #[must_use]
+    pub fn status(&self) -> u8 {
+        match self {
+            Self::Closed => 0,
+            Self::Refused(_) | Self::System(_) | Self::Output(_) => 1,
+            Self::Usage(_) => 2,
+            Self::NoConnection(..) | Self::Lost(_) | Self::Late(_) => 3,
+        }
     }
 }
 
-/// A line on standard error. If that is broken there is nobody left to tell.
-pub(super) fn hint(text: &str) {
-    let _ = writeln!(io::stderr(), "pendularm: {}", plain(text));
+/// Text as one line on which nothing acts.
+pub(super) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    text.chars().for_each(|one| push_plain(&mut plain, one));
+    plain
+}
+
+/// Prints to standard output, at once.
+pub(super) fn print(text: &str) -> Result<(), CommandError> {
+    let mut out = io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    written.map_err(CommandError::output)
+}
+
+/// JSON that is put together from JSON.
+pub(super) fn raw(text: String) -> Result<Box<RawValue>, CommandError> {
+    RawValue::from_string(text).map_err(|error| CommandError::Lost(error.to_string()))
 }

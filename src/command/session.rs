@@ -1,29 +1,31 @@
 //! A connection to a running pendularm: rosbridge over TCP, one JSON object per line.
 //!
-//! **Invariant:** what comes is read line by line, each of bounded length, and every refusal ends the command with the
-//! runtime's own words.
+//! **Invariant:** frames are read line by line, each of bounded length. Every refusal ends the command in the words of
+//! the runtime.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
-use std::process;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::io::{self, ErrorKind};
+use std::net::ToSocketAddrs as _;
+use std::time::Duration;
 
+use clap::Args;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
-use tokio::runtime::Builder;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
+use tokio::net::TcpStream;
+use tokio::time::{Instant, timeout, timeout_at};
 
-use super::error::CommandError;
-use super::output::hint;
-use super::timed::TimedStream;
+use super::output::{CommandError, plain, print};
+use super::yaml::{json_line, write_yaml};
+use crate::address;
+use crate::output::complain;
 use crate::protocol::catalog::rosapi::PREFIX;
-use crate::protocol::names::same_type;
+use crate::protocol::names::{are_same, same_type};
 use crate::protocol::op::token::Token;
-use crate::protocol::outbox::MAX_TOPIC_BYTES;
+use crate::protocol::outbox::MAX_MESSAGE;
+use crate::value::{ValueReader, needed, within};
 
 /// How long each address of the host may take to accept the connection.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -32,17 +34,57 @@ const CONNECT: Duration = Duration::from_secs(5);
 /// numbers of 25 bytes with their commas, 75 MB together.
 const MAX_ANSWER: usize = 80 * 1024 * 1024;
 
+/// The options that all commands have.
+#[derive(Debug, Clone, PartialEq, Args)]
+#[command(next_help_heading = "The runtime")]
+pub struct RuntimeOptions {
+    /// Print JSON, one object or value a line, instead of YAML
+    #[arg(long, global = true)]
+    json: bool,
+    /// Where the runtime listens: a port, a host, both, or a URL
+    #[arg(
+        long,
+        global = true,
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1:9095"
+    )]
+    #[arg(value_parser = ValueReader(read_address))]
+    connect: String,
+    /// How long an answer or the next message may take; for ever unless given, 5 s for the connection
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = ValueReader(read_positive))]
+    timeout: Option<f64>,
+    /// The runtime's token; prefer the variable: others see options
+    #[arg(long, global = true, value_name = "TOKEN", env = "ARM_SIM_TOKEN")]
+    #[arg(value_parser = ValueReader(|text| Token::new(text).map_err(|why| why.to_string())))]
+    token: Option<Token>,
+}
+
+/// An address with a port; its name is looked up later.
+fn read_address(text: &str) -> Result<String, String> {
+    let needs = "a port, a host, both or a URL without TLS, such as 9095, 127.0.0.1:9095 or ws://127.0.0.1:9095/";
+    needed(address::read(text), needs, text)
+}
+
+/// A number greater than 0, and no more than a day or a million.
+pub(super) fn read_positive(text: &str) -> Result<f64, String> {
+    within(&(1e-6..=1e6), "a number", text)
+}
+
 /// A connection.
-#[derive(Debug)]
 pub(super) struct Session {
-    lines: BufReader<TimedStream>,
+    stream: BufReader<TcpStream>,
+    /// The beginning of a frame that has not come whole.
     line: Vec<u8>,
     calls: u64,
     patience: Option<Duration>,
+    /// By then the next awaited frame has to come.
+    deadline: Option<Instant>,
+    /// Whether JSON is printed.
+    pub(super) is_json: bool,
 }
 
-/// A frame of the runtime's, as far as a command needs it. The values in it are left as they are spelled: read into a
-/// tree they would take seventy times their bytes.
+/// A frame of the runtime, as far as a command needs it. Values stay as text: a tree of them takes seventy times the
+/// memory.
 #[derive(Debug, Deserialize)]
 pub(super) struct Received {
     pub(super) op: String,
@@ -51,7 +93,7 @@ pub(super) struct Received {
     topic: String,
     #[serde(default)]
     level: String,
-    pub(super) msg: Option<Box<RawValue>>,
+    msg: Option<Box<RawValue>>,
     pub(super) values: Option<Box<RawValue>>,
     #[serde(default)]
     pub(super) result: bool,
@@ -78,112 +120,122 @@ fn read_as<T: DeserializeOwned>(raw: Option<&RawValue>) -> Option<T> {
     serde_json::from_str(raw?.get()).ok()
 }
 
-impl Session {
-    /// Connects to `address`, and shows the token.
-    pub(super) fn open(
-        address: &str,
-        token: Option<&Token>,
-        patience: Option<Duration>,
-    ) -> Result<Self, CommandError> {
-        let stream = dial(address, patience).map_err(|why| CommandError::NoConnection {
-            address: address.to_owned(),
-            why,
-        })?;
-        let timed = TimedStream {
-            stream,
-            deadline: None,
-        };
-        let mut session = Self {
-            lines: BufReader::new(timed),
+impl RuntimeOptions {
+    /// Connects. The first frame shows the token, and says that this is a command: it may use a kept place.
+    pub(super) async fn open(&self) -> Result<Session, CommandError> {
+        let patience = self.timeout.map(Duration::from_secs_f64);
+        let stream = dial(&self.connect, patience.unwrap_or(CONNECT).min(CONNECT))
+            .await
+            .map_err(|why| CommandError::NoConnection(self.connect.clone(), why))?;
+        let mut session = Session {
+            stream: BufReader::new(stream),
             line: Vec::new(),
             calls: 0,
             patience,
+            deadline: None,
+            is_json: self.json,
         };
-        if let Some(token) = token {
-            session.send(&json!({"op": "auth", "token": token.reveal()}))?;
+        let mut opening = json!({"op": "auth", "command": true});
+        if let (Some(token), Some(members)) = (&self.token, opening.as_object_mut()) {
+            members.insert("token".to_owned(), token.reveal().into());
         }
+        session.send(&opening).await?;
         Ok(session)
     }
+}
 
-    /// Has what is awaited next come within `--timeout` from now on.
+async fn dial(address: &str, patience: Duration) -> io::Result<TcpStream> {
+    let mut why = io::Error::new(ErrorKind::NotFound, "that name has no address");
+    for one in address.to_socket_addrs()? {
+        match timeout(patience, TcpStream::connect(one))
+            .await
+            .unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
+        {
+            Ok(stream) => return stream.set_nodelay(true).map(|()| stream),
+            Err(error) => why = error,
+        }
+    }
+    Err(why)
+}
+
+/// Does `work` until the deadline.
+async fn in_time<T>(
+    deadline: Option<Instant>,
+    work: impl Future<Output = io::Result<T>>,
+) -> io::Result<T> {
+    match deadline {
+        None => work.await,
+        Some(deadline) => timeout_at(deadline, work)
+            .await
+            .unwrap_or_else(|_| Err(ErrorKind::TimedOut.into())),
+    }
+}
+
+impl Session {
+    /// The next awaited frame has to come within `--timeout` from now on.
     pub(super) fn await_next(&mut self) {
-        self.lines.get_mut().deadline = self.patience.map(|patience| Instant::now() + patience);
+        self.deadline = self.patience.map(|patience| Instant::now() + patience);
     }
 
-    /// Sends a frame; what answers it is awaited from then on.
-    pub(super) fn send(&mut self, frame: &Value) -> Result<(), CommandError> {
+    /// Sends a frame, and begins to wait for its answer.
+    pub(super) async fn send(&mut self, frame: &Value) -> Result<(), CommandError> {
         self.await_next();
         let line = format!("{frame}\n");
-        let sent = self.lines.get_mut().write_all(line.as_bytes());
-        if sent.is_err() {
-            // The runtime has closed; its reason is still to be read.
+        if in_time(self.deadline, self.stream.write_all(line.as_bytes()))
+            .await
+            .is_err()
+        {
+            // The runtime has closed the connection. Its reason is still to be read.
             loop {
-                self.receive()?;
+                self.receive().await?;
             }
         }
         Ok(())
     }
 
-    /// The next frame that is no status. An error ends the command.
-    pub(super) fn receive(&mut self) -> Result<Received, CommandError> {
-        self.receive_within(MAX_ANSWER)
+    pub(super) async fn receive(&mut self) -> Result<Received, CommandError> {
+        self.receive_within(MAX_ANSWER).await
     }
 
-    /// The same, of at most so many bytes.
-    fn receive_within(&mut self, longest: usize) -> Result<Received, CommandError> {
+    /// The next frame that is no status, of at most `longest` bytes. A status of an error ends the command. A caller
+    /// that stops waiting loses nothing.
+    async fn receive_within(&mut self, longest: usize) -> Result<Received, CommandError> {
         loop {
-            let said = self.read(longest)?;
-            if said.op != "status" {
-                return Ok(said);
+            // A byte more tells a frame that is longer.
+            let room = (longest + 1).saturating_sub(self.line.len());
+            let mut bounded = (&mut self.stream).take(room as u64);
+            let read = in_time(self.deadline, bounded.read_until(b'\n', &mut self.line)).await;
+            let received = match (read, self.patience) {
+                (Ok(_), _) => frame(&std::mem::take(&mut self.line), longest)?,
+                (Err(error), Some(patience)) if error.kind() == ErrorKind::TimedOut => {
+                    return Err(CommandError::Late(patience));
+                }
+                (Err(error), _) => return Err(CommandError::Lost(error.to_string())),
+            };
+            if received.op != "status" {
+                return Ok(received);
             }
-            let msg = said.msg.as_ref().map_or("", |msg| msg.get());
-            let text: String = serde_json::from_str(msg).unwrap_or_default();
-            match said.level.as_str() {
+            let text: String = read_as(received.msg.as_deref()).unwrap_or_default();
+            match received.level.as_str() {
                 "error" => return Err(CommandError::refused(&text)),
-                "warning" => hint(&text),
+                "warning" => complain(&text),
                 _ => {}
             }
         }
     }
 
-    fn read(&mut self, longest: usize) -> Result<Received, CommandError> {
-        self.line.clear();
-        // A byte more tells a frame that is longer.
-        let mut bounded = (&mut self.lines).take(longest as u64 + 1);
-        match bounded.read_until(b'\n', &mut self.line) {
-            Ok(0) => Err(CommandError::Lost("the runtime closed it".to_owned())),
-            Ok(length) if length > longest => Err(CommandError::Lost(format!(
-                "a frame is longer than {longest} bytes"
-            ))),
-            Ok(_) => serde_json::from_slice(&self.line).map_err(|error| {
-                let whole = self.line.ends_with(b"\n");
-                let what = if whole {
-                    "no frame came"
-                } else {
-                    "within a frame"
-                };
-                CommandError::Lost(format!("{what}: {error}"))
-            }),
-            Err(error) => Err(match (error.kind(), self.patience) {
-                (ErrorKind::WouldBlock | ErrorKind::TimedOut, Some(patience)) => {
-                    CommandError::Late(patience)
-                }
-                _ => CommandError::Lost(error.to_string()),
-            }),
-        }
-    }
-
-    /// Calls a service, and gives the values of its answer.
-    pub(super) fn call(
+    /// Calls a service, and returns the values of its answer.
+    pub(super) async fn call(
         &mut self,
         service: &str,
         args: &Value,
     ) -> Result<Box<RawValue>, CommandError> {
         self.calls += 1;
         let id = self.calls;
-        self.send(&json!({"op": "call_service", "id": id, "service": service, "args": args}))?;
+        self.send(&json!({"op": "call_service", "id": id, "service": service, "args": args}))
+            .await?;
         loop {
-            let said = self.receive()?;
+            let said = self.receive().await?;
             if said.op == "service_response" && read_as(said.id.as_deref()) == Some(id) {
                 return match said.values {
                     Some(values) if said.result => Ok(values),
@@ -193,130 +245,97 @@ impl Session {
         }
     }
 
-    /// One member of what a question of rosapi is answered.
-    pub(super) fn ask<T: DeserializeOwned>(
+    /// One member of the answer to a question of rosapi.
+    pub(super) async fn ask<T: DeserializeOwned>(
         &mut self,
         question: &str,
         args: &Value,
         member: &str,
     ) -> Result<T, CommandError> {
         let service = format!("{PREFIX}{question}");
-        let values = self.call(&service, args)?;
+        let values = self.call(&service, args).await?;
         let values: BTreeMap<String, &RawValue> =
             serde_json::from_str(values.get()).unwrap_or_default();
         serde_json::from_str(values.get(member).map_or("null", |value| value.get()))
             .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))
     }
 
-    /// The type of a topic or service, empty if the runtime knows none. A type that was given has to be the same.
-    pub(super) fn type_of(
+    /// The type of a topic, service or action, empty if the runtime knows none. A given type has to be the same.
+    pub(super) async fn type_of(
         &mut self,
         kind: &str,
         name: &str,
         given: Option<&str>,
     ) -> Result<String, CommandError> {
-        let known: String = self.ask(&format!("{kind}_type"), &json!({kind: name}), "type")?;
+        let known: String = self
+            .ask(&format!("{kind}_type"), &json!({kind: name}), "type")
+            .await?;
         match given {
-            Some(given) if !known.is_empty() && !same_type(given, &known) => Err(
-                CommandError::refused(&format!("{name} is of type {known}, not {given}")),
-            ),
             Some(given) if known.is_empty() => Ok(given.to_owned()),
+            Some(given) if !same_type(given, &known) => Err(CommandError::refused(&format!(
+                "{name} is of type {known}, not {given}"
+            ))),
             _ => Ok(known),
         }
     }
 
-    /// Subscribes to a topic that is there, or whose type is given.
-    pub(super) fn subscribe(
+    /// Subscribes to a topic that exists, or whose type is given.
+    pub(super) async fn subscribe(
         &mut self,
         topic: &str,
         given: Option<&str>,
     ) -> Result<(), CommandError> {
-        let type_name = self.type_of("topic", topic, given)?;
-        let topics: Vec<String> = if type_name.is_empty() {
-            self.ask("topics", &json!({}), "topics")?
-        } else {
-            vec![topic.to_owned()]
+        let type_name = self.type_of("topic", topic, given).await?;
+        let topics: Vec<String> = match type_name.is_empty() {
+            true => self.ask("topics", &json!({}), "topics").await?,
+            false => vec![topic.to_owned()],
         };
-        let same = |one: &String| one.trim_start_matches('/') == topic.trim_start_matches('/');
-        if !topics.iter().any(same) {
+        if !topics.iter().any(|one| are_same(one, topic)) {
             return Err(CommandError::refused(&format!(
                 "{topic} is no topic yet; `pendularm topic list` has those that are, and a TYPE waits for one"
             )));
         }
-        // Without a type the messages are as ROS 2 has them, also where the name that was given is one of ROS 1.
-        self.send(&json!({"op": "subscribe", "topic": topic}))
+        // Without a type the messages are as in ROS 2, also if the given type is one of ROS 1.
+        self.send(&json!({"op": "subscribe", "topic": topic})).await
     }
 
-    /// The next message on a topic that was subscribed to.
-    pub(super) fn message(&mut self, topic: &str) -> Result<Box<RawValue>, CommandError> {
+    /// The next message of a subscribed topic.
+    pub(super) async fn message(&mut self, topic: &str) -> Result<Box<RawValue>, CommandError> {
         self.await_next();
         loop {
-            let said = self.receive_within(MAX_TOPIC_BYTES)?;
+            let said = self.receive_within(MAX_MESSAGE).await?;
             if let (true, Some(msg)) = (said.op == "publish" && said.topic == topic, said.msg) {
                 return Ok(msg);
             }
         }
     }
 
-    /// Another way to send, for [`on_signal`].
-    pub(super) fn sender(&self) -> Result<TcpStream, CommandError> {
-        let stream = self.lines.get_ref().stream.try_clone();
-        stream.map_err(|why| CommandError::System {
-            what: "the socket",
-            why,
-        })
-    }
-}
-
-fn dial(address: &str, patience: Option<Duration>) -> io::Result<TcpStream> {
-    let mut why = io::Error::new(ErrorKind::NotFound, "that name has no address");
-    for one in address.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&one, patience.unwrap_or(CONNECT).min(CONNECT)) {
-            Ok(stream) => {
-                stream.set_nodelay(true)?;
-                return Ok(stream);
-            }
-            Err(error) => why = error,
+    /// Prints an answer, and `end` behind it if that is in YAML: each of several answers ends with `---`.
+    pub(super) fn show(&self, raw: &RawValue, end: &str) -> Result<(), CommandError> {
+        match self.is_json {
+            true => print(&json_line(raw)),
+            false => write_yaml(raw, end, io::stdout().lock()),
         }
     }
-    Err(why)
+
+    /// Prints a line for each entry of a list: the object, or the text that says the same.
+    pub(super) fn show_list(&self, entries: &[(Value, String)]) -> Result<(), CommandError> {
+        let line = |(object, text): &(Value, String)| match self.is_json {
+            true => format!("{object}\n"),
+            false => plain(text) + "\n",
+        };
+        print(&entries.iter().map(line).collect::<String>())
+    }
 }
 
-/// Has SIGINT and SIGTERM do `first` from now on, and end the process with status 1 the second time.
-pub(super) fn on_signal(first: impl FnOnce() + Send + 'static) -> Result<(), CommandError> {
-    let heard = || {
-        let runtime = Builder::new_current_thread().enable_all().build()?;
-        let (mut interrupt, mut terminate) = {
-            let _entered = runtime.enter();
-            (
-                signal(SignalKind::interrupt())?,
-                signal(SignalKind::terminate())?,
-            )
-        };
-        let mut wait = move || {
-            runtime.block_on(async {
-                tokio::select! {
-                    _ = interrupt.recv() => {}
-                    _ = terminate.recv() => {}
-                }
-            });
-        };
-        let hear = move || {
-            wait();
-            first();
-            wait();
-            process::exit(1);
-        };
-        thread::Builder::new().name("signals".into()).spawn(hear)?;
-        Ok(())
-    };
-    heard().map_err(|why| CommandError::System {
-        what: "signals",
-        why,
-    })
-}
-
-/// Has SIGINT and SIGTERM end the process, as the end of what has none by itself.
-pub(super) fn end_on_signal() -> Result<(), CommandError> {
-    on_signal(|| process::exit(0))
+/// Reads a line of at most `longest` bytes.
+fn frame(line: &[u8], longest: usize) -> Result<Received, CommandError> {
+    let lost = |why: String| Err(CommandError::Lost(why));
+    match (line.len(), serde_json::from_slice(line)) {
+        (0, _) => lost("the runtime closed it".to_owned()),
+        (length, _) if length > longest => lost(format!("a frame is longer than {longest} bytes")),
+        (_, Err(error)) if line.ends_with(b"\n") => lost(format!("no frame came: {error}")),
+        (_, Err(error)) => lost(format!("within a frame: {error}")),
+        (_, Ok(received)) => Ok(received),
+    }
 }

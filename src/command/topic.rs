@@ -1,145 +1,175 @@
-//! `pendularm topic`: what is published, how often, and publishing.
+//! `pendularm topic`: prints messages, measures their rate, and publishes.
 //!
-//! **Invariant:** whatever publishes waits until the runtime has taken each message, so that a refusal is heard.
+//! **Invariant:** a publisher waits until the runtime has taken each message, so that a refusal is heard.
 
-use std::collections::VecDeque;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
 
-use clap::{Arg, Command};
+use clap::{Args, Subcommand};
 use serde_json::json;
 use serde_json::value::RawValue;
+use tokio::time::{Instant, sleep_until};
 
-use super::asked::{Asked, read_count, read_positive};
-use super::error::CommandError;
-use super::field::read_path;
-use super::output::print;
-use super::session::end_on_signal;
-use super::verbs::{flag, number, required, show_types, subject, typed_value, verb};
+use super::arguments::TypedValue;
+use super::graph::{self, GraphVerb};
+use super::output::{CommandError, print, raw};
+use super::session::{RuntimeOptions, Session, read_positive};
+use super::yaml::json_line;
 use crate::protocol::catalog::{Rosapi, Service};
+use crate::value::{ValueReader, within};
 
-/// How often `hz` says what it has measured.
+/// Time between two lines of `hz`.
 const REPORT: Duration = Duration::from_secs(1);
 
-pub(super) fn command() -> Command {
-    let topic = || {
-        required(
-            "topic",
-            "TOPIC",
-            "Its name, with or without the leading slash",
-        )
-    };
-    let type_name = || {
-        let arg = Arg::new("type").value_name("TYPE");
-        arg.help("Its type, as pkg/Name, to wait for a topic that is not there yet")
-    };
-    let list = verb(
-        "list",
-        "List the topics that there are",
-        "Examples:\n  pendularm topic list -t\n  pendularm topic list --json | jq -r .name",
-    );
-    let echo = verb(
-        "echo",
-        "Print the messages of a topic as they come",
-        "Examples:\n  pendularm topic echo /joint_states --once\n  \
-         pendularm topic echo /joint_states --field position -n 3\n  \
-         pendularm topic echo --json /clock | head -n 3\n\n\
-         Each message is a YAML document that ends with ---, or with --json a line. \
-         SIGINT, and a reader that goes away, end it\nwith status 0.",
-    );
-    let hz = verb(
-        "hz",
-        "Measure how often messages come",
-        "Example:\n  pendularm topic hz /joint_states\n\n\
-         Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between \
-         two\nmessages [s].",
-    );
-    let window = number("window", "N").short('w');
-    let field = Arg::new("field").long("field").value_name("FIELD");
-    let times = number("times", "N").short('n');
-    subject("topic", "Watch topics of a running pendularm, and publish").subcommands([
-        list.arg(show_types()),
-        echo.args([
-            topic(),
-            type_name(),
-            field
-                .value_parser(read_path)
-                .help("Print this part alone, such as header.stamp or position[0]"),
-            flag("once", "Print one message and end").conflicts_with("times"),
-            times
-                .value_parser(read_count)
-                .help("Print so many messages and end"),
-        ]),
-        hz.args([
-            topic(),
-            type_name(),
-            window
-                .value_parser(read_count)
-                .default_value("10000")
-                .help("How many of the last messages count"),
-        ]),
-        publisher()
-            .arg(topic())
-            .args(typed_value("MESSAGE", "The message")),
-    ])
+/// The verbs of topics.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum TopicVerb {
+    #[command(flatten)]
+    Graph(GraphVerb),
+    /// Print the messages of a topic as they come
+    #[command(after_help = "\
+Examples:
+  pendularm topic echo /joint_states --once
+  pendularm topic echo /joint_states --field position -n 3
+  pendularm topic echo --json /clock | head -n 3
+
+Each message is a YAML document that ends with ---, or with --json a line. A reader that goes away
+ends it with status 0.")]
+    Echo {
+        #[command(flatten)]
+        source: SubscribedTopic,
+        /// Print this part alone, such as `header.stamp` or `position[0]`
+        #[arg(long)]
+        field: Option<String>,
+        /// Print one message and end
+        #[arg(long, conflicts_with = "times")]
+        once: bool,
+        /// Print so many messages and end
+        #[arg(short = 'n', long, value_name = "N", value_parser = ValueReader(read_count))]
+        times: Option<usize>,
+    },
+    /// Measure how often messages come
+    #[command(after_help = "\
+Example:
+  pendularm topic hz /joint_states
+
+Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between two
+messages [s].")]
+    Hz {
+        #[command(flatten)]
+        source: SubscribedTopic,
+        /// How many of the last messages count
+        #[arg(short = 'w', long, value_name = "N", default_value = "10000")]
+        #[arg(value_parser = ValueReader(read_count))]
+        window: usize,
+    },
+    /// Publish a message, once or again and again
+    #[command(after_help = "\
+Examples:
+  pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'
+  pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'
+
+Without --once or --times it publishes until a signal ends it.")]
+    Pub {
+        /// Its name, with or without the leading slash
+        topic: String,
+        #[command(flatten)]
+        message: TypedValue,
+        /// Publish one message and end
+        #[arg(short = '1', long, conflicts_with = "times")]
+        once: bool,
+        /// Publish so many messages and end
+        #[arg(short = 't', long, value_name = "N", value_parser = ValueReader(read_count))]
+        times: Option<usize>,
+        /// How many a second
+        #[arg(short = 'r', long, value_name = "HZ", default_value = "1")]
+        #[arg(value_parser = ValueReader(read_positive))]
+        rate: f64,
+    },
 }
 
-fn publisher() -> Command {
-    let notes = "Examples:\n  pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'\n  \
-        pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'\n\n\
-        Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without \
-        one it is {}.";
-    let once = flag("once", "Publish one message and end").short('1');
-    let times = number("times", "N").short('t');
-    let rate = number("rate", "HZ").short('r');
-    verb("pub", "Publish a message, once or again and again", notes).args([
-        once.conflicts_with("times"),
-        times
-            .value_parser(read_count)
-            .help("Publish so many messages and end"),
-        rate.value_parser(read_positive)
-            .default_value("1")
-            .help("How many a second"),
-    ])
+/// The topic of a subscription.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct SubscribedTopic {
+    /// Its name, with or without the leading slash
+    topic: String,
+    /// Its type, as pkg/Name, to wait for a topic that is not there yet
+    #[arg(value_name = "TYPE")]
+    type_name: Option<String>,
 }
 
-pub(super) fn list(asked: &Asked) -> Result<(), CommandError> {
-    let mut session = asked.open()?;
-    let names: Vec<String> = session.ask("topics", &json!({}), "topics")?;
-    asked.list(&names, |name| session.type_of("topic", name, None))
+fn read_count(text: &str) -> Result<usize, String> {
+    within(&(1..=1_000_000), "a whole number", text)
 }
 
-pub(super) fn echo(asked: &Asked) -> Result<(), CommandError> {
-    let topic = asked.text("topic");
-    let field = asked.field();
-    let times = asked.times();
-    let mut session = asked.open()?;
-    session.subscribe(topic, asked.type_name())?;
-    end_on_signal()?;
-    let mut count = 0;
-    while times.is_none_or(|times| count < times) {
-        let msg = session.message(topic)?;
-        asked.show_next(match field {
-            Some(field) => field.pick(&msg)?,
-            None => &msg,
-        })?;
-        count += 1;
+pub(super) async fn run(verb: &TopicVerb, runtime: &RuntimeOptions) -> Result<(), CommandError> {
+    match verb {
+        TopicVerb::Graph(verb) => graph::run(verb, "topic", &mut runtime.open().await?).await,
+        TopicVerb::Echo {
+            source,
+            field,
+            once,
+            times,
+        } => {
+            let mut session = source.subscribe(runtime).await?;
+            let mut left = times.or(once.then_some(1));
+            while left != Some(0) {
+                let message = session.message(&source.topic).await?;
+                let shown = field
+                    .as_ref()
+                    .map_or(Ok(&*message), |field| part(&message, field))?;
+                session.show(shown, "---\n")?;
+                left = left.map(|left| left - 1);
+            }
+            Ok(())
+        }
+        TopicVerb::Hz { source, window } => {
+            measure(&source.topic, *window, source.subscribe(runtime).await?).await
+        }
+        TopicVerb::Pub {
+            topic,
+            message,
+            once,
+            times,
+            rate,
+        } => {
+            let times = times.or(once.then_some(1));
+            publish(topic, message, times, *rate, runtime).await
+        }
     }
-    Ok(())
 }
 
-pub(super) fn hz(asked: &Asked) -> Result<(), CommandError> {
-    let topic = asked.text("topic");
-    let window = asked.number("window").unwrap_or(1);
-    let mut session = asked.open()?;
-    session.subscribe(topic, asked.type_name())?;
-    end_on_signal()?;
+impl SubscribedTopic {
+    async fn subscribe(&self, runtime: &RuntimeOptions) -> Result<Session, CommandError> {
+        let mut session = runtime.open().await?;
+        session
+            .subscribe(&self.topic, self.type_name.as_deref())
+            .await?;
+        Ok(session)
+    }
+}
+
+/// The part of a message at a path, spelled as it came: names with dots between, items in brackets.
+fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandError> {
+    let step = |value: &'a RawValue, step: &str| -> Option<&'a RawValue> {
+        if let Some(index) = step.strip_suffix(']') {
+            let items: Vec<&RawValue> = serde_json::from_str(value.get()).ok()?;
+            return items.get(index.parse::<usize>().ok()?).copied();
+        }
+        let members: BTreeMap<String, &RawValue> = serde_json::from_str(value.get()).ok()?;
+        members.get(step).copied()
+    };
+    let part = path.split(['.', '[']).try_fold(message, step);
+    part.ok_or_else(|| CommandError::refused(&format!("the message has no {path}")))
+}
+
+async fn measure(topic: &str, window: usize, mut session: Session) -> Result<(), CommandError> {
     let mut spans = VecDeque::new();
-    session.message(topic)?;
+    session.message(topic).await?;
     let mut last = Instant::now();
     let mut reported = last;
     loop {
-        session.message(topic)?;
+        session.message(topic).await?;
         let now = Instant::now();
         if spans.len() == window {
             spans.pop_front();
@@ -148,7 +178,7 @@ pub(super) fn hz(asked: &Asked) -> Result<(), CommandError> {
         last = now;
         if now - reported >= REPORT {
             reported = now;
-            print(&rhythm(&spans, asked.has("json")))?;
+            print(&rhythm(&spans, session.is_json))?;
         }
     }
 }
@@ -172,42 +202,40 @@ fn rhythm(spans: &VecDeque<f64>, is_json: bool) -> String {
     )
 }
 
-pub(super) fn publish(asked: &Asked) -> Result<(), CommandError> {
-    let topic = asked.text("topic");
-    let (type_name, message) = asked.typed_value("MESSAGE")?;
-    let times = asked.times();
-    let period = Duration::from_secs_f64(asked.number("rate").unwrap_or(1.0_f64).recip());
-    let mut session = asked.open()?;
-    let known = session.type_of("topic", topic, type_name)?;
+async fn publish(
+    topic: &str,
+    message: &TypedValue,
+    times: Option<usize>,
+    rate: f64,
+    runtime: &RuntimeOptions,
+) -> Result<(), CommandError> {
+    let (type_name, message) = message.read()?;
+    let mut session = runtime.open().await?;
+    let known = session.check("topic", topic, type_name, &message).await?;
     let mut advertise = json!({"op": "advertise", "topic": topic});
-    if let (false, Some(frame)) = (known.is_empty(), advertise.as_object_mut()) {
-        frame.insert("type".to_owned(), known.into());
+    if let (false, Some(members)) = (known.is_empty(), advertise.as_object_mut()) {
+        members.insert("type".to_owned(), known.into());
     }
-    session.send(&advertise)?;
-    end_on_signal()?;
+    session.send(&advertise).await?;
     let publish = json!({"op": "publish", "topic": topic, "msg": message});
-    let spelled = RawValue::from_string(message.to_string()).ok();
+    let spelled = raw(message.to_string())?;
+    let period = Duration::from_secs_f64(rate.recip());
     let mut due = Instant::now();
-    let mut count = 0;
-    loop {
-        session.send(&publish)?;
-        // Answered once the message has been taken; a refusal comes before.
-        session.call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))?;
-        count += 1;
-        if let Some(spelled) = &spelled {
-            if asked.has("json") {
-                asked.show_next(spelled)?;
-            } else {
-                print(&format!(
-                    "publishing #{count}: {}",
-                    super::spelling::json_line(spelled)
-                ))?;
-            }
+    for count in 1.. {
+        session.send(&publish).await?;
+        // Its answer comes once the message has been taken. A refusal comes before it.
+        session
+            .call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))
+            .await?;
+        match session.is_json {
+            true => session.show(&spelled, "")?,
+            false => print(&format!("publishing #{count}: {}", json_line(&spelled)))?,
         }
         if times.is_some_and(|times| count >= times) {
-            return Ok(());
+            break;
         }
         due += period;
-        thread::sleep(due.saturating_duration_since(Instant::now()));
+        sleep_until(due).await;
     }
+    Ok(())
 }

@@ -1,116 +1,180 @@
-//! Arguments in JSON or YAML, read as JSON.
+//! Values of the runtime, written as YAML or as a line of JSON.
 //!
-//! **Invariant:** what is read is no deeper than the runtime takes.
+//! YAML is written here: the library's writer keeps an escape character in a text as it is, and a terminal obeys it.
+//!
+//! **Invariant:** members keep their order, numbers their value, and nothing in a text acts on a terminal.
 
-use serde_json::{Map, Value};
-use yaml_rust2::parser::{Event, Parser};
-use yaml_rust2::{Yaml, YamlLoader};
+use std::fmt;
+use std::io::{self, BufWriter, Write};
 
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
+use serde_json::value::RawValue;
+
+use super::output::CommandError;
 use crate::protocol::limits::MAX_NESTING;
+use crate::protocol::wire::text::{acts, push_quoted};
 
-/// Reads a value in JSON or YAML.
+/// Texts that a reader of YAML would take for something else, in lower case.
+pub const WORDS: [&str; 10] = [
+    "true", "false", "null", "yes", "no", "on", "off", "y", "n", "~",
+];
+
+/// JSON on one line, as it came except for characters that act on a terminal.
+#[must_use]
+pub fn json_line(raw: &RawValue) -> String {
+    let mut line = String::with_capacity(raw.get().len() + 1);
+    for character in raw.get().chars() {
+        match character {
+            // Between tokens; within a text JSON has none of them.
+            '\t' | '\r' | '\n' => line.push(' '),
+            _ if acts(character) => push_quoted(&mut line, character),
+            _ => line.push(character),
+        }
+    }
+    line.push('\n');
+    line
+}
+
+/// Writes the value as lines of YAML, and `end` behind them. It writes while it reads: a value that is nested deep has
+/// a hundred times the bytes in YAML that it has in JSON.
 ///
 /// # Errors
-/// The reader's complaint.
-pub(super) fn read(text: &str) -> Result<Value, String> {
-    // JSON as JSON has it: to YAML, pairs of `\u` escapes are no characters.
-    if let Ok(value) = serde_json::from_str(text) {
-        return Ok(value);
-    }
-    refuse_depth(text)?;
-    let mut documents = YamlLoader::load_from_str(text).map_err(|error| error.to_string())?;
-    match (documents.pop(), documents.is_empty()) {
-        (None, _) => Ok(Value::Null),
-        (Some(document), true) => value(document),
-        _ => Err("it is more than one document".to_owned()),
-    }
-}
-
-/// Refuses what would be deep: nested as such, or by names that stand for other parts.
-fn refuse_depth(text: &str) -> Result<(), String> {
-    let mut parser = Parser::new_from_str(text);
-    let mut depth = 0_usize;
-    loop {
-        match parser.next_token().map_err(|error| error.to_string())?.0 {
-            Event::SequenceStart(..) | Event::MappingStart(..) => depth += 1,
-            Event::SequenceEnd | Event::MappingEnd => depth = depth.saturating_sub(1),
-            Event::Alias(_) => return Err("an alias (*name) is not taken".to_owned()),
-            Event::StreamEnd => return Ok(()),
-            _ => {}
-        }
-        if depth > MAX_NESTING {
-            return Err(format!("it is nested more than {MAX_NESTING} deep"));
-        }
-    }
-}
-
-fn value(yaml: Yaml) -> Result<Value, String> {
-    Ok(match yaml {
-        Yaml::Null => Value::Null,
-        Yaml::Boolean(value) => value.into(),
-        Yaml::Integer(value) => value.into(),
-        Yaml::String(text) => text.into(),
-        Yaml::Real(ref text) => {
-            let number = yaml.as_f64().filter(|number| number.is_finite());
-            number
-                .ok_or_else(|| format!("{text} is no number of JSON"))?
-                .into()
-        }
-        Yaml::Array(items) => {
-            let items: Result<Vec<Value>, String> = items.into_iter().map(value).collect();
-            items?.into()
-        }
-        Yaml::Hash(members) => {
-            let mut object = Map::new();
-            for (name, member) in members {
-                let name = match name {
-                    Yaml::String(name) | Yaml::Real(name) => name,
-                    Yaml::Integer(name) => name.to_string(),
-                    _ => return Err("the name of a member is no text".to_owned()),
-                };
-                object.insert(name, value(member)?);
-            }
-            object.into()
-        }
-        Yaml::Alias(_) | Yaml::BadValue => return Err("it has a value without meaning".to_owned()),
+/// [`CommandError::Lost`] if it is nested deeper than the runtime takes, or that of `out`.
+pub fn write_yaml(raw: &RawValue, end: &str, out: impl Write) -> Result<(), CommandError> {
+    let mut out = BufWriter::new(out);
+    let written = write_value(raw, 0, &Place::Top, &mut out)
+        .and_then(|()| out.write_all(end.as_bytes()))
+        .and_then(|()| out.flush());
+    written.map_err(|why| match why.kind() {
+        io::ErrorKind::InvalidData => CommandError::Lost(format!("no frame came: {why}")),
+        _ => CommandError::output(why),
     })
 }
 
-#[cfg(test)]
-mod tests {
-    use serde_json::json;
+/// The place of a value: what stands before it on its line.
+#[derive(PartialEq)]
+enum Place {
+    Top,
+    /// The name of a member.
+    Member,
+    /// The dash of an item.
+    Item,
+}
 
-    use super::*;
+/// The members of an object, in their order.
+struct OrderedMembers<'a>(Vec<(String, &'a RawValue)>);
 
-    #[test]
-    fn arguments_are_read_as_json_has_them_and_else_as_yaml_has() {
-        for (text, value) in [
-            ("", json!(null)),
-            (
-                "{x: 1, y: 0.5, on: off}",
-                json!({"x": 1, "y": 0.5, "on": "off"}),
-            ),
-            (
-                "{\"a\": \"\\ud83d\\ude00\", \"b\": 18446744073709551615}",
-                json!({"a": "\u{1f600}", "b": u64::MAX}),
-            ),
-            (
-                "a: [0x10, 1e3, ~]\nb: !t &x [16, .5]",
-                json!({"a": [16, 1000.0, null], "b": [16, 0.5]}),
-            ),
-            ("1: one", json!({"1": "one"})),
-        ] {
-            assert_eq!(read(text), Ok(value), "{text}");
+impl<'de: 'a, 'a> Deserialize<'de> for OrderedMembers<'a> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder;
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = OrderedMembers<'de>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+                let mut members = Vec::new();
+                while let Some(member) = map.next_entry()? {
+                    members.push(member);
+                }
+                Ok(OrderedMembers(members))
+            }
         }
-        for text in [
-            "{",
-            "a: 1\n---\na: 2",
-            "[.inf]",
-            "{[1]: 2}",
-            "*x",
-            "!!float abc",
-        ] {
-            assert!(read(text).is_err(), "{text}");
-        }
+        deserializer.deserialize_map(InOrder)
     }
+}
+
+/// Writes a value whose name or dash stands behind `indent` spaces.
+fn write_value(
+    raw: &RawValue,
+    indent: usize,
+    place: &Place,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    if indent > 2 * MAX_NESTING {
+        let why = format!("it is nested more than {MAX_NESTING} deep");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, why));
+    }
+    let json = raw.get();
+    let (items, members) = match json.get(..1) {
+        Some("[") => (serde_json::from_str(json)?, OrderedMembers(Vec::new())),
+        Some("{") => (Vec::new(), serde_json::from_str(json)?),
+        _ => (Vec::new(), OrderedMembers(Vec::new())),
+    };
+    let OrderedMembers(members) = members;
+    let is_list = !items.is_empty();
+    if !is_list && members.is_empty() {
+        let space = if *place == Place::Top { "" } else { " " };
+        return writeln!(out, "{space}{}", scalar(json)?);
+    }
+    // The dashes of a member stand under its name.
+    let indent = match place {
+        Place::Top => indent,
+        Place::Member if is_list => indent,
+        _ => indent + 2,
+    };
+    let leads = members
+        .iter()
+        .map(|(name, value)| (text(name) + ":", *value));
+    let leads = leads.chain(
+        items
+            .into_iter()
+            .map(|item: &RawValue| ("-".to_owned(), item)),
+    );
+    for (at, (lead, value)) in leads.enumerate() {
+        match place {
+            Place::Item if at == 0 => write!(out, " {lead}")?,
+            Place::Member if at == 0 => write!(out, "\n{:indent$}{lead}", "")?,
+            _ => write!(out, "{:indent$}{lead}", "")?,
+        }
+        let place = if is_list { Place::Item } else { Place::Member };
+        write_value(value, indent, &place, out)?;
+    }
+    Ok(())
+}
+
+/// A value without parts. Python reads numbers of YAML 1.1: with a point, and a sign in the exponent.
+fn scalar(json: &str) -> io::Result<String> {
+    if json.starts_with('"') {
+        return Ok(text(&serde_json::from_str::<String>(json)?));
+    }
+    let has_exponent = json.starts_with(|one: char| one == '-' || one.is_ascii_digit());
+    Ok(match json.split_once(['e', 'E']).filter(|_| has_exponent) {
+        Some((digits, exponent)) => {
+            let point = if digits.contains('.') { "" } else { ".0" };
+            let sign = if exponent.starts_with(['-', '+']) {
+                ""
+            } else {
+                "+"
+            };
+            format!("{digits}{point}e{sign}{exponent}")
+        }
+        None => match json.chars().next() {
+            Some('[') => "[]".to_owned(),
+            Some('{') => "{}".to_owned(),
+            _ => json.to_owned(),
+        },
+    })
+}
+
+/// A text, quoted unless every reader takes it for one as it is.
+fn text(value: &str) -> String {
+    let begins = |one: char| one.is_ascii_alphabetic() || one == '/' || one == '_';
+    let goes_on = |one: char| one.is_ascii_alphanumeric() || "/_.-+() ".contains(one);
+    if value.starts_with(begins)
+        && value.chars().all(goes_on)
+        && !value.ends_with(' ')
+        && !WORDS.contains(&value.to_ascii_lowercase().as_str())
+    {
+        return value.to_owned();
+    }
+    let mut quoted = String::from('"');
+    for character in value.chars() {
+        push_quoted(&mut quoted, character);
+    }
+    quoted.push('"');
+    quoted
 }

@@ -9,6 +9,8 @@
 
 use thiserror::Error;
 
+use super::shown::Shown;
+
 /// Parameters of an arm with `N` links, and the constants that the dynamics derive from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arm<const N: usize> {
@@ -37,7 +39,7 @@ pub(super) struct Rod<T = f64> {
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum ArmError {
     /// A length or a mass is NaN or infinite.
-    #[error("{field}[{index}] must be finite, got {value}")]
+    #[error("{field}[{index}] must be finite, got {}", Shown(*.value))]
     NotFinite {
         /// `lengths` or `masses`.
         field: &'static str,
@@ -47,7 +49,7 @@ pub enum ArmError {
         value: f64,
     },
     /// A length or a mass is zero or negative.
-    #[error("{field}[{index}] must be greater than 0, got {value}")]
+    #[error("{field}[{index}] must be greater than 0, got {}", Shown(*.value))]
     NotPositive {
         /// `lengths` or `masses`.
         field: &'static str,
@@ -57,13 +59,13 @@ pub enum ArmError {
         value: f64,
     },
     /// Gravity is NaN or infinite.
-    #[error("gravity must be finite, got {value}")]
+    #[error("gravity must be finite, got {}", Shown(*.value))]
     GravityNotFinite {
         /// The value given \[m/s²\].
         value: f64,
     },
     /// Gravity is negative.
-    #[error("gravity must be at least 0, got {value}")]
+    #[error("gravity must be at least 0, got {}", Shown(*.value))]
     GravityNegative {
         /// The value given \[m/s²\].
         value: f64,

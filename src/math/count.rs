@@ -17,6 +17,16 @@ pub const fn length_in_f64(length: usize) -> f64 {
     in_f64(length as u64)
 }
 
+/// Bound on the relative rounding errors of a duration, such as 0.1 + 0.2, and of its quotient by a timestep.
+pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// `duration / timestep`, increased by the bound on its rounding error. Rounded, it is the nearest number of steps, and
+/// half a step counts as a whole one.
+#[must_use]
+pub fn steps_in(duration: f64, timestep: f64) -> f64 {
+    duration / timestep * (1.0 + ROUNDING)
+}
+
 /// How many of the numbers `0..count` there are for which `holds`, which it does up to some number and then no more.
 #[must_use]
 pub fn partition_point(count: u64, holds: impl Fn(u64) -> bool) -> u64 {

@@ -73,14 +73,32 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// A stay without interruption.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Dwell {
+    /// Time of the first look of the present stay; none while outside.
+    entered: Option<f64>,
+}
+
+impl Dwell {
+    /// Takes a look at simulation time `time` \[s\]; `true` once the stay has lasted for `hold` \[s\]. One look outside
+    /// starts it over, and so does a clock that runs backwards.
+    pub fn stays(&mut self, time: f64, is_inside: bool, hold: f64) -> bool {
+        let entered = self.entered.filter(|&entered| entered <= time);
+        self.entered = is_inside.then(|| entered.unwrap_or(time));
+        let lasted = self.entered.map(|entered| time - entered + rounding(time));
+        lasted.is_some_and(|lasted| lasted >= hold)
+    }
+}
+
 /// An active goal, judged at every physics step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
     target: DVec2,
     criteria: Criteria,
     started: f64,
-    /// Time of the first step of the present stay within epsilon; none while outside.
-    entered: Option<f64>,
+    /// The present stay within epsilon.
+    dwell: Dwell,
 }
 
 impl Goal {
@@ -91,7 +109,7 @@ impl Goal {
             target,
             criteria,
             started: now,
-            entered: None,
+            dwell: Dwell { entered: None },
         }
     }
 
@@ -102,17 +120,8 @@ impl Goal {
     /// that is not a number counts as outside.
     pub fn judge(&mut self, time: f64, end_effector: DVec2) -> bool {
         // NaN is not near anything.
-        if self.distance(end_effector) <= self.criteria.epsilon {
-            let entered = self
-                .entered
-                .filter(|&entered| entered <= time)
-                .unwrap_or(time);
-            self.entered = Some(entered);
-            time - entered + rounding(time) >= self.criteria.success_hold
-        } else {
-            self.entered = None;
-            false
-        }
+        let is_near = self.distance(end_effector) <= self.criteria.epsilon;
+        self.dwell.stays(time, is_near, self.criteria.success_hold)
     }
 
     /// The place for the end effector \[m\].

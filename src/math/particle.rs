@@ -11,6 +11,7 @@
 use super::count::length_in_f64;
 use super::expression::{Expression, Stack};
 use super::integrator::{Method, increment, two_sum};
+use super::shown::Shown;
 
 /// Most steps of one computation. A million samples are some 60 MB of JSON, about as much as a client can want at once.
 pub const MAX_STEPS: u64 = 1_000_000;
@@ -22,7 +23,7 @@ pub const MAX_WORK: u64 = 2_000_000_000;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ParticleError {
     /// A starting value or a timestep that is NaN or infinite.
-    #[error("{field} must be finite, got {value}")]
+    #[error("{field} must be finite, got {}", Shown(*.value))]
     NotFinite {
         /// `x0`, `xdot0` or `dt`.
         field: &'static str,
@@ -30,7 +31,7 @@ pub enum ParticleError {
         value: f64,
     },
     /// A timestep that is zero or negative.
-    #[error("dt must be greater than 0, got {dt}")]
+    #[error("dt must be greater than 0, got {}", Shown(*.dt))]
     Timestep {
         /// The value given \[s\].
         dt: f64,

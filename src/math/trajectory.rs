@@ -16,7 +16,9 @@
 )]
 
 use super::arm::State;
+use super::goal::{Dwell, SUCCESS_HOLD};
 use super::pid::Setpoint;
+use super::shown::shown_against;
 
 /// A point of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,13 +165,10 @@ pub struct Tolerance<const N: usize> {
 }
 
 impl<const N: usize> Tolerance<N> {
-    /// A tolerance for the positions of all joints alike.
-    #[must_use]
-    pub const fn of_positions(position: Option<f64>) -> Self {
-        Self {
-            position: [position; N],
-            velocity: [None; N],
-        }
+    /// Whether any distance and any velocity will do.
+    fn is_any(&self) -> bool {
+        let mut limits = self.position.iter().chain(&self.velocity);
+        limits.all(Option::is_none)
     }
 
     /// The first joint that is farther off than it may be.
@@ -208,7 +207,10 @@ impl<const N: usize> Tolerance<N> {
 
 /// A joint that is farther off than it may be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("{quantity} of joint{} is off by {error}, more than {limit}", .joint + 1)]
+#[error(
+    "{quantity} of joint{} is off by {}, more than {}",
+    .joint + 1, shown_against(*.error, *.limit), shown_against(*.limit, *.error)
+)]
 pub struct Excess {
     /// Index of the joint.
     pub joint: usize,
@@ -229,8 +231,10 @@ pub struct Course<const N: usize> {
     pub on_the_way: Tolerance<N>,
     /// How far off the joints may be at its end.
     pub at_the_end: Tolerance<N>,
-    /// How long after its end the joints may take to get there \[s\].
+    /// How long after its end the joints may take to get there \[s\]; infinite for no limit.
     pub patience: f64,
+    /// How long they have been there.
+    pub dwell: Dwell,
 }
 
 /// How the joints stand on a course.
@@ -247,19 +251,21 @@ pub enum Standing {
 }
 
 impl<const N: usize> Course<N> {
-    /// How joints at `actual` stand, `time` after the start \[s\].
-    #[must_use]
-    pub fn judge(&self, time: f64, actual: &State<N>) -> Standing {
+    /// How joints at `actual` stand, `time` after the start \[s\]. They have arrived once they have stayed within the
+    /// tolerance for [`SUCCESS_HOLD`]; a single look could find them on their way through.
+    pub fn judge(&mut self, time: f64, actual: &State<N>) -> Standing {
         let desired = self.path.at(time);
         let duration = self.path.duration();
         if time < duration {
             let excess = self.on_the_way.exceeded(&desired, actual);
             return excess.map_or(Standing::Underway, Standing::OffPath);
         }
-        match self.at_the_end.exceeded(&desired, actual) {
-            None => Standing::Arrived,
+        let excess = self.at_the_end.exceeded(&desired, actual);
+        let stays = self.dwell.stays(time, excess.is_none(), SUCCESS_HOLD);
+        match excess {
+            None if stays || self.at_the_end.is_any() => Standing::Arrived,
             Some(excess) if time - duration > self.patience => Standing::Late(excess),
-            Some(_) => Standing::Underway,
+            _ => Standing::Underway,
         }
     }
 }

@@ -1,200 +1,210 @@
-//! The command line and the environment, each option once.
+//! The command line and the environment, each option once: a field with its help, its variable and its reader.
 //!
-//! Pure: arguments and variables are handed in, and what the program is to do comes back as a value. `clap` reads the
-//! arguments and lays out the help; the values are read here, so that an option and its variable follow one rule.
-//!
-//! An option wins over its variable, which is then not looked at; an empty variable counts as unset.
+//! An option wins over its variable; an empty variable counts as unset. A command stands before its options, and the
+//! token's is the only variable that it reads.
 //!
 //! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
 
-mod explained;
-mod links;
-mod log;
-mod plan;
-#[cfg(feature = "record")]
-mod record;
-#[cfg(feature = "report")]
-mod report;
-mod setting;
-mod usage;
 mod values;
-#[cfg(feature = "web")]
-mod web;
 
+use std::env;
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-#[cfg(feature = "cli")]
+#[cfg(any(feature = "record", feature = "web"))]
 use std::path::PathBuf;
 
-#[cfg(feature = "record")]
-use clap::ArgMatches;
-use clap::builder::{OsStringValueParser, StyledStr};
-use clap::{Arg, Command};
+use clap::builder::Resettable;
+use clap::error::ErrorKind;
+use clap::{Args, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+#[cfg(feature = "cli")]
+use clap_complete::Shell;
 use tracing::level_filters::LevelFilter;
 
-use self::explained::explained;
-pub use self::links::Links;
-pub use self::plan::PlanOptions;
-#[cfg(feature = "record")]
-pub use self::record::{RecordOptions, ReplayOptions};
-use self::setting::{Given, LaunchOption, given};
-pub use self::usage::{Origin, UsageError};
-use self::values::{read_bind, read_links, read_seed, read_token};
+use self::values::{
+    read_bind, read_clients, read_level, read_log_format, read_period, read_seed, read_token,
+};
 #[cfg(feature = "web")]
-pub use self::web::WebOptions;
+use self::values::{read_host, read_origin, read_switch};
 #[cfg(feature = "cli")]
-use crate::command::{self, Asked};
+use crate::command::{CommandSubject, UNQUOTED};
 use crate::logging::LogFormat;
+use crate::plan::PlanOptions;
+pub use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_CLIENTS};
 use crate::protocol::op::token::Token;
+use crate::protocol::wire::text::shortened;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
+pub use crate::value::Links;
+use crate::value::{ValueReader, read_links};
+#[cfg(feature = "web")]
+use crate::web::{DEFAULT_REPORT, authority::Authority};
 
 /// Address of the runtime unless an option says otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
 
-/// The features of this build, as the version shows them.
+/// The version of this build, its commit if that is known, and its features.
 const BUILD: &str = if cfg!(feature = "web") {
-    concat!(env!("CARGO_PKG_VERSION"), " (web)")
+    concat!(env!("PENDULARM_VERSION"), " (web)")
 } else {
-    concat!(env!("CARGO_PKG_VERSION"), " (without web)")
+    concat!(env!("PENDULARM_VERSION"), " (without web)")
 };
-
-#[cfg(feature = "web")]
-const TRANSPORTS: &str = "\
-This build has the web feature: the port speaks rosbridge JSON over TCP and over WebSocket, and serves a page \
-over HTTP.";
-#[cfg(not(feature = "web"))]
-const TRANSPORTS: &str = "\
-This build is without the web feature: the port speaks rosbridge JSON over TCP, and neither WebSocket nor HTTP.";
 
 const AFTER_HELP: &str = "\
+The port speaks rosbridge JSON over TCP. With the web feature, which --version shows, it also speaks WebSocket and
+serves a page over HTTP.
 An option wins over its environment variable; an empty variable counts as unset.
-Exit status: 0 after SIGINT or SIGTERM, 2 for a bad option or variable, 1 for any other failure.";
+Exit status: 0 after a signal that asks it to end (SIGINT, SIGTERM, SIGHUP), 2 for a bad option or variable, 1 for any
+other failure.";
 
-const LINKS: LaunchOption = LaunchOption {
-    option: "links",
-    variable: "ARM_SIM_LINKS",
-    value: "N",
-    about: "Number of links of the arm, 2 or 3",
-    default: "2",
-    is_switch: false,
-};
-
-const BIND: LaunchOption = LaunchOption {
-    option: "bind",
-    variable: "ARM_SIM_BIND",
-    value: "ADDRESS",
-    about: "Address and port to listen on, loopback unless there is a token; port 0 takes a free one",
-    default: "127.0.0.1:9095",
-    is_switch: false,
-};
-
-const SEED: LaunchOption = LaunchOption {
-    option: "seed",
-    variable: "ARM_SIM_SEED",
-    value: "N",
-    about: "Makes the targets of timed trials repeatable",
-    default: "a new seed at every start",
-    is_switch: false,
-};
-
-const TOKEN: LaunchOption = LaunchOption {
-    option: "token",
-    variable: "ARM_SIM_TOKEN",
-    value: "TOKEN",
-    about: "What every client has to show, 16 characters at least; who may list this machine's processes \
-            sees it, so better use the variable",
-    default: "none",
-    is_switch: false,
-};
-
-/// All of them, in the order of the help.
-const SETTINGS: &[&LaunchOption] = &[
-    &LINKS,
-    &BIND,
-    &SEED,
-    &log::LOG,
-    &log::LOG_FORMAT,
-    &TOKEN,
-    #[cfg(feature = "record")]
-    &record::RECORD,
-    #[cfg(feature = "record")]
-    &record::RECORD_DIR,
-    #[cfg(feature = "web")]
-    &web::ALLOW_HOST,
-    #[cfg(feature = "web")]
-    &web::ALLOW_ORIGIN,
-    #[cfg(feature = "web")]
-    &web::STRICT_ORIGIN,
-    #[cfg(feature = "web")]
-    &web::REPORT,
-];
+/// Longest refusal \[characters\].
+const MAX_REFUSAL: usize = 1000;
 
 /// Everything that is chosen at launch.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Options {
-    /// How many links the arm has.
+    /// Number of links of the arm, 2 or 3
+    #[arg(long, env = "ARM_SIM_LINKS", value_name = "N", default_value = "2")]
+    #[arg(value_parser = ValueReader(read_links))]
     pub links: Links,
-    /// Address to listen on: a loopback address, or any if there is a token; port 0 takes a free one.
+    /// Address and port to listen on, or one of them, loopback unless there is a token; port 0 takes a free one
+    #[arg(long, env = "ARM_SIM_BIND", value_name = "ADDRESS")]
+    #[arg(default_value = "127.0.0.1:9095")]
+    #[arg(value_parser = ValueReader(read_bind))]
     pub bind: SocketAddr,
-    /// Whether `bind` is [`DEFAULT_BIND`], which brings `[::1]` with it.
-    pub is_default_bind: bool,
-    /// The seed of the random targets of timed trials; a new one at every start if absent.
+    /// Clients that are served at once, at most 4096; a few of these places are kept for HTTP and WebSocket
+    #[arg(long, env = "ARM_SIM_CLIENTS", value_name = "N")]
+    #[arg(default_value_t = DEFAULT_CLIENTS, value_parser = ValueReader(read_clients))]
+    pub clients: usize,
+    /// Time between two runs of the control law, in seconds; 0 for every step
+    #[arg(long, env = "ARM_SIM_CONTROL_PERIOD", value_name = "SECONDS")]
+    #[arg(default_value = "0", value_parser = ValueReader(read_period))]
+    pub control_period: f64,
+    /// Makes the targets of timed trials repeatable; without it the seed is new at every start
+    #[arg(long, env = "ARM_SIM_SEED", value_name = "N", value_parser = ValueReader(read_seed))]
     pub seed: Option<u64>,
-    /// The log level.
+    /// Level of the log on standard error: off, error, warn, info, debug or trace
+    #[arg(long, env = "ARM_SIM_LOG", value_name = "LEVEL")]
+    #[arg(default_value = "info", value_parser = ValueReader(read_level))]
     pub log: LevelFilter,
-    /// How each line of the log is written.
+    /// Format of the log: text, or json for one object a line
+    #[arg(long, env = "ARM_SIM_LOG_FORMAT", value_name = "FORMAT")]
+    #[arg(default_value = "text", value_parser = ValueReader(read_log_format))]
     pub log_format: LogFormat,
-    /// The token that every client has to show, if there is one.
+    /// Token of at least 16 characters; prefer the variable: others see options
+    #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(read_token))]
     pub token: Option<Token>,
     /// About runs on record.
     #[cfg(feature = "record")]
+    #[command(flatten)]
     pub record: RecordOptions,
     /// About the site.
     #[cfg(feature = "web")]
+    #[command(flatten)]
     pub web: WebOptions,
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            links: Links::default(),
-            bind: DEFAULT_BIND,
-            is_default_bind: true,
-            seed: None,
-            log: LevelFilter::INFO,
-            log_format: LogFormat::default(),
-            token: None,
-            #[cfg(feature = "record")]
-            record: RecordOptions::default(),
-            #[cfg(feature = "web")]
-            web: WebOptions::default(),
-        }
-    }
+/// Records, as chosen at launch.
+#[cfg(feature = "record")]
+#[derive(Debug, Clone, PartialEq, Eq, Args)]
+pub struct RecordOptions {
+    /// Records the run as MCAP into this file, which must not exist
+    #[arg(long = "record", env = "ARM_SIM_RECORD", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// Existing folder in which clients may have runs recorded, by /recorder/start
+    #[arg(long = "record-dir", env = "ARM_SIM_RECORD_DIR", value_name = "FOLDER")]
+    pub folder: Option<PathBuf>,
 }
 
-/// The request of the command line.
-#[derive(Debug, Clone, PartialEq)]
+/// The options of the site, as chosen at launch.
+#[cfg(feature = "web")]
+#[derive(Debug, Clone, PartialEq, Eq, Args)]
+pub struct WebOptions {
+    /// Names besides loopback's for browsers, separated by commas; one with a port is allowed at that port only
+    #[arg(long = "allow-host", env = "ARM_SIM_ALLOW_HOST", value_name = "HOSTS")]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_host))]
+    pub hosts: Vec<Authority>,
+    /// Pages besides this machine's that may open a WebSocket, by origin, separated by commas
+    #[arg(long = "allow-origin", env = "ARM_SIM_ALLOW_ORIGIN")]
+    #[arg(value_name = "ORIGINS")]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
+    pub origins: Vec<Box<str>>,
+    /// Of pages, lets only this runtime's own and those of --allow-origin open a WebSocket; a token does that too
+    #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "SWITCH")]
+    #[arg(default_value = "false")]
+    #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(value_parser = ValueReader(read_switch))]
+    pub strict_origin: bool,
+    /// Folder of the report that is shown at /report/
+    #[arg(long, env = "ARM_SIM_REPORT", value_name = "FOLDER", default_value = DEFAULT_REPORT)]
+    pub report: PathBuf,
+}
+
+/// The program's command line.
+#[derive(Parser)]
+#[command(version = BUILD, about, after_help = AFTER_HELP, args_conflicts_with_subcommands = true)]
+struct CommandLine {
+    #[command(flatten)]
+    options: Options,
+    #[command(subcommand)]
+    command: Option<Parsed>,
+}
+
+/// The request of the command line: one of the commands, or to serve.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Parsed {
-    /// To serve clients, with these options.
-    Serve(Options),
-    /// To plan method and timestep for an allowed error.
+    /// Serves clients, with these options.
+    #[command(skip)]
+    Serve(Box<Options>),
+    /// Shows this text on standard output, and no more.
+    #[command(skip)]
+    Show(String),
+    /// Find the cheapest method and timestep for an allowed error, and run them against the truth
     Plan(PlanOptions),
-    /// To replay a record.
-    #[cfg(feature = "record")]
-    Replay(ReplayOptions),
-    /// To ask a running one.
-    #[cfg(feature = "cli")]
-    Ask(Asked),
-    /// To write the pages of the manual into this folder.
-    #[cfg(feature = "cli")]
-    WriteManual(PathBuf),
-    /// To make the study's report.
+    /// Measure error against run time and stability, and write a page about it
     #[cfg(feature = "report")]
     Report(ReportOptions),
-    /// To show this text on standard output, and no more: the help or the version.
-    Show(String),
+    /// Take a recorded run's steps again and say where they differ from the record
+    #[cfg(feature = "record")]
+    #[command(after_help = "Exit status: 0 if every state is the same bit for bit, 1 if not.")]
+    Replay {
+        /// A record that --record or /recorder/start has made
+        file: PathBuf,
+    },
+    /// Asks a running one.
+    #[cfg(feature = "cli")]
+    #[command(flatten)]
+    Ask(CommandSubject),
+    /// Print the completions of a shell
+    #[cfg(feature = "cli")]
+    #[command(after_help = "\
+Examples:
+  source <(pendularm completions bash)
+  pendularm completions fish > ~/.config/fish/completions/pendularm.fish")]
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+}
+
+/// Why the command line or the environment was refused, on one line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UsageError(String);
+
+/// The first paragraph of the report, on one line; behind it are the usage and hints.
+impl From<clap::Error> for UsageError {
+    fn from(error: clap::Error) -> Self {
+        let report = error.to_string();
+        let first = report.split("\n\n").next().unwrap_or_default();
+        let first = first.strip_prefix("error: ").unwrap_or(first);
+        let words: Vec<&str> = first.split_whitespace().collect();
+        let hint = match error.kind() {
+            ErrorKind::ValueValidation | ErrorKind::InvalidValue => "",
+            _ => "; --help shows what there is",
+        };
+        Self(shortened(&(words.join(" ") + hint), MAX_REFUSAL))
+    }
 }
 
 impl Options {
@@ -202,156 +212,74 @@ impl Options {
     ///
     /// # Errors
     /// [`UsageError`] for the first argument, option or variable that is not as it should be.
-    pub fn parse<I, T, E>(arguments: I, environment: E) -> Result<Parsed, UsageError>
+    pub fn parse<I, T>(arguments: I) -> Result<Parsed, UsageError>
     where
         I: IntoIterator<Item = T>,
-        T: Into<OsString> + Clone,
-        E: Fn(&str) -> Option<OsString>,
+        T: Into<OsString>,
     {
-        let matches = match command_line().try_get_matches_from(arguments) {
-            Ok(matches) => matches,
-            Err(error) => return explained(&error).map(Parsed::Show),
-        };
-        if let Some((name, subcommand)) = matches.subcommand() {
-            // An option of serving means nothing to a subcommand.
-            if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
-                return Err(UsageError::UnknownArgument {
-                    argument: format!("--{}", stray.option),
-                });
+        let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+        let begins = |word: &OsString, with: &[char]| word.to_string_lossy().starts_with(with);
+        let is_command = |word: &&OsString| !begins(word, &['-']) && *word != "help";
+        let serves = words.get(1).filter(is_command).is_none();
+        let matches = prepared(CommandLine::command(), serves).try_get_matches_from(&words);
+        match matches.and_then(|matches| CommandLine::from_arg_matches(&matches)) {
+            Ok(CommandLine { options, command }) => match command {
+                None => options.checked().map(Box::new).map(Parsed::Serve),
+                Some(Parsed::Plan(plan)) => plan.checked().map(Parsed::Plan),
+                Some(command) => Ok(command),
             }
-            return match name {
-                #[cfg(feature = "report")]
-                report::NAME => Ok(Parsed::Report(report::read(subcommand))),
-                #[cfg(feature = "record")]
-                record::REPLAY => Self::of_replay(subcommand, environment),
-                plan::NAME => plan::read(subcommand).map(Parsed::Plan),
-                #[cfg(feature = "cli")]
-                command::COMPLETIONS => {
-                    let script = command::complete(command::shell(subcommand), command_line());
-                    Ok(Parsed::Show(script))
-                }
-                #[cfg(feature = "cli")]
-                command::MAN => Ok(Parsed::WriteManual(command::folder(subcommand))),
-                #[cfg(feature = "cli")]
-                subject => {
-                    let leaf = subcommand.subcommand().map_or(subcommand, |(_, leaf)| leaf);
-                    let token = setting::given(&TOKEN, leaf, &environment);
-                    let token = token.map(read_token).transpose()?;
-                    Ok(Parsed::Ask(Asked::new(subject, subcommand, token)))
-                }
-                #[cfg(not(feature = "cli"))]
-                _ => Err(UsageError::UnknownArgument {
-                    argument: name.to_owned(),
-                }),
-            };
-        }
-        let given = |setting: &LaunchOption| given(setting, &matches, &environment);
-        Self::read(given).map(Parsed::Serve)
-    }
-
-    /// A record to be replayed, or to be served in the arm's place.
-    #[cfg(feature = "record")]
-    fn of_replay(
-        matches: &ArgMatches,
-        environment: impl Fn(&str) -> Option<OsString>,
-    ) -> Result<Parsed, UsageError> {
-        let replay = record::read(matches);
-        let mut of_serving = SETTINGS.iter().filter(|one| record::is_of_replay(one));
-        if matches.get_flag(record::SERVE) {
-            let given = |setting: &LaunchOption| {
-                let is_ours = record::is_of_replay(setting);
-                is_ours.then(|| given(setting, matches, &environment))?
-            };
-            let mut options = Self::read(given)?;
-            options.record.replay = Some(replay.file);
-            return Ok(Parsed::Serve(options));
-        }
-        match of_serving.find(|one| matches.contains_id(one.option)) {
-            Some(stray) => Err(UsageError::UnknownArgument {
-                argument: format!("--{} without --{}", stray.option, record::SERVE),
-            }),
-            None => Ok(Parsed::Replay(replay)),
+            .map_err(UsageError),
+            #[cfg(feature = "cli")]
+            Err(error)
+                if error.kind() == ErrorKind::UnknownArgument
+                    && words.iter().any(|word| begins(word, &['{', '['])) =>
+            {
+                Err(UsageError(UNQUOTED.to_owned()))
+            }
+            Err(error) if error.use_stderr() => Err(error.into()),
+            Err(shown) => Ok(Parsed::Show(shown.to_string())),
         }
     }
 
-    fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
-        let token = given(&TOKEN).map(read_token).transpose()?;
-        let bind = given(&BIND)
-            .map(|bind| read_bind(bind, token.is_some()))
-            .transpose()?
-            .unwrap_or(DEFAULT_BIND);
-        Ok(Self {
-            links: given(&LINKS)
-                .map(read_links)
-                .transpose()?
-                .unwrap_or_default(),
-            bind,
-            is_default_bind: bind == DEFAULT_BIND,
-            seed: given(&SEED).map(read_seed).transpose()?,
-            log: given(&log::LOG)
-                .map(log::read_level)
-                .transpose()?
-                .unwrap_or(LevelFilter::INFO),
-            log_format: given(&log::LOG_FORMAT)
-                .map(log::read_format)
-                .transpose()?
-                .unwrap_or_default(),
-            token,
-            #[cfg(feature = "record")]
-            record: RecordOptions::read(&given),
-            #[cfg(feature = "web")]
-            web: WebOptions::read(&given)?,
-        })
+    fn checked(self) -> Result<Self, String> {
+        let bind = self.bind;
+        if bind.ip().is_loopback() || self.token.is_some() {
+            return Ok(self);
+        }
+        Err(format!(
+            "--bind (ARM_SIM_BIND) must be a loopback address, such as {DEFAULT_BIND}, unless --token gives something \
+             to ask for, got \"{bind}\""
+        ))
     }
 }
 
-/// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
+/// The completions of all commands and options.
+#[cfg(feature = "cli")]
 #[must_use]
-pub fn command_line() -> Command {
-    let command = Command::new(env!("CARGO_PKG_NAME"))
-        .version(BUILD)
-        .about(env!("CARGO_PKG_DESCRIPTION"))
-        .after_help(format!("{TRANSPORTS}\n{AFTER_HELP}"))
-        .args(arguments(|_| true))
-        .disable_help_subcommand(true)
-        .subcommand(plan::command());
-    #[cfg(feature = "report")]
-    let command = command.subcommand(report::command());
-    #[cfg(feature = "record")]
-    let command = command.subcommand(record::command(arguments(record::is_of_replay)));
-    #[cfg(feature = "cli")]
-    let command = command
-        .subcommands(command::subjects())
-        .subcommands(command::tools());
-    command
+pub fn completions(shell: Shell) -> String {
+    let mut script = Vec::new();
+    let name = env!("CARGO_PKG_NAME");
+    clap_complete::generate(shell, &mut CommandLine::command(), name, &mut script);
+    String::from_utf8_lossy(&script).into_owned()
 }
 
-/// The options of serving as `clap` is to read them, as far as they are `chosen`.
-fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
-    let chosen = SETTINGS.iter().filter(move |setting| chosen(setting));
-    chosen.map(|setting| {
-        let LaunchOption {
-            option,
-            variable,
-            value,
-            about,
-            default,
-            is_switch,
-        } = **setting;
-        let arg = Arg::new(option)
-            .long(option)
-            .value_name(value)
-            .value_parser(OsStringValueParser::new())
-            .allow_negative_numbers(true)
-            .help(StyledStr::from(format!(
-                "{about} [env: {variable}] [default: {default}]"
-            )));
-        if is_switch {
-            arg.num_args(0..=1)
-                .require_equals(true)
-                .default_missing_value("true")
-        } else {
-            arg
+/// The command line with the rules for all options: numbers may be negative, and an empty variable is none. The
+/// variables of the program's own options are read only if it `serves`.
+fn prepared(command: Command, serves: bool) -> Command {
+    let command = command.mut_args(|arg| {
+        let is_empty = |variable| env::var_os(variable).is_some_and(|value| value.is_empty());
+        let ignores_variable = !serves || arg.get_env().is_some_and(is_empty);
+        let is_option = arg.get_long().is_some() && arg.get_action().takes_values();
+        let may_be_negative = is_option || arg.is_allow_negative_numbers_set();
+        let arg = arg
+            .hide_env_values(true)
+            .allow_negative_numbers(may_be_negative);
+        match ignores_variable {
+            true => arg.env(Resettable::Reset),
+            false => arg,
         }
-    })
+    });
+    // A subject without a verb is refused on one line, as everything else.
+    let command = command.arg_required_else_help(false);
+    command.mut_subcommands(|subcommand| prepared(subcommand, true))
 }

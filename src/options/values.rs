@@ -1,40 +1,89 @@
 //! The values of the options, each read from its text.
 //!
-//! **Invariant:** a value that is refused is named with the option or variable that it came from.
+//! **Invariant:** a refusal says what is needed and shows the value, unless it is a secret.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 
-use super::links::Links;
-use super::setting::Given;
-use super::usage::UsageError;
+use tracing::level_filters::LevelFilter;
+
+use crate::address;
+use crate::logging::LogFormat;
+use crate::protocol::limits::MAX_CLIENTS;
 use crate::protocol::op::token::Token;
+use crate::value::{needed, within};
+#[cfg(feature = "web")]
+use crate::web::authority::Authority;
 
-pub(super) fn read_links(Given { origin, value }: Given) -> Result<Links, UsageError> {
-    match value.as_str() {
-        "2" => Ok(Links::Two),
-        "3" => Ok(Links::Three),
-        _ => Err(UsageError::Links { origin, value }),
-    }
+pub(super) fn read_bind(text: &str) -> Result<SocketAddr, String> {
+    let address = address::read(text).and_then(|text| match text.strip_prefix("localhost:") {
+        Some(port) => Some(SocketAddr::from((Ipv4Addr::LOCALHOST, port.parse().ok()?))),
+        None => text.parse().ok(),
+    });
+    let needs = "localhost or an IP address, a port, or both, such as 127.0.0.1:9095 or [::1]:9095";
+    needed(address, needs, text)
 }
 
-pub(super) fn read_token(Given { origin, value }: Given) -> Result<Token, UsageError> {
-    Token::new(&value).map_err(|why| UsageError::Token { origin, why })
+pub(super) fn read_clients(text: &str) -> Result<usize, String> {
+    within(&(1..=MAX_CLIENTS), "a whole number", text)
 }
 
-/// With a token to ask for, any address will do.
-pub(super) fn read_bind(
-    Given { origin, value }: Given,
-    has_token: bool,
-) -> Result<SocketAddr, UsageError> {
-    match value.parse::<SocketAddr>() {
-        Ok(address) if address.ip().is_loopback() || has_token => Ok(address),
-        Ok(_) => Err(UsageError::NotLoopback { origin, value }),
-        Err(_) => Err(UsageError::Bind { origin, value }),
-    }
+pub(super) fn read_period(text: &str) -> Result<f64, String> {
+    let period = text.parse().ok();
+    let period = period.filter(|period: &f64| period.is_finite() && *period >= 0.0);
+    needed(period, "a time in seconds, at least 0", text)
 }
 
-pub(super) fn read_seed(Given { origin, value }: Given) -> Result<u64, UsageError> {
-    value
-        .parse()
-        .map_err(|_| UsageError::Seed { origin, value })
+pub(super) fn read_seed(text: &str) -> Result<u64, String> {
+    within(&(0..=u64::MAX), "a whole number", text)
+}
+
+pub(super) fn read_level(text: &str) -> Result<LevelFilter, String> {
+    let is_name = ["off", "error", "warn", "info", "debug", "trace"].contains(&text);
+    let level = text.parse().ok().filter(|_| is_name);
+    needed(level, "off, error, warn, info, debug or trace", text)
+}
+
+pub(super) fn read_log_format(text: &str) -> Result<LogFormat, String> {
+    let format = match text {
+        "text" => Some(LogFormat::Text),
+        "json" => Some(LogFormat::Json),
+        _ => None,
+    };
+    needed(format, "text or json", text)
+}
+
+/// A token is a secret, so a refusal does not show it.
+pub(super) fn read_token(text: &str) -> Result<Token, String> {
+    Token::new(text).map_err(|why| why.to_string())
+}
+
+#[cfg(feature = "web")]
+pub(super) fn read_host(text: &str) -> Result<Authority, String> {
+    let needs = "hosts, with or without a port, separated by commas";
+    needed(Authority::parse(text.trim()), needs, text)
+}
+
+#[cfg(feature = "web")]
+pub(super) fn read_origin(text: &str) -> Result<Box<str>, String> {
+    let origin = text.trim().to_ascii_lowercase();
+    let in_scheme = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'-' | b'.');
+    let is_origin = match origin.split_once("://") {
+        Some(("file", "")) => true,
+        Some((scheme, host)) => {
+            !scheme.is_empty() && scheme.bytes().all(in_scheme) && Authority::parse(host).is_some()
+        }
+        None => origin == "null",
+    };
+    let needs = "origins as browsers write them, such as https://example.org, null or file://, separated by commas";
+    needed(is_origin.then(|| origin.into()), needs, text)
+}
+
+#[cfg(feature = "web")]
+pub(super) fn read_switch(text: &str) -> Result<bool, String> {
+    let switch = match text {
+        "true" | "1" | "yes" | "on" => Some(true),
+        "false" | "0" | "no" | "off" => Some(false),
+        _ => None,
+    };
+    needed(switch, "true or false", text)
 }

@@ -4,8 +4,16 @@
 
 /// Longest frame, in bytes without the newline: a 3-link trajectory has under 1 KiB, an expression of 1 MB has to pass.
 pub const MAX_FRAME: usize = 4 * 1024 * 1024;
+/// The longest frame or answer that is short: what is longer takes room that all clients share.
+pub const SHORT: usize = 64 * 1024;
+/// The longest topic message that takes none of that room while it waits for its subscribers.
+pub const MODEST_MESSAGE: usize = 256 * 1024;
 /// Deepest nesting of objects and arrays, the frame itself included: ROS messages need fewer than ten levels.
 pub const MAX_NESTING: usize = 128;
 /// Longest topic or service name, and id of a subscription or a goal, in bytes: they are kept, and the id of a goal
 /// comes back 60 times a second.
 pub const MAX_NAME: usize = 1024;
+/// Clients that are served at once, unless an option gives another number. Fewer where fewer files may be open.
+pub const DEFAULT_CLIENTS: usize = 256;
+/// The largest number of clients that the option takes.
+pub const MAX_CLIENTS: usize = 4096;

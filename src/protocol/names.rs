@@ -20,6 +20,12 @@ pub fn absolute(name: &str) -> Cow<'_, str> {
     }
 }
 
+/// Whether two names mean one topic, service or action.
+#[must_use]
+pub fn are_same(one: &str, other: &str) -> bool {
+    absolute(one) == absolute(other)
+}
+
 /// The name without its leading slash, as some clients spell it. It stays as it is if it would else name another thing.
 #[must_use]
 pub fn relative(name: &str) -> &str {

@@ -6,12 +6,15 @@
 use std::fmt;
 use std::io::Read;
 
-use serde_json::Value;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::journal::{Note, NoteError, links, read_note};
 use super::reader::{Passage, ReadError, RecordEnding, Recording};
 use super::schema::{INPUTS, STATES};
+use super::writer::VERSION;
 use crate::math::simulation::Simulation;
+use crate::protocol::wire::text::excerpt;
 
 /// Steps between two messages of a record, at most: a tick has a tenth of that on the fastest machine, so that a record
 /// whose file was slow for a while is not refused.
@@ -21,8 +24,11 @@ const SHORTEST_STEP: u64 = 10;
 /// Steps for which a record needs no time, so that a coarse clock does no harm.
 pub const AT_ONCE: u64 = 100_000;
 
+/// Longest version that is told, in characters.
+const MAX_VERSION: usize = 64;
+
 /// The outcome of a replay.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReplayVerdict {
     /// How many links the arm has.
     pub links: usize,
@@ -40,6 +46,8 @@ pub struct ReplayVerdict {
     pub difference: Option<Difference>,
     /// How the file ended, if it was read to its end.
     pub ending: Option<RecordEnding>,
+    /// The version that wrote the record, if it is not this one.
+    pub other_version: Option<String>,
 }
 
 /// The first place at which the steps differ from the record.
@@ -68,18 +76,22 @@ pub enum ReplayError {
         why: NoteError,
     },
     /// A message that lacks a field.
-    #[error("{0}: a message is not as this version writes it")]
+    #[error("{}: a message is not as this version writes it", excerpt(.0))]
     Shape(
         /// The channel's topic.
         String,
     ),
+    /// The file ends before a state of the arm.
+    #[error("the record was cut before its first state")]
+    Cut,
     /// There is no input, or no state behind one.
     #[error("nothing to compare: it has no states of an arm")]
-    Empty,
+    NoStates,
     /// More steps than the arm can have taken.
     #[error(
-        "{topic}, message {sequence}: step {step} is {due} steps after the one before, \
-         and no arm takes more than {most} there"
+        "{}, message {sequence}: step {step} is {due} steps after the one before, \
+         and no arm takes more than {most} there",
+        excerpt(topic)
     )]
     Leap {
         /// The channel's topic.
@@ -105,13 +117,8 @@ pub enum ReplayError {
 
 impl fmt::Display for ReplayVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            links,
-            steps,
-            states,
-            inputs,
-            ..
-        } = self;
+        let (links, steps) = (self.links, self.steps);
+        let (inputs, states) = (self.inputs, self.states);
         write!(
             f,
             "{links} links, {steps} steps, {inputs} inputs, {states} states"
@@ -127,14 +134,17 @@ impl fmt::Display for ReplayVerdict {
             }
         }
         if self.losses > 0 {
-            write!(
-                f,
-                "; {} gaps, which nothing is known of, were left out",
-                self.losses
-            )?;
+            let gaps = self.losses;
+            write!(f, "; {gaps} gaps in the record were left out")?;
         }
         if self.ending == Some(RecordEnding::Cut) {
             write!(f, "; the file ends early, and was read up to there")?;
+        }
+        if let Some(version) = &self.other_version {
+            write!(
+                f,
+                "; note: recorded by version {version:?}, and this is {VERSION:?}"
+            )?;
         }
         Ok(())
     }
@@ -147,27 +157,27 @@ impl fmt::Display for ReplayVerdict {
 pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
     let first = first_input(&mut recording)?;
-    match links(text(&first, "input")?) {
+    match links(&fields::<InputMessage>(&first)?.input) {
         Some(2) => play::<2>(recording, first),
         Some(3) => play::<3>(recording, first),
-        _ => Err(ReplayError::Empty),
+        _ => Err(ReplayError::NoStates),
     }
 }
 
-/// How many links the recorded arm has.
-///
-/// # Errors
-/// If the file can't be read, or holds no arm.
-pub fn recorded_links(file: impl Read) -> Result<usize, ReplayError> {
-    let first = first_input(&mut Recording::new(file))?;
-    links(text(&first, "input")?).ok_or(ReplayError::Empty)
+/// Why there is no state in a record that ends so.
+fn no_states(ending: Option<RecordEnding>) -> ReplayError {
+    match ending {
+        Some(RecordEnding::Cut) => ReplayError::Cut,
+        _ => ReplayError::NoStates,
+    }
 }
 
 fn first_input(recording: &mut Recording<impl Read>) -> Result<Passage, ReplayError> {
     loop {
-        let passage = recording.next_passage()?.ok_or(ReplayError::Empty)?;
-        if passage.topic == INPUTS {
-            return Ok(passage);
+        match recording.next_passage()? {
+            Some(passage) if passage.topic == INPUTS => return Ok(passage),
+            Some(_) => {}
+            None => return Err(no_states(recording.ending())),
         }
     }
 }
@@ -182,13 +192,11 @@ fn play<const N: usize>(
         taken: 0,
         verdict: ReplayVerdict {
             links: N,
-            steps: 0,
-            states: 0,
-            inputs: 0,
-            losses: 0,
-            agreed_to: 0,
-            difference: None,
-            ending: None,
+            other_version: recording
+                .version()
+                .filter(|version| *version != VERSION)
+                .map(|version| version.chars().take(MAX_VERSION).collect()),
+            ..ReplayVerdict::default()
         },
     };
     let mut next = Some(first);
@@ -201,7 +209,7 @@ fn play<const N: usize>(
     }
     run.verdict.ending = recording.ending();
     if run.verdict.states == 0 {
-        return Err(ReplayError::Empty);
+        return Err(no_states(run.verdict.ending));
     }
     Ok(run.verdict)
 }
@@ -226,9 +234,8 @@ impl<const N: usize> Replay<N> {
     }
 
     fn input(&mut self, passage: &Passage) -> Result<(), ReplayError> {
-        let step = number(passage, "step")?;
-        let note = read_note(text(passage, "input")?);
-        let note = note.map_err(|why| ReplayError::Input { step, why })?;
+        let InputMessage { step, input } = fields(passage)?;
+        let note = read_note(&input).map_err(|why| ReplayError::Input { step, why })?;
         if let Note::Begin(checkpoint) = note {
             self.verdict.losses += u64::from(self.arm.is_some());
             self.verdict.agreed_to = step;
@@ -247,10 +254,7 @@ impl<const N: usize> Replay<N> {
         match note {
             Note::Input(input) => simulation.apply(input),
             Note::Diverged if simulation.step() => {
-                self.differs(
-                    step,
-                    "the step from here on was not finite, and is".to_owned(),
-                );
+                self.differs(step, "the step from here on was not finite, and is");
             }
             Note::Diverged | Note::Begin(_) => {}
         }
@@ -258,7 +262,8 @@ impl<const N: usize> Replay<N> {
     }
 
     fn state(&mut self, passage: &Passage) -> Result<(), ReplayError> {
-        let step = number(passage, "step")?;
+        let recorded: StateMessage = fields(passage)?;
+        let step = recorded.step;
         if !self.advance(step, passage)? {
             return Ok(());
         }
@@ -266,28 +271,28 @@ impl<const N: usize> Replay<N> {
             return Ok(());
         };
         let state = simulation.state();
-        let ours = [
-            ("position", &state.position),
-            ("velocity", &state.velocity),
-            ("effort", simulation.effort()),
-        ];
         let mut unlike = Vec::new();
-        for (name, ours) in ours {
-            let recorded = numbers(passage, name)?;
+        for (name, recorded, ours) in [
+            ("position", &recorded.position, &state.position),
+            ("velocity", &recorded.velocity, &state.velocity),
+            ("effort", &recorded.effort, simulation.effort()),
+        ] {
+            if recorded.len() != N {
+                return Err(ReplayError::Shape(passage.topic.clone()));
+            }
             for (joint, (recorded, ours)) in recorded.iter().zip(ours).enumerate() {
+                // A number that is not finite is `null`.
+                let recorded = recorded.unwrap_or(f64::NAN);
                 if recorded.to_bits() != ours.to_bits() {
                     unlike.push(format!("{name}[{joint}] was {recorded:?} and is {ours:?}"));
                 }
-            }
-            if recorded.len() != N {
-                return Err(shape(passage));
             }
         }
         self.verdict.states += 1;
         if unlike.is_empty() {
             self.verdict.agreed_to = step;
         } else {
-            self.differs(step, unlike.join(", "));
+            self.differs(step, &unlike.join(", "));
         }
         Ok(())
     }
@@ -317,49 +322,38 @@ impl<const N: usize> Replay<N> {
         self.verdict.steps += taken;
         if taken < due {
             let at = *at;
-            self.differs(
-                at,
-                "the step from here on was finite, and is not".to_owned(),
-            );
+            self.differs(at, "the step from here on was finite, and is not");
             return Ok(false);
         }
         Ok(true)
     }
 
-    fn differs(&mut self, step: u64, what: String) {
+    fn differs(&mut self, step: u64, what: &str) {
+        let what = what.to_owned();
         let time = self.arm.as_ref().map_or(f64::NAN, |(arm, _)| arm.time());
         self.verdict.difference = Some(Difference { step, time, what });
     }
 }
 
-fn shape(passage: &Passage) -> ReplayError {
-    ReplayError::Shape(passage.topic.clone())
+/// The fields of a message on the channel of inputs, and of one on that of states.
+#[derive(Deserialize)]
+struct InputMessage {
+    step: u64,
+    input: String,
 }
 
-fn member<'a>(passage: &'a Passage, name: &str) -> Result<&'a Value, ReplayError> {
-    let msg = passage.msg.as_ref();
-    msg.and_then(|msg| msg.get(name))
-        .ok_or_else(|| shape(passage))
+#[derive(Deserialize)]
+struct StateMessage {
+    step: u64,
+    position: Vec<Option<f64>>,
+    velocity: Vec<Option<f64>>,
+    effort: Vec<Option<f64>>,
 }
 
-fn text<'a>(passage: &'a Passage, name: &str) -> Result<&'a str, ReplayError> {
-    member(passage, name)?
-        .as_str()
-        .ok_or_else(|| shape(passage))
-}
-
-fn number(passage: &Passage, name: &str) -> Result<u64, ReplayError> {
-    member(passage, name)?
-        .as_u64()
-        .ok_or_else(|| shape(passage))
-}
-
-fn numbers(passage: &Passage, name: &str) -> Result<Vec<f64>, ReplayError> {
-    let values = member(passage, name)?.as_array();
-    let values = values.ok_or_else(|| shape(passage))?;
-    // A number that is not finite is `null`.
-    Ok(values
-        .iter()
-        .map(|one| one.as_f64().unwrap_or(f64::NAN))
-        .collect())
+fn fields<T: DeserializeOwned>(passage: &Passage) -> Result<T, ReplayError> {
+    let fields = passage
+        .msg
+        .as_ref()
+        .and_then(|msg| T::deserialize(msg).ok());
+    fields.ok_or_else(|| ReplayError::Shape(passage.topic.clone()))
 }

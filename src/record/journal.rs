@@ -8,7 +8,11 @@ use serde::{Deserialize, Serialize};
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{ArmInput, Checkpoint};
+use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held};
+use crate::protocol::wire::text::{excerpt, shortened};
+
+/// Longest words of the parser's about a text \[characters\]: it repeats names of the file.
+const MAX_WORDS: usize = 200;
 
 /// Something on which the arm's steps depend.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,29 +29,17 @@ pub enum Note<const N: usize> {
 #[derive(Debug, thiserror::Error)]
 pub enum NoteError {
     /// Another text.
-    #[error("not an input: {0}")]
+    #[error("not an input: {}", shortened(&.0.to_string(), MAX_WORDS))]
     Text(#[from] serde_json::Error),
-    /// A field does not have one number per joint.
-    #[error("{0} must have one number per joint")]
-    Count(
-        /// The field.
-        &'static str,
-    ),
+    /// A field, and the rule for it.
+    #[error("{0} must {1}")]
+    Field(&'static str, &'static str),
     /// No method of that name.
-    #[error("no method {0:?}")]
+    #[error("no method {:?}", excerpt(.0))]
     Method(
         /// The name.
         String,
     ),
-    /// A count that no run can reach.
-    #[error("{0} must be at most 2^53")]
-    Steps(
-        /// The field.
-        &'static str,
-    ),
-    /// The timestep is none.
-    #[error("the timestep must be greater than 0")]
-    Timestep,
     /// There can't be such an arm.
     #[error(transparent)]
     Arm(#[from] ArmError),
@@ -64,6 +56,10 @@ enum Written {
     Enable(bool),
     Setpoint(WrittenState),
     Disturb { effort: Vec<f64>, duration: f64 },
+    Period(WrittenPeriod),
+    State(WrittenState),
+    Command(Vec<f64>),
+    Drive(Option<Vec<f64>>),
     Reset,
     Diverged,
 }
@@ -88,6 +84,22 @@ struct WrittenState {
     velocity: Vec<f64>,
 }
 
+#[derive(Serialize, Deserialize, Clone, Copy)]
+struct WrittenPeriod {
+    period: f64,
+    delay: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenHeld {
+    period: WrittenPeriod,
+    due: u64,
+    effort: Vec<f64>,
+    computed: Vec<f64>,
+    command: Vec<f64>,
+    driven: Option<Vec<f64>>,
+}
+
 #[derive(Serialize, Deserialize)]
 struct WrittenCheckpoint {
     links: usize,
@@ -96,6 +108,8 @@ struct WrittenCheckpoint {
     setpoint: WrittenState,
     integral: Vec<f64>,
     enabled: bool,
+    #[serde(default)]
+    held: Option<WrittenHeld>,
     method: String,
     timestep: f64,
     state: WrittenState,
@@ -120,14 +134,15 @@ pub fn write_note<const N: usize>(note: &Note<N>) -> String {
             ArmInput::Arm(arm) => Written::Params(arm.into()),
             ArmInput::Gains(gains) => Written::Gains(gains.into()),
             ArmInput::Enabled(on) => Written::Enable(*on),
-            ArmInput::Setpoint(setpoint) => Written::Setpoint(WrittenState {
-                position: setpoint.position.to_vec(),
-                velocity: setpoint.velocity.to_vec(),
-            }),
+            ArmInput::Setpoint(setpoint) => Written::Setpoint(setpoint.into()),
             ArmInput::Disturbance { effort, duration } => Written::Disturb {
                 effort: effort.to_vec(),
                 duration: *duration,
             },
+            ArmInput::Period(period) => Written::Period((*period).into()),
+            ArmInput::State(state) => Written::State(state.into()),
+            ArmInput::Command(effort) => Written::Command(effort.to_vec()),
+            ArmInput::Drive(effort) => Written::Drive(effort.map(|effort| effort.to_vec())),
             ArmInput::Reset => Written::Reset,
         },
     };
@@ -161,13 +176,20 @@ pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
             effort: array("effort", &effort)?,
             duration,
         },
+        Written::Period(period) => ArmInput::Period(period.read()?),
+        Written::State(state) => ArmInput::State(state.state()?),
+        Written::Command(effort) => ArmInput::Command(array("command", &effort)?),
+        Written::Drive(effort) => {
+            ArmInput::Drive(effort.map(|one| array("drive", &one)).transpose()?)
+        }
         Written::Reset => ArmInput::Reset,
     };
     Ok(Note::Input(input))
 }
 
 fn array<const N: usize>(field: &'static str, values: &[f64]) -> Result<[f64; N], NoteError> {
-    values.try_into().map_err(|_| NoteError::Count(field))
+    let why = NoteError::Field(field, "have one number per joint");
+    values.try_into().map_err(|_| why)
 }
 
 fn method(name: String) -> Result<Method, NoteError> {
@@ -178,23 +200,65 @@ fn method(name: String) -> Result<Method, NoteError> {
 /// A number of steps: exact as a `float64`, which a run at any speed stays below for years.
 fn counted(field: &'static str, steps: u64) -> Result<u64, NoteError> {
     const MOST: u64 = 1 << 53;
-    let valid = steps <= MOST;
-    valid.then_some(steps).ok_or(NoteError::Steps(field))
+    let why = NoteError::Field(field, "be at most 2^53");
+    (steps <= MOST).then_some(steps).ok_or(why)
 }
 
 fn checked(timestep: f64) -> Result<f64, NoteError> {
     let valid = timestep.is_finite() && timestep > 0.0;
-    valid.then_some(timestep).ok_or(NoteError::Timestep)
+    let why = NoteError::Field("the timestep", "be greater than 0");
+    valid.then_some(timestep).ok_or(why)
+}
+
+impl From<ControlPeriod> for WrittenPeriod {
+    fn from(ControlPeriod { period, delay }: ControlPeriod) -> Self {
+        Self { period, delay }
+    }
+}
+
+impl WrittenPeriod {
+    fn read(self) -> Result<ControlPeriod, NoteError> {
+        let Self { period, delay } = self;
+        let valid = period.is_finite() && period >= 0.0;
+        let why = NoteError::Field("the control period", "not be negative");
+        valid.then_some(ControlPeriod { period, delay }).ok_or(why)
+    }
+}
+
+impl<const N: usize> From<&Held<N>> for WrittenHeld {
+    fn from(held: &Held<N>) -> Self {
+        Self {
+            period: held.period.into(),
+            due: held.due,
+            effort: held.effort.to_vec(),
+            computed: held.computed.to_vec(),
+            command: held.command.to_vec(),
+            driven: held.driven.map(|effort| effort.to_vec()),
+        }
+    }
+}
+
+impl WrittenHeld {
+    fn read<const N: usize>(&self) -> Result<Held<N>, NoteError> {
+        let driven = self.driven.as_ref().map(|one| array("driven", one));
+        Ok(Held {
+            period: self.period.read()?,
+            due: counted("due", self.due)?,
+            effort: array("effort", &self.effort)?,
+            computed: array("computed", &self.computed)?,
+            command: array("command", &self.command)?,
+            driven: driven.transpose()?,
+        })
+    }
 }
 
 impl WrittenArm {
     fn read<const N: usize>(&self) -> Result<Arm<N>, NoteError> {
-        let lengths = array("lengths", &self.lengths)?;
-        Ok(Arm::new(
-            lengths,
+        let (lengths, masses) = (
+            array("lengths", &self.lengths)?,
             array("masses", &self.masses)?,
-            self.gravity,
-        )?)
+        );
+        Ok(Arm::new(lengths, masses, self.gravity)?)
     }
 }
 
@@ -242,6 +306,13 @@ impl WrittenState {
     }
 }
 
+impl<const N: usize> From<&Setpoint<N>> for WrittenState {
+    fn from(Setpoint { position, velocity }: &Setpoint<N>) -> Self {
+        let (position, velocity) = (position.to_vec(), velocity.to_vec());
+        Self { position, velocity }
+    }
+}
+
 impl<const N: usize> From<&State<N>> for WrittenState {
     fn from(state: &State<N>) -> Self {
         Self {
@@ -258,12 +329,10 @@ impl<const N: usize> From<&Checkpoint<N>> for WrittenCheckpoint {
             links: N,
             params: (&from.arm).into(),
             gains: (&from.gains).into(),
-            setpoint: WrittenState {
-                position: from.setpoint.position.to_vec(),
-                velocity: from.setpoint.velocity.to_vec(),
-            },
+            setpoint: (&from.setpoint).into(),
             integral: from.integral.to_vec(),
             enabled: from.enabled,
+            held: Some((&from.held).into()),
             method: from.method.name().to_owned(),
             timestep: from.timestep,
             state: (&from.state).into(),
@@ -284,12 +353,17 @@ impl WrittenCheckpoint {
             Some((effort, ends)) => Some((array("disturbance", effort)?, *ends)),
             None => None,
         };
+        let held = match &self.held {
+            Some(held) => held.read()?,
+            None => Held::default(),
+        };
         Ok(Checkpoint {
             arm: self.params.read()?,
             gains: self.gains.read()?,
             setpoint: self.setpoint.setpoint()?,
             integral: array("integral", &self.integral)?,
             enabled: self.enabled,
+            held,
             method: method(self.method)?,
             timestep: checked(self.timestep)?,
             state: self.state.state()?,

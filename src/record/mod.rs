@@ -9,18 +9,14 @@
 mod comparison;
 mod journal;
 mod reader;
-mod reel;
 mod schema;
 mod writer;
 
 use bytes::Bytes;
 
-pub use self::comparison::{
-    AT_ONCE, Difference, MAX_LEAP, ReplayError, ReplayVerdict, recorded_links, replay,
-};
+pub use self::comparison::{AT_ONCE, Difference, MAX_LEAP, ReplayError, ReplayVerdict, replay};
 pub use self::journal::{Note, NoteError, links, read_note, write_note};
 pub use self::reader::{Passage, ReadError, RecordEnding, Recording};
-pub use self::reel::{Moment, Reel, ReelPlace};
 pub use self::schema::{CALLS, INPUTS, STATES};
 pub use self::writer::{CHUNK_BYTES, RecordError, RunSettings, Scribe};
 use crate::protocol::catalog::{Service, Topic};

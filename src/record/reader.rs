@@ -4,19 +4,26 @@
 //! recorded by another definition is left out.
 
 use std::collections::HashMap;
-use std::io::{self, Read};
+use std::io::{self, Chain, Cursor, Read};
 
-use mcap::McapError;
 use mcap::io::MessageReader;
+use mcap::records::{Record, op};
 use mcap::sans_io::LinearReaderOptions;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
+use mcap::{McapError, parse_record};
 use serde_json::Value;
 
 use super::schema::{CALL, INPUT, STATE};
+use super::writer::{FACTS, VERSION_KEY};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::cdr_reader::{self, CdrError};
+use crate::protocol::wire::text::{excerpt, shortened};
 
 /// Longest chunk that is read: longer ones are never written.
 pub(super) const MAX_CHUNK: usize = 16 * 1024 * 1024;
+
+/// Bytes at the beginning of a file, in which the version is looked for.
+const HEAD: usize = 4096;
 
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,10 +54,10 @@ pub enum ReadError {
     #[error(transparent)]
     File(io::Error),
     /// It is no MCAP file, or damaged.
-    #[error("not a record: {0}")]
+    #[error("not a record: {}", shortened(&.0.to_string(), 200))]
     Mcap(McapError),
     /// A message that its definition does not fit.
-    #[error("{topic}: {why}")]
+    #[error("{}: {why}", excerpt(topic))]
     Message {
         /// The channel's topic.
         topic: String,
@@ -70,7 +77,8 @@ impl From<McapError> for ReadError {
 
 /// A record that is being read.
 pub struct Recording<R> {
-    reader: MessageReader<R>,
+    reader: MessageReader<Chain<Cursor<Vec<u8>>, R>>,
+    version: Option<String>,
     /// The type of each schema id, if it is as we know it.
     known: HashMap<u16, Option<Type>>,
     ending: Option<RecordEnding>,
@@ -78,12 +86,16 @@ pub struct Recording<R> {
 
 impl<R: Read> Recording<R> {
     /// Begins to read.
-    pub fn new(file: R) -> Self {
+    pub fn new(mut file: R) -> Self {
+        let mut head = Vec::new();
+        // A file that cannot be read says so again at the first message.
+        let _ = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(MAX_CHUNK);
         Self {
-            reader: MessageReader::new_with_options(file, options),
+            version: version(&head),
+            reader: MessageReader::new_with_options(Cursor::new(head).chain(file), options),
             known: HashMap::new(),
             ending: None,
         }
@@ -127,10 +139,41 @@ impl<R: Read> Recording<R> {
         }))
     }
 
+    /// The version of the program that wrote the file, with its commit if that was known.
+    #[must_use]
+    pub fn version(&self) -> Option<&str> {
+        self.version.as_deref()
+    }
+
     /// How the file ended; none while it has not.
     #[must_use]
     pub fn ending(&self) -> Option<RecordEnding> {
         self.ending
+    }
+}
+
+/// The version in the metadata that a record begins with.
+fn version(mut head: &[u8]) -> Option<String> {
+    let options = LinearReaderOptions::default().with_record_length_limit(HEAD);
+    let mut reader = LinearReader::new_with_options(options);
+    loop {
+        match reader.next_event()?.ok()? {
+            LinearReadEvent::ReadRequest(need) => {
+                let read = head.read(reader.insert(need)).ok()?;
+                if read == 0 {
+                    return None;
+                }
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { data, opcode } if opcode == op::METADATA => {
+                if let Ok(Record::Metadata(facts)) = parse_record(opcode, data)
+                    && facts.name == FACTS
+                {
+                    return facts.metadata.get(VERSION_KEY).cloned();
+                }
+            }
+            LinearReadEvent::Record { .. } => {}
+        }
     }
 }
 

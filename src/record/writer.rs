@@ -17,10 +17,19 @@ use super::{Content, RecordEntry};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::ros::cdr;
+use crate::protocol::ros::rosapi::DISTRO;
 use crate::protocol::ros::tree::MessageTree;
 
 /// Length of a chunk, from which on it is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
+
+/// This program's version, with its commit if that is known.
+pub(super) const VERSION: &str = env!("PENDULARM_VERSION");
+/// The metadata record with facts about the run, and its member for the version.
+pub(super) const FACTS: &str = env!("CARGO_PKG_NAME");
+pub(super) const VERSION_KEY: &str = "version";
+/// Channel metadata in which rosbag2 looks for the quality of service.
+const QOS_KEY: &str = "offered_qos_profiles";
 
 /// Facts about the run besides its inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,21 +100,31 @@ impl<W: Write> Scribe<W> {
     pub fn new(file: W, settings: &RunSettings) -> Result<Self, RecordError> {
         let options = WriteOptions::new()
             .profile("ros2")
-            .library(concat!("pendularm ", env!("CARGO_PKG_VERSION")))
+            .library(format!("{FACTS} {VERSION}"))
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
             // A chunk is kept until it is whole, so that the file is always the beginning of a good one.
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let facts = [
-            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            (VERSION_KEY, VERSION.to_owned()),
             ("links", settings.links.to_string()),
             ("seed", settings.seed.to_string()),
         ];
-        writer.write_metadata(&Metadata {
-            name: env!("CARGO_PKG_NAME").to_owned(),
-            metadata: facts.map(|(key, value)| (key.to_owned(), value)).into(),
-        })?;
+        // Without metadata of its own rosbag2 reads the quality of service in such a record as newer than it is.
+        let of_rosbag2 = [
+            ("ROS_DISTRO", DISTRO.to_owned()),
+            ("serialized_metadata", String::new()),
+        ];
+        for (name, metadata) in [(FACTS, facts.to_vec()), ("rosbag2", of_rosbag2.to_vec())] {
+            let metadata = metadata.into_iter();
+            writer.write_metadata(&Metadata {
+                name: name.to_owned(),
+                metadata: metadata
+                    .map(|(key, value)| (key.to_owned(), value))
+                    .collect(),
+            })?;
+        }
         writer.flush()?;
         Ok(Self {
             writer,
@@ -228,9 +247,9 @@ impl<W: Write> Scribe<W> {
             let schema = self
                 .writer
                 .add_schema(one.name, "ros2msg", text.as_bytes())?;
-            let id = self
-                .writer
-                .add_channel(schema, topic, "cdr", &BTreeMap::new())?;
+            let is_latched = Topic::from_name(topic).is_some_and(Topic::is_latched);
+            let metadata = BTreeMap::from([(QOS_KEY.to_owned(), qos_profiles(is_latched))]);
+            let id = self.writer.add_channel(schema, topic, "cdr", &metadata)?;
             self.channels.insert(topic, Channel { id, sequence: 0 });
         }
         let Some(channel) = self.channels.get_mut(topic) else {
@@ -248,6 +267,18 @@ impl<W: Write> Scribe<W> {
         self.bytes += data.len() as u64;
         Ok(())
     }
+}
+
+/// The quality of service that the runtime offers on a topic, as rosbag2 writes it up to version 8 of its metadata. The
+/// numbers are those of `rmw`: keep last, reliable, transient local or volatile, automatic. The times are infinite.
+fn qos_profiles(is_latched: bool) -> String {
+    let (depth, durability) = if is_latched { (1, 1) } else { (10, 2) };
+    let infinite = "\n    sec: 9223372036\n    nsec: 854775807";
+    format!(
+        "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline:{infinite}\n  \
+         lifespan:{infinite}\n  liveliness: 1\n  liveliness_lease_duration:{infinite}\n  \
+         avoid_ros_namespace_conventions: false"
+    )
 }
 
 /// A call or an answer, as it is recorded.

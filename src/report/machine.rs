@@ -27,7 +27,7 @@ impl Machine {
         let facts = vec![
             fact(
                 "Version",
-                format!("pendularm {}", env!("CARGO_PKG_VERSION")),
+                format!("pendularm {}", env!("PENDULARM_VERSION")),
             ),
             fact("Commit", commit.clone()),
             fact("Build", build.to_owned()),

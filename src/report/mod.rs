@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use clap::builder::PossibleValuesParser;
 use figures::{Maker, SECTIONS};
 use machine::Machine;
 use making::Making;
@@ -32,14 +33,18 @@ use progress::ProgressBar;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
-/// The report to be made, and where.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Measure error against run time and stability, and write a page about it
+#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct ReportOptions {
-    /// Directory for the results; made if it is not there.
+    /// Where to write it; made if it does not exist
+    #[arg(long, value_name = "DIRECTORY", default_value = "report")]
     pub out: PathBuf,
-    /// Sections to make anew; all if empty.
+    /// Sections to make anew, with commas between; all unless given
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(value_parser = PossibleValuesParser::new(sections()))]
     pub only: Vec<String>,
-    /// Coarser and shorter: a look in seconds instead of a report in minutes.
+    /// Coarser and shorter: a look in seconds
+    #[arg(long)]
     pub quick: bool,
 }
 

@@ -41,6 +41,8 @@ impl<const N: usize> Steppable for Simulation<N> {
 pub(super) enum Truth<const N: usize> {
     /// An arm under a law that acts at every instant.
     Law(ContinuousLoop<N>),
+    /// An arm under a law that runs once a control period.
+    Sampled(Box<Simulation<N>>),
     /// An arm left to itself.
     Free(FreeMotion<N>),
 }
@@ -67,6 +69,7 @@ impl<const N: usize> Steppable for Truth<N> {
     fn step(&mut self) -> Option<u64> {
         match self {
             Self::Law(law) => law.step().then(|| law.control.method.evaluations().into()),
+            Self::Sampled(sampled) => Steppable::step(&mut **sampled),
             Self::Free(free) => {
                 let before = free.follower.coefficients();
                 let is_followed = free.follower.follow(&free.arm, &[0.0; N], free.timestep);
@@ -78,6 +81,7 @@ impl<const N: usize> Steppable for Truth<N> {
 
     fn end_effector(&self) -> DVec2 {
         let (arm, state) = match self {
+            Self::Sampled(sampled) => (sampled.arm(), sampled.state()),
             Self::Law(law) => (&law.control.arm, &law.state),
             Self::Free(free) => (&free.arm, free.follower.state()),
         };

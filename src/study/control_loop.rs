@@ -8,7 +8,7 @@
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{DEFAULT_TIMESTEP, Simulation};
+use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP, Simulation};
 
 /// An arm under its control law, and how it is stepped.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +21,10 @@ pub struct ControlLoop<const N: usize> {
     pub setpoint: Setpoint<N>,
     /// The method that takes the steps.
     pub method: Method,
-    /// Length of a step, and of a control period \[s\].
+    /// Length of a step \[s\].
     pub timestep: f64,
+    /// When the law runs.
+    pub period: ControlPeriod,
 }
 
 impl<const N: usize> ControlLoop<N> {
@@ -35,6 +37,10 @@ impl<const N: usize> ControlLoop<N> {
             setpoint,
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
+            period: ControlPeriod {
+                period: 0.0,
+                delay: false,
+            },
         }
     }
 
@@ -54,6 +60,7 @@ impl<const N: usize> ControlLoop<N> {
             setpoint: *pid.setpoint(),
             method: simulation.method(),
             timestep: simulation.timestep(),
+            period: simulation.control_period(),
         }
     }
 
@@ -84,6 +91,12 @@ impl<const N: usize> ControlLoop<N> {
         Self { timestep, ..self }
     }
 
+    /// The same loop with another control period.
+    #[must_use]
+    pub const fn with_period(self, period: ControlPeriod) -> Self {
+        Self { period, ..self }
+    }
+
     /// Whether the gains are all zero.
     #[must_use]
     pub fn is_free(&self) -> bool {
@@ -102,6 +115,7 @@ impl<const N: usize> ControlLoop<N> {
         let mut simulation = Simulation::new(self.arm, self.gains);
         simulation.set_method(self.method);
         simulation.set_timestep(self.timestep);
+        simulation.set_control_period(self.period);
         simulation.set_state(start);
         simulation.set_setpoint(self.setpoint);
         simulation.enable(!self.is_free());

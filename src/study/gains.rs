@@ -24,7 +24,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
-use crate::math::shown::Shown;
+use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::Simulation;
 
 /// How near each joint has to come, and stay, to be settled \[rad\].
@@ -84,7 +84,7 @@ pub struct SuggestedGains<const N: usize> {
     pub gains: Gains<N>,
     /// The smallest timestep limit over all poses \[s\]; `None` where nothing limits.
     pub limit: Option<f64>,
-    /// Whether that is proven to 1 %.
+    /// Whether a lower bound comes within 1 % of it.
     pub certified: bool,
     /// How long the slowest of the moves took to settle \[s\].
     pub settled_after: f64,
@@ -94,7 +94,7 @@ pub struct SuggestedGains<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GainsError {
     /// More steps than [`MAX_STEPS`].
-    #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {steps:e}")]
+    #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {}", shown_against(*.steps, MAX_STEPS))]
     TooManySteps {
         /// The given number of steps.
         steps: f64,

@@ -1,22 +1,24 @@
-//! All limits of a control loop: at its setpoint, and the smallest over all poses, proven where it can be.
+//! All limits of a control loop: at its setpoint, and the smallest over all poses, bounded from below where it can be.
 //!
 //! **Invariant:** a search cut into slices finds the same bits as one made at once.
 
 use super::control_loop::ControlLoop;
 use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
+use super::motion::Motion;
 use super::poses::{Judged, PoseSearch};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
+use crate::math::integrator::Method;
 
 /// Part of the smallest limit over all poses that is advised: what linearisation leaves out (a start of 0.3 rad off
 /// costs up to a third of a stiff limit, poses on the way have limits of their own) stays within it.
 pub const ADVISED_PART: f64 = 0.8;
 
-/// How near to the proven bound the smallest limit found must be to count as proven.
+/// How near to the bound the smallest limit found must be to count as certified.
 const AGREEMENT: f64 = 0.01;
 
-/// The part of the smallest limit found below which a proven bound is no advice any more.
+/// The part of the smallest limit found below which a bound is no advice any more.
 const USEFUL: f64 = 0.5;
 
 /// Boxes that a proof cuts in one piece: half a millisecond (optimised build).
@@ -68,27 +70,42 @@ pub struct Limits<const N: usize> {
     pub held: Option<f64>,
     /// At the setpoint's equilibrium, control in every stage.
     pub continuous: Option<f64>,
-    /// The smallest over all poses, effort held over the step.
+    /// The smallest over all poses, effort held over the step. Zero where a joint integrates and the loop runs away in
+    /// some pose: the arm can be sent there.
     pub minimum_held: Option<f64>,
     /// The smallest over all poses, control in every stage: found by a search.
     pub minimum_continuous: Option<f64>,
-    /// A timestep up to which every pose is proven to be stable, effort held over the step; `None` where nothing useful
-    /// is.
+    /// A timestep up to which every pose is stable, effort held over the step; `None` where nothing useful is known.
     pub bound: Option<f64>,
+    /// Whether no estimate is inside `bound`: with Euler, and without gravity.
+    pub bound_is_proven: bool,
     /// Whether `minimum_held` and `bound` agree to 1 %.
     pub certified: bool,
     /// The pose of `minimum_held` \[rad\]; `None` where nothing limits.
     pub worst_pose: Option<[f64; N]>,
     /// The motion that grows there first.
     pub critical: Option<Critical>,
-    /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` where that is proven, of
-    /// the bound where that is less and still of use.
+    /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` where that is certified,
+    /// of the bound where that is less and still of use. Where the loop runs away in some pose that can't be: then of
+    /// the smaller of `held` and the smallest of all poses without gravity, which is for this setpoint alone.
     pub advised: Option<f64>,
 }
 
 impl<const N: usize> Limits<N> {
+    /// The timestep that is advised for a motion \[s\]: [`ADVISED_PART`] of what poses and motion allow; `None` where
+    /// nothing limits.
+    #[must_use]
+    pub fn advised_for(&self, motion: &Motion) -> Option<f64> {
+        let carried = ADVISED_PART * motion.timestep;
+        let carried = Some(carried).filter(|timestep| timestep.is_finite());
+        [self.advised, carried]
+            .into_iter()
+            .flatten()
+            .reduce(f64::min)
+    }
+
     /// The smallest over all poses that can be relied on, effort held over the step \[s\]: `minimum_held` where it is
-    /// proven or nothing is, else the bound.
+    /// certified or there is no bound, else the bound.
     #[must_use]
     pub fn trusted(&self) -> Option<f64> {
         self.bound.filter(|_| !self.certified).or(self.minimum_held)
@@ -114,6 +131,8 @@ pub struct LimitSearch<const N: usize> {
     limits: Limits<N>,
     /// How the loop rests, unless it runs away.
     at_rest: Rest,
+    /// A pose in which the loop runs away.
+    runaway: Option<Judged<N>>,
     stage: LimitStage<N>,
 }
 
@@ -125,6 +144,7 @@ enum LimitStage<const N: usize> {
     Proving(Option<Box<Proof<N>>>),
     /// The pose that the proof found to be the worst.
     Proven(Option<Proven<N>>),
+    Runaway(PoseSearch<N>),
     Poses(Sampling, PoseSearch<N>),
     Done,
 }
@@ -146,12 +166,14 @@ impl<const N: usize> LimitSearch<N> {
                 minimum_held: None,
                 minimum_continuous: None,
                 bound: None,
+                bound_is_proven: false,
                 certified: false,
                 worst_pose: None,
                 critical: None,
                 advised: None,
             },
             at_rest: Rest::Setpoint,
+            runaway: None,
             stage: LimitStage::Setpoint,
         }
     }
@@ -180,6 +202,15 @@ impl<const N: usize> LimitSearch<N> {
                 proven => LimitStage::Proven(proven),
             },
             LimitStage::Proven(proven) => self.compare(proven),
+            LimitStage::Runaway(mut search) => {
+                if search.advance() {
+                    LimitStage::Runaway(search)
+                } else {
+                    let (found, pose) = search.smallest();
+                    self.runaway = found.map(|_| pose);
+                    self.search_held()
+                }
+            }
             LimitStage::Poses(sampling, mut search) => {
                 if search.advance() {
                     LimitStage::Poses(sampling, search)
@@ -216,12 +247,13 @@ impl<const N: usize> LimitSearch<N> {
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
         let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
-        let search = |sampling, found| {
-            let search = PoseSearch::new(control, sampling, found);
-            LimitStage::Poses(sampling, search)
-        };
         let Some(Proven { timestep, pose }) = proven else {
-            return search(Sampling::Held, found);
+            let integrates = control.integrating().contains(&true);
+            return if integrates && control.arm.gravity() > 0.0 {
+                LimitStage::Runaway(PoseSearch::for_runaway(control))
+            } else {
+                self.search_held()
+            };
         };
         let linear = Linear::at_pose(control, &pose);
         let there = largest_timestep(&linear, control.method, Sampling::Held);
@@ -242,7 +274,22 @@ impl<const N: usize> LimitSearch<N> {
         if found.0.is_some_and(|least| agree(timestep, least)) {
             return self.conclude(Sampling::Held, found);
         }
-        search(Sampling::Held, found)
+        LimitStage::Poses(
+            Sampling::Held,
+            PoseSearch::new(control, Sampling::Held, found),
+        )
+    }
+
+    /// Searches all poses, or those without gravity where some pose with it runs away.
+    fn search_held(&self) -> LimitStage<N> {
+        let found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
+        let search = PoseSearch::new(&self.control, Sampling::Held, found);
+        let search = if self.runaway.is_some() {
+            search.weightless()
+        } else {
+            search
+        };
+        LimitStage::Poses(Sampling::Held, search)
     }
 
     /// Notes the smallest limit over all poses, and goes on with the next search, if there is one.
@@ -257,10 +304,20 @@ impl<const N: usize> LimitSearch<N> {
             limits.minimum_continuous = least;
             return LimitStage::Done;
         }
+        if let Some(pose) = self.runaway {
+            limits.advised = least.map(|limit| ADVISED_PART * limit);
+            limits.minimum_held = Some(0.0);
+            limits.minimum_continuous = Some(0.0);
+            limits.worst_pose = Some(pose.pose);
+            limits.critical = critical(&pose.linear(control), control.method, 0.0);
+            return LimitStage::Done;
+        }
         limits.minimum_held = least;
         limits.bound = limits
             .bound
             .filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
+        limits.bound_is_proven = limits.bound.is_some()
+            && (control.method == Method::Euler || control.arm.gravity() == 0.0);
         limits.certified =
             matches!((limits.bound, least), (Some(bound), Some(least)) if agree(bound, least));
         limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);

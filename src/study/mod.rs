@@ -4,9 +4,11 @@
 //! | --- | --- |
 //! | [`stability`] | the largest stable timestep, by the linearised loop ([`linear`], [`matrix`]) |
 //! | [`motion`] | the largest timestep that a motion bears |
+//! | [`clocks`] | the largest stable control period, and the largest stable timestep at a control period |
 //! | [`control_loop`] | the loop that all of these speak of, and how it is stepped |
 //! | [`continuous`] | the same loop with its law in every stage |
 //! | [`gains`] | gains for an arm and a timestep, stable in every pose, that settle in time |
+//! | [`fewest`] | the fewest steps with which a run is good enough |
 //! | [`planner`] | the cheapest method and timestep for an allowed error at the end effector |
 //! | [`rollout`] | an offline run with its error against a reference ([`follower`]) |
 //! | [`error_estimate`] | the local error of the step about to be taken |
@@ -16,11 +18,13 @@
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
 mod beside;
+pub mod clocks;
 pub mod continuous;
 pub mod control_loop;
 mod critical;
 mod equilibrium;
 pub mod error_estimate;
+pub mod fewest;
 pub mod follower;
 pub mod gains;
 mod limits;

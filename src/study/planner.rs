@@ -4,36 +4,38 @@
 //! | --- | --- |
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
+//! | the same with a control period that is given | the loop whose law runs once a period: holding is none |
 //!
 //! The truth is followed with ever smaller steps, or, for an arm left to itself, within ever smaller tolerances, until
 //! two truths agree to a part of the allowed error. Then each method is run beside the truth, as the live arm runs it.
-//! Its steps are made smaller until it stays within the rest of the error after each of them, and then larger again by
-//! bisection. The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A
-//! run that could only be dearer than another is not made.
+//! The fewest steps are searched ([`StepSearch`]) with which it stays within the rest of the error after each of them.
+//! The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A run that
+//! could only be dearer than another is not made.
 //!
-//! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
-//! every pose, since the error of one move says nothing about the next.
+//! Where no control period is given both are planned: the law then runs in every step, since a longer period at the
+//! same timestep costs as much and is further from the truth. Under control no timestep is planned beyond what is
+//! advised for every pose, since the error of one move says nothing about the next.
 //!
 //! **Invariant:** the work is bounded when a plan is asked for, and every candidate that is answered has been run.
 
 use std::f64::consts::PI;
 
 use super::beside::{Beside, FreeMotion, Truth};
+use super::clocks::clock_limits;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
+use super::fewest::StepSearch;
 use super::follower::ROUNDING;
 use super::limits::LimitSearch;
 use crate::math::arm::State;
-use crate::math::count::in_f64;
+use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
-use crate::math::shown::Shown;
+use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::Simulation;
 
-/// Longest timestep that is planned \[s\].
-const LONGEST: f64 = 0.05;
-
-/// Fewest steps of a run.
-const FEWEST_STEPS: f64 = 16.0;
+/// Longest time between two comparisons of truths \[s\], and how many there are at least.
+const LONGEST_SPAN: f64 = 0.05;
+const FEWEST_SPANS: f64 = 16.0;
 
 /// Longest duration that is planned \[s\].
 pub const MAX_DURATION: f64 = 1000.0;
@@ -50,7 +52,8 @@ const FINER: f64 = 0.01;
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task<const N: usize> {
-    /// The loop; its method and timestep are looked for. Gains of zero mean an arm left to itself.
+    /// The loop; its method and timestep are looked for, and its control period where that is 0. Gains of zero mean an
+    /// arm left to itself.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
@@ -94,7 +97,7 @@ impl Planned {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// A duration that is too long.
-    #[error("duration must be at most {MAX_DURATION} s, got {}", Shown(*.duration))]
+    #[error("duration must be at most {MAX_DURATION} s, got {}", shown_against(*.duration, MAX_DURATION))]
     TooLong {
         /// The given duration \[s\].
         duration: f64,
@@ -106,10 +109,26 @@ pub enum PlanError {
         uncertainty: f64,
     },
     /// No method stays within the error.
-    #[error("error must be larger: no method stays within {error:e} m in {MAX_STEPS} steps")]
+    #[error("error must be larger: no method stays within {} m in {MAX_STEPS} steps", Shown(*.error))]
     NotFound {
         /// The given error \[m\].
         error: f64,
+    },
+    /// Nothing was run, since the loop is stable at no timestep.
+    #[error(
+        "gains or control_period must be others: the loop is unstable at every timestep, at the setpoint or in a pose \
+         on the way (/study/stability says where), so nothing was run"
+    )]
+    Unstable,
+    /// Nothing was run, since the longest stable timestep is too short.
+    #[error(
+        "duration must be shorter: at the longest stable timestep, {} s, it takes more than {MAX_STEPS} steps, so \
+         nothing was run",
+        Shown(*.timestep)
+    )]
+    TooManySteps {
+        /// The longest timestep that is stable with any method \[s\].
+        timestep: f64,
     },
 }
 
@@ -117,10 +136,13 @@ pub enum PlanError {
 #[derive(Debug, Clone)]
 pub struct Planning<const N: usize> {
     task: Task<N>,
-    /// The longest timestep \[s\], a whole part of the duration; others are whole parts of it.
-    longest: f64,
-    /// Number of steps of that length.
-    fewest: u64,
+    /// The duration, or the control period \[s\]: timesteps are whole parts of it.
+    whole: f64,
+    /// How many of it there are.
+    count: u64,
+    /// The longest stable timestep of all methods so far \[s\], and whether any was run.
+    longest_stable: f64,
+    has_run: bool,
     /// How finely the truth is followed.
     fineness: Fineness,
     uncertainty: f64,
@@ -133,7 +155,7 @@ pub struct Planning<const N: usize> {
 /// How finely a truth is followed.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
-    /// Each longest timestep is cut into so many steps.
+    /// Each whole is cut into so many steps.
     Steps(u64),
     /// Within a tolerance.
     Tolerance(f64),
@@ -152,17 +174,9 @@ impl Fineness {
 enum PlanStage<const N: usize> {
     Comparing(Box<Beside<Truth<N>, N>>),
     Limiting(Method, Box<LimitSearch<N>>),
-    /// Each longest timestep is cut into so many steps.
-    Running(Bracket, u64, Box<Beside<Simulation<N>, N>>),
+    /// The search looks for the number of steps in the whole.
+    Running(Method, StepSearch, Box<Beside<Simulation<N>, N>>),
     Done(Result<Planned, PlanError>),
-}
-
-/// Numbers of steps in the longest timestep: one that is too few, and one that is enough, once it is known.
-#[derive(Debug, Clone, Copy)]
-struct Bracket {
-    method: Method,
-    too_few: u64,
-    enough: Option<u64>,
 }
 
 impl<const N: usize> Planning<N> {
@@ -181,7 +195,13 @@ impl<const N: usize> Planning<N> {
         if duration.is_nan() || duration > MAX_DURATION {
             return Err(PlanError::TooLong { duration });
         }
-        let fewest = whole(duration / LONGEST).max(whole(FEWEST_STEPS));
+        let control = &task.control;
+        let (count, whole) = if is_sampled(control) {
+            let period = control.period.period;
+            (ceiling((duration / period).round()).max(1), period)
+        } else {
+            (1, duration)
+        };
         let fineness = if task.control.is_free() {
             // This part of half a turn moves the end effector of the stretched arm by the truth's part of the error.
             let reach = task.control.arm.reach();
@@ -189,12 +209,14 @@ impl<const N: usize> Planning<N> {
             // The truth that it is first compared with must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
-            Fineness::Steps(4)
+            Fineness::Steps(4 * spans(whole, count))
         };
         let mut planning = Self {
             task,
-            longest: duration / in_f64(fewest),
-            fewest,
+            whole,
+            count,
+            longest_stable: 0.0,
+            has_run: false,
             fineness,
             uncertainty: f64::INFINITY,
             methods: Method::ALL.to_vec(),
@@ -223,24 +245,29 @@ impl<const N: usize> Planning<N> {
                     self.begin(method, most);
                 }
             }
-            PlanStage::Running(bracket, steps, run) => {
+            PlanStage::Running(method, search, run) => {
                 if let Some(error) = run.advance() {
-                    let (bracket, steps) = (*bracket, *steps);
-                    self.narrow(bracket, steps, error);
+                    let (method, search) = (*method, *search);
+                    self.judge(method, search, error);
                 }
             }
         }
         None
     }
 
-    /// The truth, followed so finely, and how many of its steps make one of a run. The run takes `steps` steps in the
-    /// longest timestep.
+    /// The truth, followed so finely, and how many of its steps make one of a run that takes `steps` steps in the
+    /// whole.
     fn truth(&self, fineness: Fineness, steps: u64) -> (Truth<N>, u64) {
         let Task { control, start, .. } = self.task;
         match fineness {
             Fineness::Steps(finest) => {
                 let each = finest.div_ceil(steps);
-                let timestep = self.longest / in_f64(steps * each);
+                let timestep = self.whole / in_f64(steps * each);
+                if is_sampled(&control) {
+                    let control = control.with_method(Method::Rk4).with_timestep(timestep);
+                    let sampled = Box::new(control.simulation(start));
+                    return (Truth::Sampled(sampled), each);
+                }
                 let law = ContinuousLoop {
                     control: control.with_method(Method::Rk4).with_timestep(timestep),
                     state: start,
@@ -249,7 +276,7 @@ impl<const N: usize> Planning<N> {
                 (Truth::Law(law), each)
             }
             Fineness::Tolerance(tolerance) => {
-                let timestep = self.longest / in_f64(steps);
+                let timestep = self.whole / in_f64(steps);
                 let motion = FreeMotion::new(control.arm, start, timestep, tolerance);
                 (Truth::Free(motion), 1)
             }
@@ -260,11 +287,11 @@ impl<const N: usize> Planning<N> {
     fn compare_truths(&mut self) {
         let steps = match self.fineness {
             Fineness::Steps(steps) => steps,
-            Fineness::Tolerance(_) => 1,
+            Fineness::Tolerance(_) => spans(self.whole, self.count),
         };
         let (coarse, _) = self.truth(self.fineness, steps);
         let (fine, each) = self.truth(self.fineness.finer(), steps);
-        let truths = Beside::new(coarse, steps * self.fewest, fine, each, f64::INFINITY);
+        let truths = Beside::new(coarse, steps * self.count, fine, each, f64::INFINITY);
         self.stage = PlanStage::Comparing(Box::new(truths));
     }
 
@@ -275,7 +302,7 @@ impl<const N: usize> Planning<N> {
         }
         self.fineness = self.fineness.finer();
         let can_be_finer = match self.fineness {
-            Fineness::Steps(steps) => 2 * steps * self.fewest <= MAX_STEPS,
+            Fineness::Steps(steps) => 2 * steps * self.count <= MAX_STEPS,
             Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
         };
         if apart <= PART_OF_TRUTH * self.task.error {
@@ -290,47 +317,63 @@ impl<const N: usize> Planning<N> {
 
     fn next_method(&mut self) {
         let Some(method) = self.methods.pop() else {
-            let error = self.task.error;
-            self.candidates
-                .sort_by_key(|one| std::cmp::Reverse(one.evaluations));
-            self.stage = PlanStage::Done(if self.candidates.is_empty() {
-                Err(PlanError::NotFound { error })
-            } else {
-                Ok(Planned {
-                    candidates: std::mem::take(&mut self.candidates),
-                    uncertainty: self.uncertainty,
-                })
-            });
+            self.conclude();
             return;
         };
         if self.task.control.is_free() {
             self.begin(method, f64::INFINITY);
+        } else if is_sampled(&self.task.control) {
+            let limits = clock_limits(&self.task.control.with_method(method));
+            let most = limits.timestep.unwrap_or(f64::INFINITY);
+            // It is a whole part of the period, but for rounding.
+            self.begin(method, most * (1.0 + count::ROUNDING));
         } else {
             let search = LimitSearch::new(&self.task.control.with_method(method));
             self.stage = PlanStage::Limiting(method, Box::new(search));
         }
     }
 
-    /// Begins with the longest timestep, `most` \[s\] at most.
-    fn begin(&mut self, method: Method, most: f64) {
-        let steps = whole(self.longest / most).max(1);
-        let bracket = Bracket {
-            method,
-            too_few: steps - 1,
-            enough: None,
-        };
-        self.run(bracket, steps);
+    fn conclude(&mut self) {
+        self.candidates
+            .sort_by_key(|one| std::cmp::Reverse(one.evaluations));
+        self.stage = PlanStage::Done(if !self.candidates.is_empty() {
+            Ok(Planned {
+                candidates: std::mem::take(&mut self.candidates),
+                uncertainty: self.uncertainty,
+            })
+        } else if self.has_run {
+            let error = self.task.error;
+            Err(PlanError::NotFound { error })
+        } else if self.longest_stable > 0.0 {
+            let timestep = self.longest_stable;
+            Err(PlanError::TooManySteps { timestep })
+        } else {
+            Err(PlanError::Unstable)
+        });
     }
 
-    /// Runs a method with so many steps in the longest timestep, unless there is a cheaper candidate already.
-    fn run(&mut self, bracket: Bracket, steps: u64) {
-        let Bracket { method, .. } = bracket;
-        let all = steps.saturating_mul(self.fewest);
-        let cost = all.saturating_mul(u64::from(method.evaluations()));
-        if all > MAX_STEPS || self.candidates.iter().any(|one| one.evaluations <= cost) {
+    /// Begins to search the fewest steps of a method whose longest stable timestep is `most` \[s\].
+    fn begin(&mut self, method: Method, most: f64) {
+        self.longest_stable = self.longest_stable.max(most);
+        let fewest = ceiling(self.whole / most * (1.0 - count::ROUNDING));
+        // As many as cost less than the best run so far.
+        let cheapest = self.candidates.iter().map(|one| one.evaluations).min();
+        let affordable = cheapest.map_or(u64::MAX, |least| {
+            least.saturating_sub(1) / u64::from(method.evaluations())
+        });
+        self.run(
+            method,
+            StepSearch::new(fewest, affordable.min(MAX_STEPS) / self.count),
+        );
+    }
+
+    /// Makes the next run of a search.
+    fn run(&mut self, method: Method, search: StepSearch) {
+        let Some(steps) = search.wanted() else {
             return self.next_method();
-        }
-        let timestep = self.longest / in_f64(steps);
+        };
+        self.has_run = true;
+        let timestep = self.whole / in_f64(steps);
         let control = self
             .task
             .control
@@ -339,40 +382,35 @@ impl<const N: usize> Planning<N> {
         let live = control.simulation(self.task.start);
         let (truth, each) = self.truth(self.fineness, steps);
         let allowed = self.task.error - self.uncertainty;
-        let run = Beside::new(live, all, truth, each, allowed);
-        self.stage = PlanStage::Running(bracket, steps, Box::new(run));
+        let run = Beside::new(live, steps * self.count, truth, each, allowed);
+        self.stage = PlanStage::Running(method, search, Box::new(run));
     }
 
-    fn narrow(&mut self, bracket: Bracket, steps: u64, error: f64) {
-        let Bracket { method, .. } = bracket;
-        let bracket = if error + self.uncertainty <= self.task.error {
+    /// Takes the error of a run of a search, and goes on with the search.
+    fn judge(&mut self, method: Method, mut search: StepSearch, error: f64) {
+        let is_enough = error + self.uncertainty <= self.task.error;
+        if let Some(steps) = search.wanted().filter(|_| is_enough) {
             self.candidates.retain(|one| one.method != method);
             self.candidates.push(Candidate {
                 method,
-                timestep: self.longest / in_f64(steps),
-                evaluations: steps * self.fewest * u64::from(method.evaluations()),
+                timestep: self.whole / in_f64(steps),
+                evaluations: steps * self.count * u64::from(method.evaluations()),
                 error,
             });
-            Bracket {
-                enough: Some(steps),
-                ..bracket
-            }
-        } else {
-            Bracket {
-                too_few: steps,
-                ..bracket
-            }
-        };
-        let next = match bracket.enough {
-            None => 2 * steps,
-            Some(enough) => bracket.too_few + (enough - bracket.too_few) / 2,
-        };
-        if next == bracket.too_few || bracket.enough == Some(next) {
-            self.next_method();
-        } else {
-            self.run(bracket, next);
         }
+        search.tell(is_enough);
+        self.run(method, search);
     }
+}
+
+/// Parts of a whole \[s\], of which there are `count`, after which truths are compared.
+fn spans(whole: f64, count: u64) -> u64 {
+    ceiling((whole / LONGEST_SPAN).max(FEWEST_SPANS / in_f64(count)))
+}
+
+/// Whether the law runs at a period that is given.
+fn is_sampled<const N: usize>(control: &ControlLoop<N>) -> bool {
+    control.period.period > 0.0 && !control.is_free()
 }
 
 /// Says how well a motion is known if two truths differ by so much.
@@ -390,6 +428,6 @@ fn known(uncertainty: f64) -> String {
     clippy::cast_sign_loss,
     reason = "a count of steps; a cast saturates"
 )]
-fn whole(x: f64) -> u64 {
+fn ceiling(x: f64) -> u64 {
     x.ceil() as u64
 }

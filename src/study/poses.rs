@@ -7,6 +7,10 @@
 //! makes run away even in continuous time say nothing about timesteps and are left out; without gravity they count,
 //! since then it is the gains that run away.
 //!
+//! An arm whose joints integrate can be held in every pose, and where it runs away it does so for good. Towards the
+//! border of such poses the limit falls to zero. So these are searched first ([`PoseSearch::for_runaway`]): uphill on
+//! the largest real part of any mode in continuous time.
+//!
 //! **Invariant:** the work is bounded: [`cells`] poses, and one climb from each at most.
 
 #![allow(
@@ -77,6 +81,17 @@ struct Climb<const N: usize> {
     moves: u32,
 }
 
+/// The object of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sought {
+    /// The smallest limit, of poses with gravity and without.
+    Limit(Sampling),
+    /// The smallest limit of poses without gravity.
+    WeightlessLimit(Sampling),
+    /// A pose that runs away in continuous time: its limit is zero.
+    Runaway,
+}
+
 #[derive(Debug, Clone)]
 enum PoseStage<const N: usize> {
     Grid(usize),
@@ -90,7 +105,7 @@ enum PoseStage<const N: usize> {
 #[derive(Debug, Clone)]
 pub(super) struct PoseSearch<const N: usize> {
     control: ControlLoop<N>,
-    sampling: Sampling,
+    sought: Sought,
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
     /// The pose of that value.
@@ -107,16 +122,37 @@ impl<const N: usize> PoseSearch<N> {
     ) -> Self {
         Self {
             control: *control,
-            sampling,
+            sought: Sought::Limit(sampling),
             smallest: bound,
             worst,
             stage: PoseStage::Grid(0),
         }
     }
 
+    /// The same search among poses without gravity.
+    pub(super) fn weightless(mut self) -> Self {
+        if let Sought::Limit(sampling) = self.sought {
+            self.sought = Sought::WeightlessLimit(sampling);
+        }
+        self
+    }
+
+    /// A search for a pose that runs away: its smallest limit is zero, or none is found.
+    pub(super) fn for_runaway(control: &ControlLoop<N>) -> Self {
+        Self {
+            control: *control,
+            sought: Sought::Runaway,
+            smallest: None,
+            worst: Judged::as_it_is(control.setpoint.position),
+            stage: PoseStage::Rating(0, Vec::new()),
+        }
+    }
+
     /// Judges the loop at one more pose; false once there is none left.
     pub(super) fn advance(&mut self) -> bool {
+        let is_found = self.sought == Sought::Runaway && self.smallest.is_some();
         self.stage = match std::mem::replace(&mut self.stage, PoseStage::Done) {
+            _ if is_found => return false,
             PoseStage::Grid(index) => match self.judged(index) {
                 Some(judged) => {
                     self.judge(&judged);
@@ -171,7 +207,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Judgements at one pose of the outer joints. Without gravity the direction of the first joint makes no
     /// difference.
     fn turns(&self) -> usize {
-        if self.control.arm.gravity() == 0.0 {
+        if self.control.arm.gravity() == 0.0 || matches!(self.sought, Sought::WeightlessLimit(_)) {
             1
         } else {
             DIRECTIONS + 1
@@ -179,8 +215,11 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     fn judge(&mut self, judged: &Judged<N>) {
+        let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
+            return;
+        };
         let linear = judged.linear(&self.control);
-        let stepping = Stepping::new(&linear, self.control.method, self.sampling);
+        let stepping = Stepping::new(&linear, self.control.method, sampling);
         let passes = self.smallest.is_some_and(|limit| {
             PROBES
                 .iter()
@@ -201,10 +240,18 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// Growth at the smallest limit so far.
-    fn growth(&self, judged: &Judged<N>) -> f64 {
+    /// Growth at the smallest limit so far, or in continuous time if a pose is sought that runs away.
+    fn growth(&mut self, judged: &Judged<N>) -> f64 {
         let linear = judged.linear(&self.control);
-        let growth = Stepping::new(&linear, self.control.method, self.sampling)
+        let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
+            let modes = Modes::of(&linear);
+            if modes.run_away() {
+                self.smallest = Some(0.0);
+                self.worst = *judged;
+            }
+            return modes.growth();
+        };
+        let growth = Stepping::new(&linear, self.control.method, sampling)
             .growth(self.smallest.unwrap_or(0.0));
         if growth > NEUTRAL && judged.weighs && Modes::of(&linear).run_away() {
             f64::NEG_INFINITY
@@ -213,7 +260,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn rate(&self, index: usize, judged: Judged<N>, cells: &mut Vec<(Judged<N>, f64)>) {
+    fn rate(&mut self, index: usize, judged: Judged<N>, cells: &mut Vec<(Judged<N>, f64)>) {
         let growth = self.growth(&judged);
         match cells.get_mut(index / self.turns()) {
             Some(cell) if growth > cell.1 => *cell = (judged, growth),
@@ -222,7 +269,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn begin(&self, at: Judged<N>) -> Climb<N> {
+    fn begin(&mut self, at: Judged<N>) -> Climb<N> {
         Climb {
             at,
             growth: self.growth(&at),
@@ -252,7 +299,7 @@ impl<const N: usize> PoseSearch<N> {
         let growth = self.growth(&next);
         if growth > climb.growth {
             (climb.at, climb.growth, climb.failed) = (next, growth, 0);
-            if growth > NEUTRAL {
+            if growth > NEUTRAL && self.sought != Sought::Runaway {
                 self.judge(&next);
                 climb.growth = self.growth(&next);
             }

@@ -81,32 +81,20 @@ pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> 
 /// The largest stable control period \[s\] if the effort is held over `substeps` steps of the method.
 #[must_use]
 pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
-    let stepping = Stepping {
-        substeps: substeps.max(1),
-        ..Stepping::new(linear, method, Sampling::Held)
-    };
-    stepping.search(&Modes::of(linear))
+    Stepping::held(linear, method, substeps, false).search(&Modes::of(linear))
 }
 
 /// The largest stable control period \[s\] if every effort acts one period late, as over a bus or with a slow
 /// controller. There is no integral in it.
 #[must_use]
 pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
-    let stepping = Stepping {
-        substeps: substeps.max(1),
-        delayed: true,
-        ..Stepping::new(linear, method, Sampling::Held)
-    };
-    stepping.search(&Modes::of(linear))
+    Stepping::held(linear, method, substeps, true).search(&Modes::of(linear))
 }
 
 /// The matrix by which one control period \[s\] of `substeps` steps changes a deviation; states as in [`Linear::flow`].
 #[must_use]
 pub fn period_matrix(linear: &Linear, method: Method, substeps: u32, period: f64) -> Matrix {
-    let stepping = Stepping {
-        substeps: substeps.max(1),
-        ..Stepping::new(linear, method, Sampling::Held)
-    };
+    let stepping = Stepping::held(linear, method, substeps, false);
     stepping.generator(period).shifted_identity(period)
 }
 
@@ -140,6 +128,12 @@ impl Modes {
     /// A timestep far below the fastest time constant \[s\].
     pub(super) fn tiny(&self) -> f64 {
         SEARCH_START / self.rate
+    }
+
+    /// The fastest growth of any mode, or the slowest decay \[1/s\].
+    pub(super) fn growth(&self) -> f64 {
+        let growth = self.eigenvalues.iter().map(|mode| mode.re);
+        growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
@@ -179,6 +173,15 @@ impl<'a> Stepping<'a> {
                 Sampling::Continuous => linear.flow(),
                 Sampling::Held => linear.plant(),
             },
+        }
+    }
+
+    /// The law once in `substeps` steps, at once or one period late.
+    pub(super) fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
+        Self {
+            substeps: substeps.max(1),
+            delayed,
+            ..Self::new(linear, method, Sampling::Held)
         }
     }
 

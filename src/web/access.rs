@@ -4,14 +4,18 @@
 //! tells under which name the browser looked for us (not ours where a hostile name server points a foreign name here),
 //! and `Origin` whose page opens a WebSocket. Programs send what they like there, and could use the raw port as well.
 //!
-//! **Invariant:** what is not allowed by a rule is refused, with a text that names the rule or the option.
+//! **Invariant:** a request that no rule allows is refused, with a text that names the rule or the option.
 
 use std::net::SocketAddr;
 
+use hyper::StatusCode;
+use hyper::header::ALLOW;
+
 use super::authority::{Authority, Host};
 use super::head::RequestHead;
+use super::response::{HttpResponse, set, text};
 use crate::protocol::op::token::Token;
-use crate::protocol::wire::text::push_plain;
+use crate::protocol::wire::text::shortened;
 
 /// Characters of a header that a refusal repeats.
 const MAX_SHOWN: usize = 80;
@@ -21,7 +25,7 @@ const MAX_SHOWN: usize = 80;
 pub struct Access {
     /// The token that has to be shown, if there is one.
     pub token: Option<Token>,
-    /// Names that `Host` may have besides loopback's; without a port, ours is meant.
+    /// Names that `Host` may have besides loopback's; without a port, at every port.
     pub hosts: Vec<Authority>,
     /// Pages that may open a WebSocket besides loopback's, as `Origin` writes them, in lower case.
     pub origins: Vec<Box<str>>,
@@ -29,16 +33,26 @@ pub struct Access {
     pub strict_origin: bool,
 }
 
-/// Why a request is refused.
+/// Why a request is refused, and the connection closed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {
+    /// An authority, or `*`.
+    #[error("this is not a well-formed HTTP request: its target must begin with a slash")]
+    Target,
+    /// Another method.
+    #[error("only GET and HEAD are answered here")]
+    Method,
+    /// Where a body ends depends on the reader, so nobody could hide a request in it.
+    #[error("a request has no body here")]
+    Body,
     /// The request does not say which host it looks for.
     #[error("the request must have one Host header")]
     NoHost,
     /// A name that is not ours.
     #[error(
         "this runtime does not answer to the host {host:?}: it could be another site's name that points here. Ask for \
-         http://localhost:{port}/, or start the runtime with --allow-host and that name"
+         http://localhost:{port}/, or start the runtime with --allow-host and that name (without a port, to allow \
+         every port)"
     )]
     Host {
         /// The host that the request names.
@@ -62,6 +76,25 @@ pub enum AccessError {
     WrongToken,
 }
 
+impl AccessError {
+    /// The answer.
+    #[must_use]
+    pub fn response(&self) -> HttpResponse {
+        let status = match self {
+            Self::Target | Self::Body | Self::NoHost => StatusCode::BAD_REQUEST,
+            Self::Method => StatusCode::METHOD_NOT_ALLOWED,
+            Self::Host { .. } | Self::Origin(_) | Self::NoToken | Self::WrongToken => {
+                StatusCode::FORBIDDEN
+            }
+        };
+        let mut response = text(status, &self.to_string());
+        if *self == Self::Method {
+            set(&mut response, ALLOW, "GET, HEAD");
+        }
+        response
+    }
+}
+
 impl Access {
     /// The host that the request looks for, if it is ours; `local` is the address that the client has connected to.
     ///
@@ -69,22 +102,19 @@ impl Access {
     /// [`AccessError::NoHost`] and [`AccessError::Host`].
     pub fn host(&self, request: &RequestHead, local: SocketAddr) -> Result<Authority, AccessError> {
         let text = request.one("host").ok_or(AccessError::NoHost)?;
-        let authority = Authority::parse(text).filter(|host| self.is_ours(host, local));
+        let authority = Authority::parse(&text).filter(|host| self.is_ours(host, local));
         authority.ok_or_else(|| AccessError::Host {
-            host: shown(text),
+            host: shortened(&text, MAX_SHOWN),
             port: local.port(),
         })
     }
 
     fn is_ours(&self, asked: &Authority, local: SocketAddr) -> bool {
-        let port = asked.http_port();
         let bound = Host::Address(local.ip().to_canonical());
-        if (asked.host.is_loopback() || asked.host == bound) && port == local.port() {
-            return true;
-        }
-        self.hosts
-            .iter()
-            .any(|one| one.host == asked.host && one.port.unwrap_or(local.port()) == port)
+        // No name server can point these names elsewhere. Their port may be that of a proxy or of a tunnel.
+        asked.host.is_loopback()
+            || asked.host == bound
+            || self.hosts.iter().any(|one| one.allows(asked))
     }
 
     /// Whether the page that opens a WebSocket may do so; `own` is the host that the request looks for. Without an
@@ -96,7 +126,7 @@ impl Access {
         if request.count("origin") == 0 {
             return Ok(());
         }
-        let text = request.one("origin").unwrap_or("more than one");
+        let text = request.one("origin").unwrap_or("more than one".into());
         let lower = text.to_ascii_lowercase();
         let over_http = lower.strip_prefix("http://").and_then(Authority::parse);
         let is_own = over_http
@@ -109,7 +139,7 @@ impl Access {
         if is_own || is_named || (is_local && !is_strict) {
             Ok(())
         } else {
-            Err(AccessError::Origin(shown(text)))
+            Err(AccessError::Origin(shortened(&text, MAX_SHOWN)))
         }
     }
 
@@ -141,7 +171,12 @@ impl Access {
     pub fn cookie(&self, local: SocketAddr) -> Option<String> {
         let token = self.token.as_ref()?;
         let name = cookie_name(local.port());
-        let value = encode(token.reveal());
+        // A cookie has no place for some characters of a token.
+        let value: String = token
+            .reveal()
+            .bytes()
+            .map(|byte| format!("%{byte:02X}"))
+            .collect();
         Some(format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict"))
     }
 }
@@ -149,26 +184,4 @@ impl Access {
 /// Browsers keep cookies by host, not by port: the name tells two runtimes on one machine apart.
 fn cookie_name(port: u16) -> String {
     format!("pendularm_{port}")
-}
-
-/// Everything but letters, digits, `-`, `_` and `.` as `%` and two digits.
-fn encode(text: &str) -> String {
-    let mut encoded = String::with_capacity(text.len());
-    for byte in text.bytes() {
-        if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.') {
-            encoded.push(char::from(byte));
-        } else {
-            encoded.push_str(&format!("%{byte:02X}"));
-        }
-    }
-    encoded
-}
-
-/// Returns the part of a header that is repeated to its sender.
-fn shown(text: &str) -> String {
-    let mut shown = String::new();
-    for character in text.chars().take(MAX_SHOWN) {
-        push_plain(&mut shown, character);
-    }
-    shown
 }

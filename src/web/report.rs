@@ -1,16 +1,21 @@
-//! The last report: files of one folder, by plain names. They are read piece by piece: however long one is, it
-//! takes a piece's memory, and it is open only while a piece is read.
+//! The last report: files of one folder, by plain names.
 //!
-//! **Invariant:** what is served lies in the folder, also where a link in it points elsewhere, and is of a kind that is
-//! listed.
+//! **Invariant:** a served file lies in the folder, also where a link points elsewhere, and is of a listed kind.
+//! At most [`FILES`] are in memory, each of at most [`MAX_FILE`] bytes.
 
-use std::fs::{self, Metadata};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::spawn_blocking;
+
+use super::head::decode;
 
 /// Path under which it is served.
 pub const PREFIX: &str = "/report/";
-/// The kinds of files that are shown of a folder.
+/// The file that is served for a folder.
 const INDEX: &str = "index.html";
 /// Deepest file below the folder, in names.
 const MAX_DEPTH: usize = 8;
@@ -31,21 +36,38 @@ const KINDS: [(&str, &str); 8] = [
     ("txt", "text/plain; charset=utf-8"),
 ];
 
+/// Files that are read or sent at once: a disk or a client that takes long keeps no others.
+pub const FILES: usize = 4;
+/// Longest file that is sent \[bytes\]: the longest of a full report has 1.5 MB.
+pub const MAX_FILE: u64 = 4 * 1024 * 1024;
+
+/// Permits to look at the report's folder. A permit travels with the file that was read.
+#[derive(Debug)]
+pub(super) struct Disk(Arc<Semaphore>);
+
+impl Default for Disk {
+    fn default() -> Self {
+        Self(Arc::new(Semaphore::new(FILES)))
+    }
+}
+
+impl Disk {
+    /// Does `work` on another thread, once there is a permit. `None` if it panicked, or if the runtime is ending.
+    pub(super) async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Option<(T, OwnedSemaphorePermit)> {
+        let permit = Arc::clone(&self.0).acquire_owned().await.ok()?;
+        spawn_blocking(|| (work(), permit)).await.ok()
+    }
+}
+
 /// A file of the report, by its path on the web.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     path: PathBuf,
     /// Its media type.
     pub kind: &'static str,
-}
-
-/// A file that is being read: as it was when it was found, or not at all.
-#[derive(Debug)]
-pub struct File {
-    path: PathBuf,
-    found: Metadata,
-    /// Bytes of it that have been read.
-    read: u64,
 }
 
 /// Whether there is a report in the folder: one look at the disk.
@@ -59,11 +81,11 @@ impl FileName {
     /// beginning with a dot, a known ending. A folder's is its index.
     #[must_use]
     pub fn parse(rest: &str) -> Option<Self> {
-        let rest = super::head::decode(rest)?;
+        let rest = decode(rest)?;
         let whole = if rest.is_empty() || rest.ends_with('/') {
             format!("{rest}{INDEX}")
         } else {
-            rest.into_owned()
+            rest
         };
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
         let mut path = PathBuf::new();
@@ -79,142 +101,29 @@ impl FileName {
         Some(Self { path, kind })
     }
 
-    /// The file in `folder`, to be read; `None` if there is none to be had. It may block for as long as the disk takes.
+    /// Reads the file in `folder`; `None` if `folder` has no such file. It may block for as long as the disk takes.
     ///
     /// # Errors
     ///
-    /// The system's, where the file can't be opened: too many are open, or it is not ours to read.
-    pub fn find(&self, folder: &Path) -> io::Result<Option<File>> {
-        let Some((path, found)) = self.look(folder) else {
+    /// The system's, or that the file is too long.
+    pub fn read(&self, folder: &Path) -> io::Result<Option<Vec<u8>>> {
+        let find = || {
+            let folder = folder.canonicalize().ok()?;
+            let path = folder.join(&self.path).canonicalize().ok()?;
+            // Opening what is no file, such as a pipe, could wait for ever.
+            (path.starts_with(&folder) && path.is_file()).then_some(path)
+        };
+        let Some(path) = find() else {
             return Ok(None);
         };
-        fs::File::open(&path)?;
-        Ok(Some(File {
-            path,
-            found,
-            read: 0,
-        }))
-    }
-
-    /// Where the file is, and what it is: `None` unless it is a file in `folder`.
-    fn look(&self, folder: &Path) -> Option<(PathBuf, Metadata)> {
-        let folder = folder.canonicalize().ok()?;
-        let path = folder.join(&self.path).canonicalize().ok()?;
-        let found = path.metadata().ok()?;
-        (path.starts_with(&folder) && found.is_file()).then_some((path, found))
-    }
-}
-
-impl File {
-    /// Its length \[bytes\].
-    #[must_use]
-    pub fn length(&self) -> u64 {
-        self.found.len()
-    }
-
-    /// The next piece, of at most so many bytes: none at the end. It may block as [`FileName::find`] does.
-    ///
-    /// # Errors
-    ///
-    /// The system's, where the file can't be read; and where it is no longer the one that was found.
-    pub fn next_piece(&mut self, most: usize) -> io::Result<Vec<u8>> {
-        // Asked first: opening what is no file, a pipe say, could wait for ever.
-        let now = self.path.metadata()?;
-        let is_same = now.len() == self.length() && now.modified()? == self.found.modified()?;
-        if !now.is_file() || !is_same {
-            return Err(io::Error::other(
-                "the file has changed since its first piece",
-            ));
+        let mut bytes = Vec::new();
+        let file = fs::File::open(path)?;
+        file.take(MAX_FILE + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MAX_FILE {
+            return Err(io::Error::other(format!(
+                "it is longer than {MAX_FILE} bytes"
+            )));
         }
-        let mut file = fs::File::open(&self.path)?;
-        file.seek(SeekFrom::Start(self.read))?;
-        let mut piece = Vec::with_capacity(most);
-        file.take(most as u64).read_to_end(&mut piece)?;
-        self.read += piece.len() as u64;
-        Ok(piece)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn plain_names_of_known_kinds_are_taken() {
-        for (rest, path, kind) in [
-            ("", "index.html", "text/html"),
-            ("a/", "a/index.html", "text/html"),
-            ("error.svg", "error.svg", "image/svg+xml"),
-            ("data/a-1_b.2.csv", "data/a-1_b.2.csv", "text/csv"),
-            ("%61.svg", "a.svg", "image/svg+xml"),
-        ] {
-            let name = FileName::parse(rest).unwrap();
-            assert_eq!(name.path, Path::new(path));
-            assert!(name.kind.starts_with(kind));
-        }
-    }
-
-    #[test]
-    fn everything_else_is_not() {
-        for rest in [
-            "..",
-            "../a.svg",
-            "a/../b.svg",
-            "%2e%2e/a.svg",
-            "..%2fa.svg",
-            "a//b.svg",
-            "/a.svg",
-            ".hidden.svg",
-            "a\\b.svg",
-            "a",
-            "a.exe",
-            "a.svg%00",
-            "a.SVG",
-            "a b.svg",
-            ".",
-            "a/.git/config.json",
-            "c:/a.svg",
-            "a.js",
-            "1/2/3/4/5/6/7/8/9.svg",
-        ] {
-            assert_eq!(FileName::parse(rest), None, "{rest}");
-        }
-    }
-
-    #[test]
-    fn a_file_is_read_in_pieces_as_long_as_it_stays_the_same() {
-        let folder = std::env::temp_dir().join(format!("pendularm-report-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        let path = folder.join("a.csv");
-        let name = FileName::parse("a.csv").unwrap();
-        assert!(name.find(&folder).unwrap().is_none());
-        let begun = || {
-            fs::write(&path, "123456789").unwrap();
-            let mut file = name.find(&folder).unwrap().unwrap();
-            assert_eq!(file.length(), 9);
-            assert_eq!(file.next_piece(4).unwrap(), b"1234");
-            file
-        };
-        let mut file = begun();
-        assert_eq!(file.next_piece(4).unwrap(), b"5678");
-        assert_eq!(file.next_piece(4).unwrap(), b"9");
-        assert_eq!(file.next_piece(4).unwrap(), b"");
-        let mut longer = begun();
-        fs::write(&path, "1234567890").unwrap();
-        longer.next_piece(4).unwrap_err();
-        let mut newer = begun();
-        fs::write(&path, "abcdefghi").unwrap();
-        let later = newer.found.modified().unwrap() + std::time::Duration::from_secs(1);
-        let opened = fs::File::options().write(true).open(&path).unwrap();
-        opened.set_modified(later).unwrap();
-        newer.next_piece(4).unwrap_err();
-        let mut gone = begun();
-        fs::remove_file(&path).unwrap();
-        gone.next_piece(4).unwrap_err();
-        let mut folder_now = begun();
-        fs::remove_file(&path).unwrap();
-        fs::create_dir(&path).unwrap();
-        folder_now.next_piece(4).unwrap_err();
-        fs::remove_dir_all(&folder).unwrap();
+        Ok(Some(bytes))
     }
 }

@@ -1,161 +1,127 @@
 //! Answers over HTTP, each with the headers that keep a browser strict.
 //!
-//! **Invariant:** no byte of a request becomes part of a header; what a text repeats of one is plain text, and labelled
-//! so.
+//! **Invariant:** no byte of a request becomes part of a header. A text that repeats a part of a request is labelled as
+//! plain text.
 
-use std::borrow::Cow;
-use std::fmt::Write;
+use std::convert::Infallible;
+use std::fmt::Write as _;
+use std::pin::Pin;
+use std::task::{Context, Poll};
 
-/// A status code and its phrase.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HttpStatus {
-    /// Here it is.
-    Ok,
-    /// It is elsewhere.
-    MovedPermanently,
-    /// The request is not as it has to be.
-    BadRequest,
-    /// The request may not have that.
-    Forbidden,
-    /// There is no such thing.
-    NotFound,
-    /// Another method than GET.
-    MethodNotAllowed,
-    /// The head took too long.
-    RequestTimeout,
-    /// A WebSocket of another version.
-    UpgradeRequired,
-    /// The head is too long.
-    HeadTooLong,
-    /// Too many requests at once.
-    Unavailable,
-}
-
-impl HttpStatus {
-    const fn line(self) -> &'static str {
-        match self {
-            Self::Ok => "200 OK",
-            Self::MovedPermanently => "301 Moved Permanently",
-            Self::BadRequest => "400 Bad Request",
-            Self::Forbidden => "403 Forbidden",
-            Self::NotFound => "404 Not Found",
-            Self::MethodNotAllowed => "405 Method Not Allowed",
-            Self::RequestTimeout => "408 Request Timeout",
-            Self::UpgradeRequired => "426 Upgrade Required",
-            Self::HeadTooLong => "431 Request Header Fields Too Large",
-            Self::Unavailable => "503 Service Unavailable",
-        }
-    }
-}
+use bytes::Bytes;
+use hyper::body::{Body, Frame, SizeHint};
+use hyper::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
+    X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+};
+use hyper::{Response, StatusCode};
+use tokio::sync::OwnedSemaphorePermit;
 
 /// An answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct HttpResponse {
-    status: HttpStatus,
-    kind: &'static str,
-    policy: Cow<'static, str>,
-    /// How long a browser may keep it.
-    cache: &'static str,
-    /// Headers besides those that every answer has.
-    headers: Vec<(&'static str, String)>,
-    body: Cow<'static, [u8]>,
-}
+pub type HttpResponse = Response<AnswerBody>;
+
+const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
+const OPENER_POLICY: HeaderName = HeaderName::from_static("cross-origin-opener-policy");
 
 /// The policy of a text in a browser, which may do nothing.
 const NOTHING: &str = "default-src 'none'; frame-ancestors 'none'";
+/// Bytes that are handed to the library at a time.
+const PIECE: usize = 64 * 1024;
 
-/// Never: the next time it may be another.
-const NOT_KEPT: &str = "no-store";
-/// For ever, by that browser alone: its name stands for what is in it.
-const KEPT: &str = "private, max-age=31536000, immutable";
+/// A file, with its policy in a browser. No browser keeps it: the next time it may be another.
+#[must_use]
+pub fn file(kind: &'static str, policy: &str, body: impl Into<AnswerBody>) -> HttpResponse {
+    let mut response = Response::new(body.into());
+    for (name, value) in [
+        (CONTENT_TYPE, kind),
+        (CACHE_CONTROL, "no-store"),
+        (CONTENT_SECURITY_POLICY, policy),
+        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (REFERRER_POLICY, "no-referrer"),
+        (RESOURCE_POLICY, "same-origin"),
+        (OPENER_POLICY, "same-origin"),
+        (X_FRAME_OPTIONS, "DENY"),
+    ] {
+        set(&mut response, name, value);
+    }
+    response
+}
 
-impl HttpResponse {
-    /// A file, and what it may do in a browser.
-    #[must_use]
-    pub fn file(
-        kind: &'static str,
-        policy: impl Into<Cow<'static, str>>,
-        body: impl Into<Cow<'static, [u8]>>,
-    ) -> Self {
+/// A sentence to the client.
+#[must_use]
+pub fn text(status: StatusCode, sentence: &str) -> HttpResponse {
+    let body = Bytes::from(format!("{sentence}\n"));
+    let mut response = file("text/plain; charset=utf-8", NOTHING, body);
+    *response.status_mut() = status;
+    response
+}
+
+/// Sets a header, whose value is ours.
+pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
+    if let Ok(value) = HeaderValue::from_str(value) {
+        response.headers_mut().insert(name, value);
+    }
+}
+
+/// The bytes of a sentence to a client whose request was not read to its end. The connection is closed behind it.
+#[must_use]
+pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
+    let response = text(status, sentence);
+    let length = sentence.len() + 1;
+    let mut message =
+        format!("HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: {length}\r\n");
+    for (name, value) in response.headers() {
+        // A `String` takes whatever is written to it.
+        let value = value.to_str().unwrap_or_default();
+        let _ = write!(message, "{name}: {value}\r\n");
+    }
+    let _ = write!(message, "\r\n{sentence}\n");
+    message.into_bytes()
+}
+
+/// The body of an answer.
+pub struct AnswerBody {
+    bytes: Bytes,
+    /// The permit of a file.
+    _permit: Option<OwnedSemaphorePermit>,
+}
+
+impl From<Bytes> for AnswerBody {
+    fn from(bytes: Bytes) -> Self {
         Self {
-            status: HttpStatus::Ok,
-            kind,
-            policy: policy.into(),
-            cache: NOT_KEPT,
-            headers: Vec::new(),
-            body: body.into(),
+            bytes,
+            _permit: None,
         }
     }
+}
 
-    /// A sentence to whoever asked.
-    #[must_use]
-    pub fn text(status: HttpStatus, sentence: &str) -> Self {
+impl AnswerBody {
+    pub(super) fn of(file: Vec<u8>, permit: OwnedSemaphorePermit) -> Self {
         Self {
-            status,
-            kind: "text/plain; charset=utf-8",
-            policy: NOTHING.into(),
-            cache: NOT_KEPT,
-            headers: Vec::new(),
-            body: format!("{sentence}\n").into_bytes().into(),
+            bytes: file.into(),
+            _permit: Some(permit),
         }
     }
+}
 
-    /// The same with one more header, whose value is ours.
-    #[must_use]
-    pub fn with(mut self, name: &'static str, value: impl Into<String>) -> Self {
-        self.headers.push((name, value.into()));
-        self
+impl Body for AnswerBody {
+    type Data = Bytes;
+    type Error = Infallible;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
+        let piece = self.bytes.len().min(PIECE);
+        let piece = self.bytes.split_to(piece);
+        Poll::Ready((!piece.is_empty()).then(|| Ok(Frame::data(piece))))
     }
 
-    /// The same, to be kept for ever: what is at that path never changes.
-    #[must_use]
-    pub fn kept(mut self) -> Self {
-        self.cache = KEPT;
-        self
+    fn is_end_stream(&self) -> bool {
+        self.bytes.is_empty()
     }
 
-    /// The same with `body`, its own body packed by `deflate`.
-    #[must_use]
-    pub fn packed(mut self, body: &'static [u8]) -> Self {
-        self.body = body.into();
-        self.with("Content-Encoding", "deflate")
-    }
-
-    /// The sentence.
-    #[must_use]
-    pub fn body(&self) -> &[u8] {
-        &self.body
-    }
-
-    /// The head, which comes before the body; nothing comes after that, the connection is closed.
-    #[must_use]
-    pub fn head(&self) -> String {
-        self.head_of(self.body.len() as u64)
-    }
-
-    /// The head before another body, of so many bytes, that is sent instead of its own.
-    #[must_use]
-    pub fn head_of(&self, length: u64) -> String {
-        let Self {
-            status,
-            kind,
-            policy,
-            cache,
-            headers,
-            body: _,
-        } = self;
-        let mut head = format!(
-            "HTTP/1.1 {}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\
-             Cache-Control: {cache}\r\nContent-Security-Policy: {policy}\r\nX-Content-Type-Options: nosniff\r\n\
-             Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
-             Cross-Origin-Opener-Policy: same-origin\r\nX-Frame-Options: DENY\r\n",
-            status.line(),
-        );
-        for (name, value) in headers {
-            // Writing to a `String` cannot fail.
-            let _ = write!(head, "{name}: {value}\r\n");
-        }
-        head.push_str("\r\n");
-        head
+    fn size_hint(&self) -> SizeHint {
+        SizeHint::with_exact(self.bytes.len() as u64)
     }
 }

@@ -11,7 +11,8 @@ use pendularm::actors::gateway::connection::admission::{
     ATTEMPT_INTERVAL, Admission, FREE_ATTEMPTS, MAX_UNAUTHENTICATED,
 };
 use pendularm::actors::gateway::connection::{Connection, Ends};
-use pendularm::actors::gateway::limits::{HEAD_TIME, MAX_CONNECTIONS};
+use pendularm::actors::gateway::limits::{HEAD_TIME, KEPT_PLACES};
+use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::op::token::Token;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep, timeout};
@@ -197,12 +198,24 @@ fn clients_with_the_token_are_counted_apart_from_those_without() {
         let guarded = Guarded::new().await;
         let mut holders = Vec::new();
         let silent = guarded.silent(MAX_UNAUTHENTICATED);
-        for _ in 0..MAX_CONNECTIONS {
+        for _ in 0..DEFAULT_CLIENTS - KEPT_PLACES {
             holders.push(guarded.holder().await);
         }
         let mut late = guarded.connect();
         late.write_all(AUTH.as_bytes()).await.unwrap();
         assert!(rest(&mut late).await.contains("too many connections"));
+        // A command shows the token too, and has a kept place.
+        let mut command = guarded.connect();
+        let opening = AUTH.replace("}", ",\"command\":true}");
+        command.write_all(opening.as_bytes()).await.unwrap();
+        command.write_all(b"{\"op\":\"nonsense\"}\n").await.unwrap();
+        let mut answer = [0; 40];
+        command.read_exact(&mut answer).await.unwrap();
+        assert!(!String::from_utf8_lossy(&answer).contains("too many"));
+        assert_eq!(
+            guarded.connections(),
+            DEFAULT_CLIENTS as u64 - KEPT_PLACES as u64 + 1
+        );
         drop(silent);
     });
 }
@@ -282,7 +295,9 @@ fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
         assert!(rest(&mut client).await.starts_with("HTTP/1.1 403 "));
         assert_elapsed(began, 10 * ATTEMPT_INTERVAL);
         let mut client = guarded.connect();
-        let right = format!("GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n\r\n");
+        let right = format!(
+            "GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1:9095\r\nConnection: close\r\n\r\n"
+        );
         client.write_all(right.as_bytes()).await.unwrap();
         assert!(rest(&mut client).await.starts_with("HTTP/1.1 200 "));
         assert_elapsed(began, 10 * ATTEMPT_INTERVAL);

@@ -49,6 +49,7 @@ impl<const N: usize> IkBench<N> {
             time: 0.0,
             resets: 0,
             simulated: 0.0,
+            obstacle: None,
         }));
         let asked = Rc::default();
         let arm = StandIn {

@@ -28,7 +28,7 @@ async fn exchange(stream: &mut BufReader<TcpStream>) {
 #[test]
 fn accepted_clients_outlive_the_listening() {
     in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = socket.local_addr().unwrap();
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();
@@ -56,8 +56,8 @@ fn accepted_clients_outlive_the_listening() {
 #[test]
 fn a_port_in_use_is_an_error() {
     in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
-        assert!(bind(socket.local_addr().unwrap()).await.is_err());
+        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        assert!(bind(socket.local_addr().unwrap()).is_err());
     });
 }
 
@@ -66,7 +66,7 @@ fn a_port_in_use_is_an_error() {
 #[test]
 fn a_silent_client_is_asked_after_a_while_whether_it_is_there() {
     in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = socket.local_addr().unwrap();
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();

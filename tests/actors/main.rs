@@ -32,11 +32,11 @@ mod integration;
 #[path = "../support/json.rs"]
 mod json;
 mod listener;
+mod log_repeats;
 mod memory;
-mod memory_kinds;
 mod pacing;
+mod paths;
 #[cfg(feature = "record")]
-mod player;
 #[cfg(feature = "record")]
 mod recorder;
 mod registry;

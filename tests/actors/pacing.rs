@@ -13,10 +13,8 @@ use std::sync::Arc;
 use crate::system::in_real_time;
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::protocol::catalog::{Service, Topic};
-use pendularm::protocol::messages;
+use pendularm::protocol::catalog::Service;
 use serde_json::json;
 
 /// Subscribers: many more than are written to where the message is heard, and than have their turn at once.
@@ -86,37 +84,4 @@ fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
             assert_eq!(arrived.get(), SUBSCRIBERS);
         });
     }
-}
-
-#[test]
-fn a_message_of_the_arm_does_not_wait_behind_what_others_publish() {
-    in_real_time(async {
-        let gateway = Gateway::bare().await;
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let mut crowd = Vec::new();
-        for _ in 0..SUBSCRIBERS {
-            crowd.push(subscriber(&gateway, &listener, "/t").await);
-        }
-        let watcher = subscriber(&gateway, &listener, "/joint_states").await;
-        let mut publisher = gateway.connect(WIDE);
-        publisher.advertise("/t").await;
-        settle().await;
-        let has_come = |client: &TcpStream| client.peek(&mut [0]).is_ok();
-        let msg = json!({"data": "x".repeat(40_000)});
-        publisher
-            .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
-            .await;
-        while !crowd.iter().any(has_come) {
-            tokio::task::yield_now().await;
-        }
-        gateway.registry.do_send(Publish {
-            topic: Topic::JointStates,
-            frame: messages::publish("/joint_states", &json!({})).into(),
-        });
-        while !has_come(&watcher) {
-            tokio::task::yield_now().await;
-        }
-        let before = crowd.iter().filter(|client| has_come(client)).count();
-        assert!(before < SUBSCRIBERS, "all of them came first");
-    });
 }

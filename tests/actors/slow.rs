@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, settle};
-use pendularm::actors::gateway::limits::{FRAME_TIME, MAX_CONNECTIONS};
+use pendularm::actors::gateway::limits::{FRAME_TIME, KEPT_PLACES};
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::limits::MAX_FRAME;
 use serde_json::json;
@@ -120,7 +121,7 @@ fn slow_clients_are_bounded_in_number_and_give_their_places_back() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let began = Instant::now();
-        let mut slow: Vec<Peer> = (0..MAX_CONNECTIONS)
+        let mut slow: Vec<Peer> = (0..DEFAULT_CLIENTS - KEPT_PLACES)
             .map(|_| gateway.connect(1024))
             .collect();
         for client in &mut slow {

@@ -68,7 +68,7 @@ class Reconnecting(PageTest):
         self.assertTrue(self.page.run("document.querySelector('#verdict-pill').hidden"))
         self.assertEqual(self.page.text("#verdict"), "")
         self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
-        for field, typed in ((setpoint, "1"), ("#timestep-field input[type=number]", "0.002")):
+        for field, typed in ((setpoint, "1"), ("#timestep-field input[type=number]", "2")):
             self.page.fill(field, typed)
         refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal')].map((one) => one.textContent).filter(Boolean)"
         self.page.until(f"{refused}.length === 2")

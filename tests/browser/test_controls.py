@@ -51,6 +51,42 @@ class Controls(PageTest):
         self.wait(lambda: math.dist(self.runtime.end_effector(), (-0.4, 1.3)) < 0.02, "end effector at the setpoint")
         self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
 
+    def choose_drag(self, mode):
+        self.page.run(f"document.querySelector('input[name=drag][value={mode}]').click()")
+
+    def test_the_arm_is_lifted_held_and_let_go(self):
+        self.choose_drag("arm")
+        start, end = self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2))
+        self.page.mouse("mousePressed", *start)
+        self.page.mouse("mouseMoved", *end)
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (0.7, 1.2)) < 0.1, "the arm is where the pointer is")
+        began = self.time()
+        self.wait(lambda: self.time() > began + 0.5, "half a second passes")
+        self.assertLess(math.dist(self.runtime.end_effector(), (0.7, 1.2)), 0.2, "a pointer that rests holds the arm")
+        self.page.mouse("mouseReleased", *end)
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (0.7, 1.2)) > 0.5, "nothing holds it any longer")
+
+    def test_a_paused_arm_is_lifted_and_stays_at_rest(self):
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.choose_drag("arm")
+        self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)))
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (-0.4, 1.3)) < 0.01, "the arm is where the drag ended")
+        self.assertEqual(self.runtime.next("/joint_states")["velocity"], [0, 0])
+        self.assertTrue(self.values("/arm_sim/pause")["data"])
+        # Beyond the reach it points at the pointer.
+        self.page.drag(self.on_canvas((0.0, 1.9)), self.on_canvas((0.0, 2.2)))
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (0, 2)) < 0.01, "the arm is stretched")
+
+    def test_arrow_keys_lift_the_arm_where_that_is_chosen(self):
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.runtime.call("/arm_sim/reset")
+        self.page.until("own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.9999)", why="the page has seen the reset")
+        self.choose_drag("arm")
+        self.page.run("document.querySelector('#arm').focus()")
+        self.page.key("ArrowLeft")
+        self.page.key("ArrowLeft")
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (1.9, 0)) < 0.001, "0.05 m with each key")
+
     def test_a_target_out_of_reach_is_refused_in_words(self):
         self.page.drag(self.on_canvas((1.5, 0.0)), self.on_canvas((2.2, 0.3)))
         refusal = self.page.until("document.querySelector('#goal-body .refusal').textContent", why="refusal shown")
@@ -80,7 +116,7 @@ class Controls(PageTest):
 
     def test_settings_reach_the_runtime_and_show_what_it_took(self):
         self.page.click("input[value=euler]")
-        self.page.fill(self.field("timestep-field"), "0.002")
+        self.page.fill(self.field("timestep-field"), "2")
         self.wait(lambda: self.values("/arm_sim/set_integrator") == {"method": "euler", "timestep": 0.002}, "integrator")
         self.page.fill(self.field("masses-fields", 2), "2.5")
         self.page.fill(self.field("lengths-fields", 1), "0.8")
@@ -92,6 +128,27 @@ class Controls(PageTest):
             before[gain][joint - 1] = value
         self.wait(lambda: self.values("/pid_controller/set_gains") == before, "gains")
         self.page.until("document.querySelector('#out-timestep').textContent === '2 ms'")
+
+    def test_the_control_period_is_set_beside_the_timestep_and_can_be_undone(self):
+        slider = "document.querySelector('#period-field input[type=range]')"
+        self.page.until(f"{slider}.getAttribute('aria-valuetext') === 'every step'")
+        self.page.fill(self.field("period-field"), "20")
+        self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0.02, "control period")
+        self.page.until("!document.querySelector('#undo').disabled")
+        self.page.click("#undo")
+        self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0, "undone")
+        self.page.click("#servo")
+        self.page.until(f"{slider}.getAttribute('aria-valuetext').startsWith('every step, stable up to ')")
+        self.keep("clocks")
+        marks = self.page.run("[...document.querySelectorAll('#timestep-field .mark, #period-field .mark')].map((one) => one.getBoundingClientRect().x)")
+        self.assertEqual(len(marks), 2)
+        self.assertAlmostEqual(*marks, delta=1, msg="the same limit is at the same place of both sliders")
+        self.page.fill(self.field("period-field"), "20")
+        self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0.02, "control period")
+        self.page.until("document.querySelector('#period-text').textContent === '20 steps, 20 ms'")
+        self.page.until("document.querySelector('#notice').textContent.startsWith('A control period of 20 ms is above the limit')")
+        self.page.run("[...document.querySelectorAll('#notice button')].find((one) => one.textContent === 'Control at every step').click()")
+        self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0, "every step")
 
     def test_a_preset_and_a_slider_set_gravity(self):
         self.page.click("#gravity-places button:nth-of-type(2)")
@@ -109,7 +166,7 @@ class Controls(PageTest):
 
     def test_a_refusal_is_shown_beside_its_field_which_goes_back(self):
         for field, wrong, service, shown in (
-            ("masses-fields", "-2", "/arm_sim/set_params", "1"), ("timestep-field", "0", "/arm_sim/set_integrator", "0.001"),
+            ("masses-fields", "-2", "/arm_sim/set_params", "1"), ("timestep-field", "0", "/arm_sim/set_integrator", "1"),
             ("kp-fields", "-1", "/pid_controller/set_gains", "1000"), ("gravity-field", "-9", "/arm_sim/set_params", "9.81"),
         ):
             before = self.values(service)
@@ -122,7 +179,7 @@ class Controls(PageTest):
         self.keep("refusals", whole=True)
         self.page.fill(self.field("masses-fields"), "2")
         self.page.until("document.querySelector('#masses-fields .refusal').textContent === ''")
-        self.page.fill(self.field("timestep-field"), "0.001")
+        self.page.fill(self.field("timestep-field"), "1")
         self.page.until("document.querySelector('#timestep-field .refusal').textContent === ''", why="it is in force already")
         self.runtime.call("/arm_sim/set_params", gravity=3)
         self.page.until("document.querySelector('#gravity-field .refusal').textContent === ''", why="somebody else has changed it")
@@ -180,7 +237,7 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#out-servo').textContent === 'on'")
         limit = self.runtime.call("/study/stability")["values"]["timestep_limit_held"]
         self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#limit-bar').className === 'limit-bar good'")
+        self.page.until("!document.querySelector('#timestep-field .mark').hidden")
         self.runtime.call("/arm_sim/set_integrator", timestep=2 * limit)
         self.page.until("document.querySelector('#notice').textContent.includes('is above the limit')")
         self.page.until("document.querySelector('#out-limit').classList.contains('bad')")

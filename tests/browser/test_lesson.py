@@ -55,9 +55,9 @@ class Ways(Lesson):
         self.page.click("#pause")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.fill(f"#timestep-field {NUMBER}", "-1")
-        self.page.until("document.querySelector('#timestep-field .refusal').textContent.includes('got -1')")
+        self.page.until("document.querySelector('#timestep-field .refusal').textContent.includes('got -0.001')")
         self.assertTrue(self.page.run("document.querySelector('#undo').disabled"))
-        self.page.fill(f"#timestep-field {NUMBER}", "0.002")
+        self.page.fill(f"#timestep-field {NUMBER}", "2")
         self.page.until("!document.querySelector('#undo').disabled")
         self.page.click("#undo")
         self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] == 0.001, "undone")
@@ -151,6 +151,7 @@ class Defaults(Lesson):
         present = {
             "integrator": self.values("/arm_sim/set_integrator"), "params": self.values("/arm_sim/set_params"),
             "gains": self.values("/pid_controller/set_gains"), "servo": self.values("/pid_controller/enable")["data"],
+            "period": {key: value for key, value in self.values("/pid_controller/set_period").items() if key != "effective_period"},
         }
         self.assertEqual(self.page.run(f"own('settings.js').then(({{ DEFAULTS }}) => DEFAULTS[{self.links}])"), {**present, "setpoint": [0] * self.links})
 

@@ -100,7 +100,7 @@ class BlowUp(Lesson):
         inside = self.page.until("document.querySelector('#circle-text').textContent.includes('within the circle') && document.querySelector('#circle-text').textContent")
         self.assertIn("1 ms", inside)
         before = self.image("#circle").count(self.color("bad"))
-        self.page.fill(f"#timestep-field {NUMBER}", "0.006")
+        self.page.fill(f"#timestep-field {NUMBER}", "6")
         self.page.until("document.querySelector('#circle-text').textContent.includes('grows, flipping its sign at every step')")
         self.assertGreater(self.image("#circle").count(self.color("bad")), before + 20)
         self.keep("modes")

@@ -10,8 +10,8 @@ use proc_macro2::{TokenStream, TokenTree};
 
 use crate::tree::{files_in, rust_files};
 
-/// Longest file, in lines: more than can be taken in at one sitting.
-const MAX_LINES: usize = 400;
+/// Longest file, in lines.
+const MAX_LINES: usize = 800;
 /// Folders of what is kept as source, tests and tools too, and the extensions of its languages.
 const FOLDERS: [&str; 9] = [
     "src", "tests", "benches", "fuzz", "client", "python", "ros2", "page", "scripts",
@@ -22,8 +22,6 @@ const MAX_WIDTH: usize = 120;
 
 /// In this file each link has a tip, of which one at most is the end effector.
 const LINKS_HAVE_TIPS: &str = "math/dynamics/articulated_body.rs";
-/// Words that a sentence about code does well without: who begins with one has to be read twice.
-const DANGLING: [&str; 6] = ["What", "Whatever", "Whoever", "Of", "That", "Those"];
 /// Names for which the field or the house has a better one.
 const NAMES: [&str; 10] = [
     "told", "Owed", "owe", "Settle", "Desk", "by_hand", "ByHand", "hand", "tip", "Tip",
@@ -96,37 +94,6 @@ fn nobody_reaches_three_floors_up() {
     for (path, text) in source() {
         assert!(!text.contains("super::super::super"), "{path}");
     }
-}
-
-#[test]
-fn comments_are_sentences_that_begin_with_their_subject_or_their_verb() {
-    let mut dangling = Vec::new();
-    let folders = [
-        "src", "tests", "client", "benches", "fuzz", "python", "ros2",
-    ];
-    for path in folders.into_iter().flat_map(rust_files) {
-        let text = fs::read_to_string(&path).unwrap();
-        let path = path.display();
-        let mut before = "";
-        for (number, line) in (1..).zip(text.lines()) {
-            let line = line.trim_start();
-            // The first line of a comment, or the first behind an empty one.
-            let comment = line
-                .strip_prefix("//")
-                .map(|rest| rest.trim_start_matches(['/', '!']));
-            let opens =
-                !before.starts_with("//") || before.trim_matches(['/', '!', ' ']).is_empty();
-            before = line;
-            if let Some(first) = comment
-                .filter(|_| opens)
-                .and_then(|text| words(text.trim()).next())
-                && DANGLING.contains(&first)
-            {
-                dangling.push(format!("{path}:{number}: {line}"));
-            }
-        }
-    }
-    assert_none("comments that dangle", &dangling);
 }
 
 /// Every name in the code, of macros' arguments too; text and comments are none.

@@ -9,8 +9,7 @@ use pendularm::math::dynamics::{self, forward_dynamics};
 use pendularm::math::integrator::Method;
 use pendularm::math::number::Registers;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
-use pendularm::math::simulation::batch;
+use pendularm::math::simulation::{ControlPeriod, Simulation, batch};
 
 /// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.
 const FAR: [f64; 5] = [1.9e5, 2.1e5, 1e9, 1e16, 1e300];
@@ -43,7 +42,7 @@ fn any_state<const N: usize>(rng: &mut Rng) -> State<N> {
     state
 }
 
-/// An arm of any kind, anywhere in its life: weightless, wound up, pushed, off, about to diverge, or diverged.
+/// An arm of any kind, anywhere in its life: weightless, wound up, pushed, off, commanded, driven, sampled, about to diverge, or diverged.
 fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     let gravity = if rng.u32(..3) == 0 { 0.0 } else { 9.81 };
     let arm = Arm::new(
@@ -62,6 +61,12 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     simulation.set_timestep(of_any_size(rng, 1e-5, 0.5));
     simulation.set_state(any_state(rng));
     simulation.enable(rng.bool());
+    if rng.bool() {
+        simulation.set_control_period(ControlPeriod {
+            period: simulation.timestep() * between(rng, 0.0, 12.0),
+            delay: rng.bool(),
+        });
+    }
     simulation.set_setpoint(Setpoint {
         position: each(|| between(rng, -TAU, TAU)),
         velocity: each(|| between(rng, -1.0, 1.0)),
@@ -70,6 +75,13 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     simulation.advance(rng.u64(..3));
     if rng.bool() {
         simulation.set_timestep(of_any_size(rng, 1e-5, 1e-2));
+    }
+    match rng.u32(..8) {
+        0 => simulation.drive(Some(each(|| between(rng, -20.0, 20.0)))),
+        1 if !simulation.pid().is_enabled() => {
+            simulation.set_command(each(|| between(rng, -20.0, 20.0)));
+        }
+        _ => {}
     }
     if rng.u32(..3) == 0 {
         let duration = simulation.timestep() * between(rng, 0.1, 40.0);
@@ -162,7 +174,7 @@ fn an_observer_sees_what_it_sees_of_an_arm_that_is_stepped_alone_and_may_end_it(
     let mut rng = Rng::with_seed(2);
     for registers in Registers::all() {
         let mut ended = 0;
-        for count in [1, 2, 7, 33, 200] {
+        for count in [1, 2, 7, 33, 200, 50] {
             ended += compare_observed::<2>(registers, &mut rng, count);
             ended += compare_observed::<3>(registers, &mut rng, count);
         }

@@ -43,17 +43,21 @@ fn check_divergence<const N: usize>(gains: Gains<N>, method: Method) {
         }
     );
 
-    // Nothing but a reset sets it going again.
+    // Nothing but a reset or another state sets it going again.
     let held = simulation.clone();
     assert!(!simulation.step());
     assert_eq!(simulation.advance(1000), 0);
     assert_eq!(simulation, held);
     simulation.enable(false);
     simulation.set_timestep(1e-4);
-    simulation.set_state(State::rest());
     assert!(!simulation.step());
     assert_eq!(simulation.divergence(), Some(divergence));
     assert_eq!(simulation.time(), divergence.time);
+    let mut put = simulation.clone();
+    put.set_state(State::rest());
+    assert_eq!(put.divergence(), None);
+    assert_eq!(put.time(), divergence.time);
+    assert_eq!(put.advance(1000), 1000);
     simulation.reset();
     assert_eq!(simulation.divergence(), None);
     assert_eq!(simulation.advance(1000), 1000);

@@ -2,6 +2,7 @@
 //! somebody follows is told rightly.
 
 use pendularm::math::arm::State;
+use pendularm::math::goal::{Dwell, SUCCESS_HOLD};
 use pendularm::math::trajectory::{Course, JointPath, PathError, Standing, Tolerance, Waypoint};
 
 const START: Waypoint<2> = Waypoint {
@@ -130,14 +131,18 @@ fn ways_that_overflow_are_no_path() {
 
 #[test]
 fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
-    let course = Course {
+    let mut course = Course {
         path: JointPath::new(START, vec![straight(1.0, [0.5, 0.5])]).unwrap(),
         on_the_way: Tolerance {
             position: [Some(0.1), None],
             velocity: [None, Some(2.0)],
         },
-        at_the_end: Tolerance::of_positions(Some(0.01)),
+        at_the_end: Tolerance {
+            position: [Some(0.01); 2],
+            velocity: [Some(1.0), None],
+        },
         patience: 0.5,
+        dwell: Dwell::default(),
     };
     let at = |position: [f64; 2], velocity: [f64; 2]| State { position, velocity };
     let rest = [0.0, 0.0];
@@ -157,10 +162,6 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
         panic!("joint 2 is too fast");
     };
     assert_eq!((excess.quantity, excess.joint), ("velocity", 1));
-    assert_eq!(
-        course.judge(1.0, &at([0.5, 0.505], [9.0, 9.0])),
-        Standing::Arrived
-    );
     assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Underway);
     assert!(matches!(
         course.judge(1.6, &at([0.5, 0.6], rest)),
@@ -170,4 +171,26 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
         course.judge(0.5, &at([f64::NAN, 0.0], rest)),
         Standing::OffPath(_)
     ));
+
+    // Arrived is a joint that stays: one that passes through is late.
+    let there = [0.5, 0.505];
+    for (time, speed, standing) in [
+        (2.0, 0.9, Standing::Underway),
+        (2.0 + SUCCESS_HOLD, 0.9, Standing::Arrived),
+        (3.0, 0.9, Standing::Arrived),
+    ] {
+        assert_eq!(course.judge(time, &at(there, [speed, 9.0])), standing);
+    }
+    let Standing::Late(excess) = course.judge(3.0, &at(there, [1.1, 9.0])) else {
+        panic!("joint 1 moves");
+    };
+    assert_eq!((excess.quantity, excess.joint), ("velocity", 0));
+    assert_eq!(course.judge(3.1, &at(there, rest)), Standing::Underway);
+    course.patience = f64::INFINITY;
+    assert_eq!(course.judge(1e300, &at([9.0; 2], rest)), Standing::Underway);
+    course.at_the_end = Tolerance {
+        position: [None; 2],
+        velocity: [None; 2],
+    };
+    assert_eq!(course.judge(1.0, &at([9.0; 2], rest)), Standing::Arrived);
 }

@@ -8,6 +8,7 @@ import { growthOf, growthRate } from "../../page/growth.js";
 import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, uncertaintyOf } from "../../page/ladder.js";
 import { record, take } from "../../page/history.js";
 import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/runs.js";
+import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
 import { state } from "../../page/store.js";
@@ -85,6 +86,19 @@ test("Euler's free swing doubles its energy in seconds, midpoint's hardly ever",
   assert.match(growthOf(arm("euler", 0.001)), /doubles every [\d.]+ s/);
   assert.match(growthOf(arm("midpoint", 0.001)), /nothing within an hour/);
   assert.equal(growthOf(arm("rk4", 0.001)), "");
+});
+
+test("a place out of reach gives way to the nearest one within", () => {
+  const near = (place, lengths, expected) => {
+    const found = nearestInReach(place, lengths);
+    assert.ok(Math.hypot(found.x - expected.x, found.y - expected.y) < 1e-12, JSON.stringify(found));
+  };
+  near({ x: 0.3, y: -0.4 }, [1, 1], { x: 0.3, y: -0.4 });
+  near({ x: 3, y: 4 }, [1, 1], { x: 1.2, y: 1.6 });
+  // Links of 2 m and 0.5 m leave a hole of 1.5 m around the base.
+  near({ x: 0, y: -1 }, [2, 0.5], { x: 0, y: -1.5 });
+  near({ x: 0, y: 0 }, [2, 0.5], { x: 1.5, y: 0 });
+  near({ x: 0, y: 0 }, [1, 1, 1], { x: 0, y: 0 });
 });
 
 test("a file holds its settings, and what is not finite is empty", () => {

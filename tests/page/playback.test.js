@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
 import { advance, follow, goLive, play, seek, shown, span, stepBy } from "../../page/playback.js";
-import { forgetFrom, record, take } from "../../page/history.js";
+import { record, take } from "../../page/history.js";
 import { state } from "../../page/store.js";
 
 /** A joint that moves as t³, sampled ten times a second through two seconds. */
@@ -66,23 +66,4 @@ test("while the recording is looked at the arm goes on unseen", () => {
   assert.equal(shown.position[0], 1);
   goLive();
   assert.equal(shown.position[0], 77);
-});
-
-test("a record that goes back keeps what was before, also where the ring has gone round", () => {
-  for (let k = 0; k < 2; k += 1) {
-    forgetFrom(1);
-    assert.deepEqual(span(), { from: 0, to: 0.9 });
-    state.time = 1;
-    take();
-    assert.deepEqual(span(), { from: 0, to: 1 });
-  }
-  for (let k = 0; k < record.capacity; k += 1) {
-    state.time = 2 + k / 10;
-    take();
-  }
-  const { from, to } = span();
-  forgetFrom(to - 0.05);
-  assert.equal(span().from, from);
-  assert.ok(Math.abs(span().to - (to - 0.1)) < 1e-9);
-  assert.equal(record.length, record.capacity - 1);
 });

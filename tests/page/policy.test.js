@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { adviceText, answerInForce, energyName, limitInForce, motionHasChanged, question, verdict, worstText } from "../../page/policy.js";
+import { adviceText, answerInForce, controlPeriodLimit, energyName, limitInForce, motionHasChanged, periodText, question, verdict, worstText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -14,7 +14,7 @@ function arm(changed = {}) {
   const state = {
     connection: "open", links: 2, enabled: true, setpointKnown: true, setpoint: Float64Array.of(0.9, -1.3, 0),
     integrator: { method: "rk4", timestep: 0.001 }, params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
-    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, diagnostics: { state: "running" }, stability: VALUES, ...changed,
+    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false }, diagnostics: { state: "running" }, stability: VALUES, ...changed,
   };
   return { ...state, stabilityAsked: changed.stabilityAsked ?? JSON.stringify(question(state)) };
 }
@@ -107,6 +107,45 @@ test("without a study the diagnostics' limit is used", () => {
   assert.equal(said.kind, "beyond");
 });
 
+const sampled = (period, changed = {}) => arm({ period: { period, effective_period: period, delay: false }, ...changed });
+
+test("a control period that is too long is unstable, however short the timestep", () => {
+  const said = verdict(sampled(0.02));
+  assert.deepEqual([said.kind, said.slow], ["beyond", true]);
+  assert.match(said.sentence, /^A control period of 20 ms is above the limit 13\.6 ms, at the setpoint/);
+  assert.ok(Number.isNaN(said.advised), "no smaller timestep helps");
+  const here = verdict(sampled(0.006));
+  assert.equal(here.kind, "here");
+  assert.match(here.sentence, /^A control period of 6 ms is stable at the setpoint/);
+  assert.equal(verdict(sampled(0.004)).kind, "stable");
+});
+
+test("a control period below the timestep, or without a controller, changes nothing", () => {
+  for (const state of [sampled(0.0001), sampled(0.0014)]) assert.deepEqual(verdict(state), verdict(arm()));
+  assert.deepEqual(verdict(sampled(0.02, { enabled: false })), verdict(arm({ enabled: false })));
+});
+
+test("the limit of the control period is the answer's own, or the timestep's where the answer names none", () => {
+  assert.equal(controlPeriodLimit(arm()), VALUES.timestep_limit_held);
+  assert.equal(controlPeriodLimit(arm({ stability: { ...VALUES, control_period_limit: 0.012 } })), 0.012);
+  assert.equal(controlPeriodLimit(arm({ stability: { ...VALUES, control_period_limit: null } })), Infinity);
+  assert.ok(Number.isNaN(controlPeriodLimit(arm({ enabled: false }))));
+});
+
+test("with a delay the limit is not known unless the answer names it", () => {
+  const delayed = { period: { period: 0, effective_period: 0.001, delay: true } };
+  assert.equal(verdict(arm(delayed)).kind, "unknown");
+  assert.equal(verdict(arm({ ...delayed, stability: { ...VALUES, control_period_limit: 0.0008 } })).kind, "beyond");
+});
+
+test("how often the control law runs is said in steps and in time", () => {
+  assert.equal(periodText(arm()), "");
+  assert.equal(periodText(sampled(0.0101)), "10 steps, 10 ms");
+  const delayed = { period: 0.01, effective_period: 0.01, delay: true };
+  assert.equal(periodText(arm({ period: delayed })), "10 steps, 10 ms, delayed");
+  assert.equal(periodText(arm({ period: null })), "");
+});
+
 test("energy drifts only if nothing puts any in", () => {
   assert.equal(energyName({ enabled: false, pushed: false }), "drift");
   assert.equal(energyName({ enabled: true, pushed: false }), "work done");
@@ -115,13 +154,14 @@ test("energy drifts only if nothing puts any in", () => {
 
 test("the pose that bears least is named, with how surely it is known and what shakes there", () => {
   const answer = {
-    ...VALUES, worst_pose: [0, 0.5], certified: true, minimum_over_poses_bound: 0.0043,
+    ...VALUES, worst_pose: [0, 0.5], certified: true, bound_is_proven: true, minimum_over_poses_bound: 0.0043,
     critical: { growth_per_step: 1.214, frequency: 105.3, joint: 1 },
   };
   assert.equal(worstText(answer), "The pose that bears least, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
     + "10 % beyond it joint 2 moves most, at 105 Hz, 1.21 times further at every step.");
   assert.match(worstText({ ...answer, certified: false }), /\(the least that a search found; proven is 4\.3 ms\)/);
-  assert.match(worstText({ ...answer, certified: false, minimum_over_poses_bound: null }), /search found, not proven/);
+  assert.match(worstText({ ...answer, bound_is_proven: false }), /4\.32 ms \(bounded by an estimate to 1 %\)/);
+  assert.match(worstText({ ...answer, certified: false, minimum_over_poses_bound: null }), /search found, without a bound/);
   assert.match(worstText({ ...answer, critical: { ...answer.critical, frequency: 0 } }), /without swinging/);
 });
 

@@ -81,7 +81,7 @@ test("a median is not moved by one wild reading, and forgets", () => {
 
 test("settings survive a link", () => {
   for (const links of [2, 3]) {
-    const settings = { ...DEFAULTS[links], setpoint: [0.1 + 0.2, -1e-9, 3].slice(0, links), servo: true };
+    const settings = { ...DEFAULTS[links], period: { period: 0.0021, delay: true }, setpoint: [0.1 + 0.2, -1e-9, 3].slice(0, links), servo: true };
     assert.deepEqual(fromFragment(`#${toFragment(settings, links)}`), settings);
   }
 });

@@ -296,3 +296,48 @@ fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
         assert_eq!(untyped.as_ref(), made, "{missing}");
     }
 }
+
+/// One message in both spellings, of stamps and of durations, at any depth: the same bytes.
+#[test]
+fn stamps_and_durations_are_read_under_their_names_of_ros_1_too() {
+    let spelled = |sec: &str, nanosec: &str| {
+        let time = |s: i64, ns: u64| json!({sec: s, nanosec: ns});
+        let point = json!({"positions": [1.0], "time_from_start": time(-3, 4)});
+        let header = json!({"stamp": time(1, 2), "frame_id": "f"});
+        [
+            (
+                "trajectory_msgs/JointTrajectory",
+                json!({"header": header, "points": [point, point]}),
+            ),
+            ("sensor_msgs/msg/JointState", json!({"header": header})),
+            (
+                "tf2_msgs/TFMessage",
+                json!({"transforms": [{"header": header}]}),
+            ),
+            ("rosgraph_msgs/msg/Clock", json!({"clock": time(7, 8)})),
+            ("builtin_interfaces/msg/Duration", json!({nanosec: 9})),
+            (
+                "std_msgs/msg/Header",
+                json!({"stamp": {sec: 5}, "frame_id": "f"}),
+            ),
+        ]
+    };
+    for ((type_name, ros2), (_, ros1)) in spelled("sec", "nanosec")
+        .into_iter()
+        .zip(spelled("secs", "nsecs"))
+    {
+        let raw = publish_raw("/t", type_name, &ros2);
+        assert_eq!(publish_raw("/t", type_name, &ros1), raw, "{type_name}");
+        assert!(raw.is_some(), "{type_name}");
+        let cbor = publish("/t", Some(type_name), &ros2);
+        assert_eq!(publish("/t", Some(type_name), &ros1), cbor, "{type_name}");
+    }
+    // Where both are there, the names of ROS 2 count, and CBOR keeps both.
+    let both = json!({"sec": 1, "nanosec": 2, "secs": 3, "nsecs": 4});
+    let raw = |msg: &Value| publish_raw("/t", "builtin_interfaces/msg/Time", msg);
+    assert_eq!(raw(&both), raw(&json!({"sec": 1, "nanosec": 2})));
+    let parts = ["nanosec", "nsecs", "sec", "secs"].map(text);
+    let [nanosec, nsecs, sec, secs] = parts.each_ref().map(Vec::as_slice);
+    let expected = [&[0xa4], nanosec, &[2], nsecs, &[4], sec, &[1], secs, &[3]].concat();
+    assert_eq!(typed("builtin_interfaces/msg/Time", both), expected);
+}

@@ -138,8 +138,6 @@ pub struct Honest {
     pub is_excused: bool,
     /// It has not been reading for a while, so what comes may come late, and some of it not at all.
     pub is_hampered: bool,
-    /// It has been told that it held the most: its connection ends, and nothing is owed to it any more.
-    pub was_cut_off: bool,
     /// When it reads again.
     pub stalled_until: Option<Instant>,
     /// It has shut down its writing side.
@@ -169,7 +167,6 @@ impl Honest {
             mistakes: 0,
             is_excused: false,
             is_hampered: false,
-            was_cut_off: false,
             stalled_until: None,
             has_finished: false,
         };

@@ -17,8 +17,8 @@ use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
-use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::resources::work_clock;
 use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use pendularm::math::arm::Arm;
@@ -53,8 +53,8 @@ pub fn in_virtual_time<T>(course: impl Future<Output = T>) -> T {
     system.block_on(course)
 }
 
-/// Bytes that all clients together may hold in a world with little room: one that holds more than is modest has to give way, soon.
-pub const SCARCE: usize = 400 << 10;
+/// Room for one long frame at a time, and for long answers of so many bytes, where room is scarce.
+const SCARCE: (usize, usize) = (1, 1 << 20);
 
 pub struct World {
     pub registry: Addr<Registry>,
@@ -69,7 +69,7 @@ pub struct World {
 impl World {
     pub async fn start(court: &Rc<Court>, links: usize, is_scarce: bool, seed: u64) -> Self {
         let memory = if is_scarce {
-            Memory::of(SCARCE)
+            Memory::of(SCARCE.0, SCARCE.1)
         } else {
             Memory::default()
         };
@@ -162,13 +162,13 @@ impl World {
     }
 
     /// Bytes that all clients together hold.
-    pub fn held(&self) -> usize {
-        self.gauges.memory().held()
+    pub fn taken(&self) -> usize {
+        self.gauges.memory().taken()
     }
 
     /// Whether nobody is connected, nothing is held for anybody, and nothing is computed.
     pub fn is_empty(&self) -> bool {
-        self.gauges.connections() == 0 && self.held() == 0 && self.pool.is_idle()
+        self.gauges.connections() == 0 && self.taken() == 0 && self.pool.is_idle()
     }
 }
 
@@ -218,6 +218,7 @@ where
         params: tap.clone().recipient(),
         gains: tap.clone().recipient(),
         integrator: tap.clone().recipient(),
+        period: arm.clone().recipient(),
         time: tap.clone().recipient(),
     };
     let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();

@@ -39,9 +39,9 @@ fn carried_rounding_hardly_moves_energy_and_plain_sums_walk() {
         end(&plain),
         end(&carried)
     );
-    // A random walk has 1/2; one of its kind is off by some tenths.
-    let law = law(&plain).unwrap();
-    assert!((0.1..1.1).contains(&law), "{law}");
+    // A random walk has 1/2; a decade of one is off by some tenths, and no two decades agree.
+    let (least, most) = law(&plain).unwrap();
+    assert!(0.0 <= least && least < most && most < 1.5, "{least} {most}");
 }
 
 #[test]

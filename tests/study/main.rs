@@ -17,6 +17,7 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
+mod clocks;
 mod equilibrium;
 mod error;
 mod experiments;
@@ -29,6 +30,7 @@ mod motion;
 mod planner;
 mod poses;
 mod properties;
+mod recomputed;
 mod reference;
 mod report;
 mod review;

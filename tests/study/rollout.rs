@@ -63,6 +63,40 @@ fn halving_the_timestep_divides_the_error_by_two_to_the_order() {
     }
 }
 
+/// A run has the number of steps nearest to its duration, and its samples are at the nearest steps too.
+#[test]
+fn a_run_has_the_nearest_number_of_steps() {
+    let times = |duration, timestep, samples| {
+        let rollout = run(RolloutRequest {
+            control: swing().control.with_timestep(timestep),
+            duration,
+            samples,
+            reference: false,
+            ..swing()
+        });
+        let in_steps = rollout.times().iter().map(|time| time / timestep);
+        in_steps.map(f64::round).collect::<Vec<_>>()
+    };
+    for (duration, timestep, steps) in [
+        (1.0, 0.6, 2.0),
+        (1.0, 0.3, 3.0),
+        (1.0, 0.4, 3.0),
+        (0.3, 0.2, 2.0),
+        (0.3, 0.1, 3.0),
+        (0.1 + 0.2, 0.1, 3.0),
+        (0.1 + 0.7, 0.1, 8.0),
+        (0.7, 0.1 + 0.2 + 0.1, 2.0),
+        (1.0, 0.001, 1000.0),
+        (1.0 - 1e-16, 1.0, 1.0),
+    ] {
+        assert_eq!(times(duration, timestep, 2), [0.0, steps]);
+    }
+    assert_eq!(times(0.1, 0.01, 4), [0.0, 3.0, 7.0, 10.0]);
+    assert_eq!(times(0.5, 0.1, 3), [0.0, 3.0, 5.0]);
+    // More samples than steps: one a step.
+    assert_eq!(times(0.3, 0.1, MAX_SAMPLES), [0.0, 1.0, 2.0, 3.0]);
+}
+
 /// The two references agree to rounding: a second of this motion amplifies errors some ten times.
 #[test]
 fn the_references_agree_to_rounding() {
@@ -177,8 +211,9 @@ fn a_run_in_slices_gives_the_same_bits_as_one_made_at_once() {
 #[test]
 fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
     const WORK: u64 = 1000;
-    // A step of the run and one of each reference: 4 evaluations, and twice 22 coefficients.
-    const LOOK: u64 = 4 + 2 * 22;
+    // A step of the run, one of each reference and one of each ideal loop: 4 evaluations, twice 22 coefficients, and
+    // twice 4 evaluations.
+    const LOOK: u64 = 4 + 2 * 22 + 2 * 4;
     for request in [swing(), reach()] {
         let mut wild = request;
         wild.control.timestep = 0.5;
@@ -202,25 +237,6 @@ fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
         assert_eq!(whole.positions(), sliced.positions());
         assert_eq!(whole.deviation(), sliced.deviation());
     }
-}
-
-#[test]
-fn samples_are_spread_evenly_over_whole_steps() {
-    let rollout = run(RolloutRequest {
-        duration: 0.1,
-        samples: 4,
-        ..swing()
-    });
-    let times: Vec<f64> = rollout.times().to_vec();
-    assert_eq!(times, [0.0, 0.03, 0.06, 0.1]);
-    // More samples than there are: one a step. 0.3 s hold three steps of 0.1 s, although 0.3 / 0.1 falls short of 3.
-    let rollout = run(RolloutRequest {
-        duration: 0.3,
-        control: swing().control.with_timestep(0.1),
-        samples: MAX_SAMPLES,
-        ..swing()
-    });
-    assert_eq!(rollout.times().len(), 4);
 }
 
 #[test]

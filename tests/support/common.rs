@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc;
 use std::time::Duration;
 
 use pendularm_client::ending;
@@ -16,9 +17,10 @@ pub const SET_GRAVITY: &str =
     "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
 
 /// The variables of the environment that the program reads.
-pub const VARIABLES: [&str; 12] = [
+pub const VARIABLES: [&str; 13] = [
     "ARM_SIM_LINKS",
     "ARM_SIM_BIND",
+    "ARM_SIM_CLIENTS",
     "ARM_SIM_SEED",
     "ARM_SIM_LOG",
     "ARM_SIM_LOG_FORMAT",
@@ -36,7 +38,7 @@ pub fn program() -> Command {
     without_variables(Command::new(env!("CARGO_BIN_EXE_pendularm")))
 }
 
-fn without_variables(mut command: Command) -> Command {
+pub fn without_variables(mut command: Command) -> Command {
     for variable in VARIABLES {
         command.env_remove(variable);
     }
@@ -124,19 +126,17 @@ impl Runtime {
         Self::spawn(program(), bind, arguments)
     }
 
-    /// Starts the program with a record in the arm's place.
-    pub fn replaying(record: &str) -> Self {
-        let mut program = program();
-        program.args(["replay", record, "--serve"]);
-        Self::spawn(program, "127.0.0.1:0", &[])
-    }
-
     /// The same, started by a shell that has done `prelude` before: sets limits, say.
     pub fn under(prelude: &str) -> Self {
+        Self::under_with(prelude, &[])
+    }
+
+    /// The same with more arguments.
+    pub fn under_with(prelude: &str, arguments: &[&str]) -> Self {
         let mut shell = Command::new("sh");
         let script = format!("{prelude} && exec \"$0\" \"$@\"");
         shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
-        Self::spawn(without_variables(shell), "127.0.0.1:0", &[])
+        Self::spawn(without_variables(shell), "127.0.0.1:0", arguments)
     }
 
     fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
@@ -189,6 +189,70 @@ impl Runtime {
 }
 
 impl Drop for Runtime {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The program with its standard output somewhere else, and its log read to the end.
+pub struct Logged {
+    child: Child,
+    pub address: SocketAddr,
+    lines: mpsc::Receiver<String>,
+    /// The lines that have been read.
+    log: Vec<String>,
+}
+
+impl Logged {
+    pub fn start(mut command: Command, stdout: impl Into<Stdio>) -> Self {
+        let mut child = command
+            .args(["--bind", "127.0.0.1:0", "--log", "info"])
+            .stdin(Stdio::null())
+            .stdout(stdout)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let stderr = BufReader::new(child.stderr.take().unwrap());
+        let (line_came, lines) = mpsc::channel();
+        std::thread::spawn(move || {
+            for line in stderr.lines() {
+                let _ = line_came.send(line.unwrap());
+            }
+        });
+        let mut started = Self {
+            child,
+            address: SocketAddr::from(([0; 4], 0)),
+            lines,
+            log: Vec::new(),
+        };
+        let line = started.await_line("serving rosbridge clients");
+        let address = line.split_once("address=").unwrap().1;
+        started.address = address.parse().unwrap();
+        started
+    }
+
+    /// The line of the log with this text, which may have come already.
+    pub fn await_line(&mut self, text: &str) -> String {
+        loop {
+            if let Some(line) = self.log.iter().find(|line| line.contains(text)) {
+                return line.clone();
+            }
+            self.log
+                .push(self.lines.recv_timeout(PATIENCE).expect(text));
+        }
+    }
+
+    /// Ends the program in order; its whole log.
+    pub fn end(mut self) -> Vec<String> {
+        signal(self.child.id(), "TERM");
+        assert!(end(&mut self.child).0.success());
+        self.log.extend(self.lines.iter());
+        std::mem::take(&mut self.log)
+    }
+}
+
+impl Drop for Logged {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();

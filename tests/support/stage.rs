@@ -261,6 +261,16 @@ impl Client {
         self.settle().await;
     }
 
+    /// Commands an effort; where the controller is on, the error status is passed over.
+    pub async fn command_effort(&mut self, effort: Value) {
+        self.send(
+            &json!({"op": "publish", "topic": "/effort_controller/commands",
+            "msg": {"data": effort}}),
+        )
+        .await;
+        self.settle().await;
+    }
+
     /// Lets `time` pass, and gives the messages on `topic` that came in it.
     pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
         let before = self.heard.len();
@@ -343,6 +353,7 @@ impl Handler<ArmPose<2>> for SilentArm {
             time: 0.0,
             resets: 0,
             simulated: 0.0,
+            obstacle: None,
         }
     }
 }
@@ -354,6 +365,7 @@ impl Handler<TrackGoal<2>> for SilentArm {
         Tracking {
             positions: goal.solution,
             before: None,
+            obstacle: None,
         }
     }
 }

@@ -13,8 +13,8 @@ use actix::prelude::*;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Interest;
-use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;
@@ -45,7 +45,7 @@ impl Gateway {
         Self::within(Memory::default(), nodes).await
     }
 
-    /// A gateway whose clients together may hold so much.
+    /// A gateway whose clients share this room for what is long.
     pub async fn within(memory: Memory, nodes: Nodes) -> Self {
         let gauges = Arc::new(Gauges::with(memory));
         let registry = Registry::new(Arc::clone(&gauges)).start();

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
 
@@ -27,6 +27,23 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Takes apart the answers that came before the end of the stream, each as long as it says.
+    pub fn parse_all(mut bytes: &[u8]) -> Vec<Self> {
+        let mut answers = Vec::new();
+        while !bytes.is_empty() {
+            let text = String::from_utf8_lossy(bytes).to_ascii_lowercase();
+            let (head, _) = text.split_once("\r\n\r\n").expect("a head");
+            let length = head
+                .split("\r\n")
+                .find_map(|line| line.strip_prefix("content-length: "));
+            let length: usize = length.expect("a length").parse().unwrap();
+            let (answer, rest) = bytes.split_at(head.len() + 4 + length);
+            answers.push(Self::parse(answer));
+            bytes = rest;
+        }
+        answers
+    }
+
     /// Takes an answer apart, which is all that came before the end of the stream.
     pub fn parse(bytes: &[u8]) -> Self {
         let end = bytes
@@ -38,6 +55,7 @@ impl Answer {
         let first = lines.next().unwrap();
         let status = first
             .strip_prefix("HTTP/1.1 ")
+            .or(first.strip_prefix("HTTP/1.0 "))
             .and_then(|rest| rest.get(..3))
             .and_then(|code| code.parse().ok())
             .unwrap_or_else(|| panic!("not a status line: {first:?}"));
@@ -69,11 +87,12 @@ impl Answer {
     }
 }
 
-/// Sends bytes and gives all that comes up to the end of the stream.
+/// Sends bytes and their end, and gives all that comes up to the end of the stream.
 pub fn exchange(address: SocketAddr, request: &[u8]) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).expect("the program accepts");
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     stream.write_all(request).expect("the program takes it");
+    let _ = stream.shutdown(Shutdown::Write);
     rest(&mut stream)
 }
 

@@ -62,7 +62,8 @@ fn a_goal_is_followed_to_its_end_under_the_clients_own_id() {
 fn a_goal_without_feedback_has_none_and_answers_in_the_spelling_that_was_used() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
-    client.send(&json!({"op": "send_action_goal", "action": "ik_action", "args": [0.5, 1.2]}));
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.send(&json!({"op": "send_action_goal", "action": "ik_action", "args": [-0.5, 1.2]}));
     let mut other = runtime.connect();
     other.subscribe("/joint_states");
     ticks(&mut other, 18);

@@ -25,7 +25,7 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
     let mut client = runtime.connect();
     client.send(&json!({"op": "advertise", "topic": "/t"}));
     client.subscribe("/t");
-    // 100 MiB, of which the deaf client's outbox takes 4 and the system's buffers some.
+    // 100 MiB, of which the deaf client's outbox takes one message and the system's buffers some.
     let blob = "x".repeat(MIB / 4);
     for n in 0..400 {
         client.send(&json!({"op": "publish", "topic": "/t", "msg": {"n": n, "blob": blob}}));
@@ -36,11 +36,12 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
         );
     }
     let peak = runtime.peak_memory();
-    assert!(peak < BASE, "{peak} bytes for an outbox of 4 MiB");
+    assert!(peak < BASE, "{peak} bytes");
     client.subscribe("/diagnostics");
     let dropped = gateway_count(&mut client, "messages_dropped");
     assert!(dropped > 200, "{dropped} of 400");
 
+    // Of those that still wait more grow too old.
     let mut received = vec![];
     while received.last() != Some(&399) {
         received.push(deaf.message("/t")["n"].as_u64().unwrap());
@@ -49,27 +50,24 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
         received.is_sorted_by(|a, b| a < b),
         "reordered: {received:?}"
     );
+    let dropped = gateway_count(&mut client, "messages_dropped");
     assert_eq!(
         received.len() as u64,
         400 - dropped,
         "what is not dropped arrives"
     );
-    // 4 MiB at the end are the newest 15 messages of a little over 256 KiB: the oldest went first.
-    assert!(
-        received.ends_with(&(385..400).collect::<Vec<_>>()),
-        "{received:?}"
-    );
 }
 
 #[test]
 fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
-    const CALLS: usize = 90;
+    const CALLS: usize = 1000;
+    const LENGTH: usize = 10_000;
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     let mut stream = client.stream().try_clone().unwrap();
     let sent = Arc::new(AtomicUsize::new(0));
     let count = Arc::clone(&sent);
-    let id = "x".repeat(MIB);
+    let id = "x".repeat(LENGTH);
     let sending = std::thread::spawn(move || {
         for n in 0..CALLS {
             let frame = json!({"op": "call_service", "service": "/arm_sim/pause", "id": format!("{n} {id}")});
@@ -81,10 +79,10 @@ fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
     let mut other = runtime.connect();
     let (mut before, mut since) = (0, Instant::now());
     let deadline = since + PATIENCE;
-    while before < 32 || since.elapsed() < Duration::from_millis(500) {
+    while before < 10 || since.elapsed() < Duration::from_millis(500) {
         assert!(
             Instant::now() < deadline,
-            "{before} calls of a MiB are under the limit, or it never stands"
+            "{before} calls are under the limit, or it never stands"
         );
         other.settle();
         let now = sent.load(Ordering::Relaxed);
@@ -97,14 +95,11 @@ fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
         "everything was read although nothing was taken"
     );
     let peak = runtime.peak_memory();
-    assert!(
-        peak < BASE + 50 * MIB,
-        "{peak} bytes for 32 MiB of responses and a frame"
-    );
+    assert!(peak < BASE, "{peak} bytes");
     for n in 0..CALLS {
         let response = client.receive();
         let id = response["id"].as_str().unwrap();
-        assert_eq!(id.len(), MIB + n.to_string().len() + 1);
+        assert_eq!(id.len(), LENGTH + n.to_string().len() + 1);
         assert!(id.starts_with(&format!("{n} ")), "out of order at {n}");
     }
     sending.join().unwrap();
@@ -116,7 +111,7 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
     let mut provider = runtime.connect();
     provide(&mut provider, "/s");
     let mut caller = runtime.connect();
-    let blob = "x".repeat(MIB);
+    let blob = "x".repeat(50_000);
     let mut busy = 0;
     for id in 0..200 {
         caller.send(
@@ -137,10 +132,7 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
     }
     assert!(busy > 50, "{busy} of 200 refused");
     let peak = runtime.peak_memory();
-    assert!(
-        peak < BASE + MAX_BACKLOG + 16 * MIB,
-        "{peak} bytes for 64 MiB that may wait"
-    );
+    assert!(peak < BASE + MAX_BACKLOG + 16 * MIB, "{peak} bytes");
 }
 
 /// As for calls and goals: nobody fills the memory, and nobody ends another's connection, by asking a goal's end again
@@ -156,7 +148,6 @@ fn cancellations_for_a_client_that_never_reads_are_refused_when_too_many_wait() 
     client.send(&json!({"op": "send_action_goal", "id": "g", "action": action, "args": {}}));
     let cancel = json!({"op": "cancel_action_goal", "id": "g", "action": action});
     let mut refused = 0;
-    // Each takes some 300 bytes of the 64 MiB, and the system's buffers take some more.
     for _ in 0..60 {
         for _ in 0..5_000 {
             client.send(&cancel);
@@ -173,10 +164,7 @@ fn cancellations_for_a_client_that_never_reads_are_refused_when_too_many_wait() 
     }
     assert!(refused > 0, "all went on");
     let peak = runtime.peak_memory();
-    assert!(
-        peak < BASE + MAX_BACKLOG + 32 * MIB,
-        "{peak} bytes for 64 MiB that may wait"
-    );
+    assert!(peak < BASE + MAX_BACKLOG + 32 * MIB, "{peak} bytes");
 }
 
 /// A flood is read as fast as the arm takes it: the others' calls go in between. Without that they would wait for

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use crate::common::{Client, PATIENCE, Runtime};
-use pendularm::actors::gateway::limits::MAX_WAITING_GOALS;
 use serde_json::{Value, json};
 
 /// A client that pursues `/dance`.
@@ -199,35 +198,81 @@ fn actions_of_clients_are_found_by_asking_and_those_of_the_runtime_stay_its_own(
     }
 }
 
+/// The results of broken action servers, and why they are discarded. `ID` stands for the id of the goal.
+const BROKEN: [(&str, &str); 9] = [
+    (r#"{NAMED,"values":{},"status":4}"#, "result is required"),
+    (
+        r#"{NAMED,"values":{},"result":"yes"}"#,
+        "result must be true or false",
+    ),
+    (
+        r#"{NAMED,"values":{},"result":true,"status":7}"#,
+        "status must be",
+    ),
+    (
+        r#"{NAMED,"values":{},"result":true,"status":"done"}"#,
+        "status must be",
+    ),
+    (
+        r#"{NAMED,"values":5,"result":true}"#,
+        "values must be an object",
+    ),
+    (
+        r#"{"op":"action_result","id":ID,"result":true}"#,
+        "action is required",
+    ),
+    (
+        r#"{"op":"action_result","id":ID,"action":"/sing","result":true}"#,
+        "is of /dance",
+    ),
+    (
+        r#"{"op":"action_result","action":"dance","result":true}"#,
+        "id is required",
+    ),
+    (r#"{NAMED,"result":True}"#, "malformed frame"),
+];
+
 #[test]
-fn so_many_goals_of_a_client_are_pursued_by_others_and_no_more() {
+fn a_result_that_cannot_be_passed_on_ends_its_goal_and_is_its_servers_error() {
     let runtime = Runtime::start();
     let (mut dancer, mut client) = (dancer(&runtime), runtime.connect());
-    for number in 0..=MAX_WAITING_GOALS {
-        client.send(&goal(&number.to_string(), false));
+    let named = r#""op":"action_result","action":"/dance","id":ID"#;
+    for (frame, why) in BROKEN {
+        client.send(&goal("a", true));
+        let id = with_op(&mut dancer, "send_action_goal")["id"].clone();
+        // Feedback that cannot be passed on costs nothing but itself.
+        for bad in [
+            json!({"values": 5}),
+            json!({}),
+            json!({"values": {}, "action": "/sing"}),
+        ] {
+            let mut feedback = json!({"op": "action_feedback", "id": id, "action": "/dance"});
+            feedback
+                .as_object_mut()
+                .unwrap()
+                .extend(bad.as_object().unwrap().clone());
+            dancer.send(&feedback);
+            assert_eq!(dancer.status()["level"], "error", "{feedback}");
+        }
+        let frame = frame.replace("NAMED", named).replace("ID", &id.to_string());
+        dancer.send_bytes(format!("{frame}\n").as_bytes());
+        let end = client.receive();
+        assert_eq!(
+            (&end["op"], &end["id"], &end["status"], &end["result"]),
+            (
+                &json!("action_result"),
+                &json!("a"),
+                &json!(6),
+                &json!(false)
+            ),
+            "{frame}"
+        );
+        let values = end["values"].as_str().unwrap();
+        assert!(
+            values.contains("of /dance") && values.contains(why),
+            "{values}"
+        );
+        let told = dancer.status();
+        assert!(told["msg"].as_str().unwrap().contains(why), "{told}");
     }
-    let end = with_op(&mut client, "action_result");
-    assert_eq!(
-        (&end["id"], &end["status"]),
-        (&json!(MAX_WAITING_GOALS.to_string()), &json!(0))
-    );
-    assert!(
-        end["values"]
-            .as_str()
-            .unwrap()
-            .contains("at most 256 goals"),
-        "{end}"
-    );
-    let first = with_op(&mut dancer, "send_action_goal")["id"].clone();
-    dancer.send(&json!({"op": "action_result", "id": first, "action": "/dance", "values": {}, "result": true}));
-    assert_eq!(with_op(&mut client, "action_result")["status"], 4);
-    client.send(&goal("again", false));
-    client.settle();
-    assert!(
-        !client
-            .kept
-            .iter()
-            .any(|frame| frame["op"] == "action_result"),
-        "there is room again"
-    );
 }

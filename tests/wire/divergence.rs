@@ -151,16 +151,18 @@ fn a_step_after_which_the_clock_would_not_be_finite_is_not_taken() {
     client.ask("/arm_sim/set_integrator", json!({"timestep": 1e308}));
     let ended = client.call("/arm_sim/step", json!({"steps": 2}));
     assert_eq!(ended["result"], false, "{ended}");
-    assert_eq!(ended["values"], json!({"steps": 1, "time": 1e308}));
+    assert_eq!(ended["values"]["steps"], 1);
+    assert_eq!(ended["values"]["time"], 1e308);
     client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
     client.subscribe("/diagnostics");
     let message = client.message("/diagnostics");
     let message = arm_status(&message)["message"].as_str().unwrap();
     assert!(message.contains("step 2 from t = 1"), "{message}");
     client.ask("/arm_sim/reset", json!({}));
+    let stepped = client.ask("/arm_sim/step", json!({"steps": 2}));
     assert_eq!(
-        client.ask("/arm_sim/step", json!({"steps": 2})),
-        json!({"steps": 2, "time": 0.002})
+        (&stepped["steps"], &stepped["time"]),
+        (&json!(2), &json!(0.002))
     );
 }
 

@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 use crate::common::{Client, Runtime, forwarded, provide, respond};
 use serde_json::{Value, json};
 
-fn call(client: &mut Client, service: &str, id: Value) {
+pub fn call(client: &mut Client, service: &str, id: Value) {
     client.send(&json!({"op": "call_service", "service": service, "id": id, "args": {"a": 1}}));
 }
 
 /// The next response, which must be a failure; gives its status.
-fn failure(client: &mut Client, id: &Value) -> String {
+pub fn failure(client: &mut Client, id: &Value) -> String {
     let response = client.receive_where("response", |frame| frame["op"] == "service_response");
     assert_eq!(&response["id"], id, "{response}");
     assert_eq!(response["result"], false, "{response}");
@@ -240,7 +240,6 @@ fn an_answer_with_an_unknown_or_stale_id_is_an_error_and_completes_nobodys_call(
     refused(&mut other, "/s", &frame["id"]);
     refused(&mut other, "/other", &frame["id"]);
     refused(&mut caller, "/s", &frame["id"]);
-    refused(&mut provider, "/other", &frame["id"]);
     for id in [
         json!(1),
         json!(null),

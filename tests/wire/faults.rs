@@ -22,7 +22,7 @@ fn ask_steps(client: &mut Client, function: &str, steps: u64, id: usize) {
 /// Hundreds of computations without end have theirs; whoever comes then is not refused, and what they asked for goes with them.
 #[test]
 fn however_many_computations_wait_a_newcomers_is_done_and_light_calls_are_answered() {
-    let runtime = Runtime::start();
+    let runtime = Runtime::with(&["--clients", "1024"]);
     let mut clients: Vec<Client> = (0..300).map(|_| runtime.connect()).collect();
     for client in &mut clients {
         ask_steps(client, ENDLESS, 1_000_000, 0);
@@ -68,7 +68,7 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
     let mut late = runtime.connect();
     late.subscribe("/big");
     late.send(&json!({"op": "advertise", "topic": "/big"}));
-    let blob = "x".repeat(100_000);
+    let blob = "x".repeat(10_000);
     for n in 0..30 {
         late.send(&json!({"op": "publish", "topic": "/big", "msg": {"n": n, "blob": blob}}));
     }

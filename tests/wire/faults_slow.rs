@@ -7,13 +7,14 @@ use std::time::{Duration, Instant};
 
 use crate::arm::{stamp, state};
 use crate::common::{Client, PATIENCE, Runtime, provide};
-use pendularm::actors::resources::budget::MAX_MEMORY;
+use pendularm::actors::gateway::limits::MAX_MEMORY;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;
 const STEP: &str = "/arm_sim/integration_step";
 
-/// Fifty clients ask for 60 MB each and read nothing. Those whose answers fit get them, whole, as soon as they read; the others are told at once.
+/// Fifty clients ask for 60 MB each and read nothing for a while. There is room for one such answer, so each is computed
+/// once the one before has been read.
 #[test]
 #[ignore = "a minute: make test-slow"]
 fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
@@ -25,7 +26,7 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
             "args": {"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": STEPS,
                 "integrator": "euler"}}));
     }
-    // Until all have been answered somehow: an answer waits for 20 s at most before its client counts as dead.
+    // An answer waits for 20 s at most before its client counts as dead.
     let mut honest = runtime.connect();
     let mut answers = Vec::new();
     std::thread::scope(|scope| {
@@ -35,7 +36,7 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
                 scope.spawn(|| {
                     // Deaf for a while, each.
                     std::thread::sleep(Duration::from_secs(12));
-                    client.set_patience(Duration::from_secs(120));
+                    client.set_patience(Duration::from_secs(600));
                     let line = client.receive_text();
                     let response: Value = serde_json::from_str(&line).unwrap();
                     let whole = response["values"]["velocities"].as_array().map(Vec::len);
@@ -62,21 +63,10 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
     });
     let peak = runtime.peak_memory();
     println!("peak {} MiB", peak / MIB);
-    let mut whole = 0;
     for (n, (id, result, length, status)) in answers.iter().enumerate() {
-        assert_eq!(id, n);
-        if *result {
-            assert_eq!(*length, Some(STEPS + 1));
-            whole += 1;
-        } else {
-            assert!(
-                status.as_str().unwrap().contains("try again later"),
-                "{status}"
-            );
-        }
+        assert_eq!((id, result), (&json!(n), &true), "{status}");
+        assert_eq!(*length, Some(STEPS + 1));
     }
-    println!("{whole} of 50 answered");
-    assert!((4..50).contains(&whole), "{whole} answered");
     assert!(peak < MAX_MEMORY, "{peak} bytes");
 }
 

@@ -104,6 +104,9 @@ fn an_arm_that_does_not_follow_is_told_apart_from_one_that_comes_late() {
     let mut client = runtime.connect();
     client.ask("/arm_sim/set_params", json!({"gravity": 0}));
     client.ask("/arm_sim/reset", json!({}));
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    let weak = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
+    client.ask("/pid_controller/set_gains", weak);
     let mut args = through(&[point([1.0, 0.0], 0.5)]);
     args["path_tolerance"] = json!([{"name": "joint1", "position": 0.1}]);
     client.send(&goal("a", &args));
@@ -155,14 +158,14 @@ fn a_goal_ends_with_a_cancellation_or_when_its_setpoint_is_gone() {
     let end = result(&mut client);
     assert_eq!(
         outcome(&end),
-        (6, 0, "another setpoint has taken its place")
+        (6, -1, "another setpoint has taken its place")
     );
 
     client.send(&goal("d", &long));
     client.settle();
     other.ask("/arm_sim/reset", json!({}));
     let end = result(&mut client);
-    assert_eq!(outcome(&end), (6, 0, "the arm was reset"));
+    assert_eq!(outcome(&end), (6, -1, "the arm was reset"));
     client.send(&cancel("d"));
     assert_eq!(client.status()["level"], "error");
 }
@@ -256,6 +259,7 @@ fn unfit_points() -> Vec<(Value, &'static str)> {
 fn a_goal_that_is_none_is_refused_by_its_field() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
     for (args, why) in unfit_goals().into_iter().chain(unfit_points()) {
         client.send(&goal("x", &args));
         let end = result(&mut client);
@@ -346,6 +350,7 @@ fn the_result_of_a_path_is_the_last_that_comes_of_it() {
 fn an_arm_that_is_paused_anew_is_on_no_way_either() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask("/arm_sim/step", json!({"steps": 10}));
     client.ask("/arm_sim/pause", json!({"data": true}));
@@ -370,4 +375,16 @@ fn a_reset_is_answered_when_the_path_has_ended() {
             .filter(|frame| frame["op"] == "action_result");
         assert_eq!(ends.count(), 1, "{:?}", client.kept);
     }
+}
+
+/// As a newcomer has it who has not read about the switch.
+#[test]
+fn a_path_for_a_controller_that_is_off_is_refused_and_told_what_switches_it_on() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.send(&goal("x", &through(&[point([0.1, 0.1], 1.0)])));
+    let end = result(&mut client);
+    assert_eq!((&end["status"], &end["result"]), (&json!(0), &json!(false)));
+    let why = end["values"].as_str().unwrap();
+    assert!(why.contains("/pid_controller/enable"), "{why}");
 }

@@ -129,14 +129,13 @@ mod web {
     use crate::web_client::{Answer, exchange, folder, get, handshake, request, try_handshake};
 
     /// Headers of every answer to a browser, whatever it is about.
-    const STRICT: [(&str, &str); 7] = [
+    const STRICT: [(&str, &str); 6] = [
         ("x-content-type-options", "nosniff"),
         ("x-frame-options", "DENY"),
         ("cross-origin-resource-policy", "same-origin"),
         ("cross-origin-opener-policy", "same-origin"),
         ("referrer-policy", "no-referrer"),
         ("cache-control", "no-store"),
-        ("connection", "close"),
     ];
 
     fn assert_strict(answer: &Answer, what: &str) {

@@ -182,7 +182,8 @@ fn a_guessed_id_answers_nobodys_call_but_ones_own() {
     let number: u64 = number.parse().unwrap();
     for guess in number.saturating_sub(50)..number + 50 {
         for service in ["/s", "s", "/t", "t", "//s"] {
-            if guess == number && service.ends_with('t') {
+            // Its own call, which a bad answer of its own may fail.
+            if guess == number {
                 continue;
             }
             let forged = json!({"service": service, "id": format!("{prefix}:{guess}")});
@@ -280,10 +281,9 @@ fn what_only_the_runtime_says_of_its_action_is_refused_from_a_client() {
     }
     client.settle();
     let frames = std::mem::take(&mut client.kept);
-    assert!(
-        frames.iter().all(|frame| frame["op"] == "action_feedback"),
-        "{frames:?}"
-    );
+    // The controller is off, which the client is warned of.
+    let is_its = |frame: &Value| frame["op"] == "action_feedback" || frame["level"] == "warning";
+    assert!(frames.iter().all(is_its), "{frames:?}");
     client.send(&json!({"op": "cancel_action_goal", "id": "g", "action": "/ik_action"}));
     let end = client.receive_where("result", |frame| frame["op"] == "action_result");
     assert_eq!((&end["id"], &end["status"]), (&json!("g"), &json!(5)));
@@ -293,6 +293,7 @@ fn what_only_the_runtime_says_of_its_action_is_refused_from_a_client() {
 fn two_goals_under_one_id_are_told_apart_by_their_connections() {
     let runtime = Runtime::start();
     let (mut one, mut other) = (runtime.connect(), runtime.connect());
+    one.ask("/pid_controller/enable", json!({"data": true}));
     let goal = |x: f64| {
         json!({"op": "send_action_goal", "id": "g", "action": "/ik_action",
         "action_type": "pendularm_interfaces/action/MoveTo", "args": {"x": x, "y": 1.2}})

@@ -99,7 +99,7 @@ fn pings_without_end_are_answered_as_far_as_they_are_read() {
     for _ in 0..400 {
         socket.send_bytes(&ping.repeat(1000));
     }
-    let grown = runtime.peak_memory() - before;
+    let grown = runtime.peak_memory().saturating_sub(before);
     assert!(
         grown < 8_000_000,
         "{grown} bytes for pongs that are not read"
@@ -108,7 +108,7 @@ fn pings_without_end_are_answered_as_far_as_they_are_read() {
     assert_eq!(response["result"], true);
 }
 
-/// A body behind a handshake is not a way past the check of the origin, nor are two requests in one.
+/// A body is not a way past the check of the host and the origin, nor is a request behind one that was refused.
 #[test]
 fn a_handshake_hidden_in_a_request_opens_nothing() {
     let runtime = Runtime::start();
@@ -127,7 +127,6 @@ fn a_handshake_hidden_in_a_request_opens_nothing() {
             inner.len()
         ),
         "GET / HTTP/1.1\r\nHost: evil.example\r\nX: \r\n\r\n".to_owned(),
-        format!("GET /nothing HTTP/1.1\r\nHost: {address}\r\nConnection: keep-alive\r\n\r\n"),
     ] {
         let mut bytes = (outer + &inner).into_bytes();
         bytes.extend_from_slice(&text);

@@ -117,6 +117,7 @@ fn a_goals_trajectory_reaches_every_subscriber() {
 fn goals_cancellations_and_resets_in_one_packet_take_effect_in_order() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
     client.subscribe(RESULT);
     let call = |service: &str, args: Value| {
         let frame = json!({"op": "call_service", "service": service, "args": args});
@@ -177,10 +178,20 @@ fn every_goal_has_exactly_one_result_whatever_clients_do_at_the_same_time() {
             })
         })
         .collect();
+    // Who does not read for a second misses results.
+    let (stop, stopped) = std::sync::mpsc::channel::<()>();
+    let reading = std::thread::spawn(move || {
+        while let Err(std::sync::mpsc::TryRecvError::Empty) = stopped.try_recv() {
+            listener.settle();
+        }
+        listener
+    });
     let mut sent: Vec<String> = clients
         .into_iter()
         .flat_map(|client| client.join().unwrap())
         .collect();
+    drop(stop);
+    let mut listener = reading.join().unwrap();
     listener.call(CANCEL, json!({}));
     listener.settle();
     let mut ended: Vec<String> = listener

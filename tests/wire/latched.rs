@@ -20,12 +20,80 @@ fn every_new_subscriber_gets_the_description_and_the_fixed_frame_once() {
                 assert!(message["data"].as_str().unwrap().starts_with("<?xml"));
             }
         }
-        // Subscribed already: it has it.
-        client.send(&json!({"op": "subscribe", "topic": "/tf_static", "id": "again"}));
+        // The same subscription has it already.
+        client.send(&json!({"op": "subscribe", "topic": "/tf_static", "throttle_rate": 5}));
         client.status();
     }
     for client in &mut clients {
         assert!(client.so_far().is_empty());
+    }
+}
+
+/// Each part of a program subscribes for itself. A throttle does not hold back the first message of a subscription.
+#[test]
+fn every_subscription_of_a_client_gets_what_is_latched_once_and_live_messages_come_once() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let topics = ["/robot_description", "/tf_static", "tf_static"];
+    let ids = [json!("a"), json!(2), json!(null), json!("d"), json!("e")];
+    let more = [
+        json!({}),
+        json!({"throttle_rate": 60_000, "queue_length": 3}),
+        json!({"compression": "png"}),
+        json!({"type": "tf2_msgs/msg/TFMessage"}),
+        json!({"throttle_rate": 60_000}),
+    ];
+    let subscribe = |client: &mut crate::common::Client, topic: &str, id: &Value, more: &Value| {
+        let mut frame = json!({"op": "subscribe", "topic": topic, "id": id});
+        frame
+            .as_object_mut()
+            .unwrap()
+            .extend(more.as_object().unwrap().clone());
+        client.send(&frame);
+        assert_eq!(client.status()["level"], "info", "{frame}");
+    };
+    for topic in topics {
+        for (id, more) in ids.iter().zip(&more) {
+            subscribe(&mut client, topic, id, more);
+            client.message(topic);
+        }
+        // Unsubscribed and subscribed again, it is a new one; the same one again is not.
+        client.send(&json!({"op": "unsubscribe", "topic": topic, "id": "a"}));
+        subscribe(
+            &mut client,
+            topic,
+            &json!("a"),
+            &json!({"throttle_rate": 60_000}),
+        );
+        client.message(topic);
+        subscribe(&mut client, topic, &json!("d"), &json!({}));
+    }
+    assert!(client.so_far().is_empty());
+    client.ask("/arm_sim/set_params", json!({"lengths": [1.0, 0.25]}));
+    client.settle();
+    let told = std::mem::take(&mut client.kept);
+    let told: Vec<_> = told.iter().map(|frame| frame["topic"].clone()).collect();
+    for topic in topics {
+        let count = told.iter().filter(|one| **one == topic).count();
+        assert_eq!(count, 1, "{topic}: {told:?}");
+    }
+    // All are throttled now, and each still gets it at once.
+    for id in ["d", "2nd", "3rd"] {
+        client.send(&json!({"op": "unsubscribe", "topic": "/tf_static"}));
+        subscribe(
+            &mut client,
+            "/tf_static",
+            &json!(id),
+            &json!({"throttle_rate": 60_000}),
+        );
+        client.message("/tf_static");
+        subscribe(
+            &mut client,
+            "/tf_static",
+            &json!("last"),
+            &json!({"throttle_rate": 60_000}),
+        );
+        client.message("/tf_static");
     }
 }
 

@@ -126,7 +126,7 @@ fn bad_usage_is_told_in_one_line_with_status_2() {
         (&["--links", "5"], &[], "--links"),
         (&["--links"], &[], "--links"),
         (&["--what"], &[], "--what"),
-        (&["serve"], &[], "\"serve\""),
+        (&["serve"], &[], "'serve'"),
         (&["--bind", "nowhere"], &[], "--bind"),
         (&["--bind", "0.0.0.0:0"], &[], "loopback"),
         (&["--bind", "192.168.1.1:9095"], &[], "loopback"),
@@ -170,7 +170,7 @@ fn help_and_version_go_to_standard_output_with_status_0() {
     let version = outcome(&["--version"], &[("ARM_SIM_LINKS", "7")]);
     assert_eq!((version.status.code(), version.stderr), (Some(0), vec![]));
     let version = String::from_utf8(version.stdout).unwrap();
-    let expected = format!("pendularm {} (", env!("CARGO_PKG_VERSION"));
+    let expected = format!("pendularm {} (", env!("PENDULARM_VERSION"));
     assert!(
         version.starts_with(&expected) && version.lines().count() == 1,
         "{version}"

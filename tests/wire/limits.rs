@@ -3,122 +3,128 @@
 //! **Invariant:** what is over a limit is refused by name; what was registered before stays, and what is withdrawn makes
 //! room again.
 
-use crate::common::{Client, Runtime, provide};
-use pendularm::actors::gateway::limits::{
-    MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
-};
+use crate::common::{Runtime, provide};
+use pendularm::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
 use pendularm::protocol::limits::MAX_NAME;
 use serde_json::{Value, json};
-
-/// Sends `count` frames of an op on names of their own, and gives the statuses that come.
-fn register(client: &mut Client, op: &str, field: &str, count: usize) -> Vec<Value> {
-    let frames: String = (0..count)
-        .map(|n| format!("{}\n", json!({"op": op, field: format!("/{n}"), "id": n})))
-        .collect();
-    client.send_bytes(frames.as_bytes());
-    client.settle();
-    let mut statuses = std::mem::take(&mut client.kept);
-    statuses.retain(|frame| frame["op"] == "status");
-    statuses
-}
 
 fn errors(statuses: &[Value]) -> Vec<&Value> {
     let errors = statuses.iter().filter(|status| status["level"] == "error");
     errors.map(|status| &status["id"]).collect()
 }
 
+/// Frames of each kind, as many as a connection may have and one more.
 #[test]
-fn a_connection_holds_so_many_subscriptions() {
+fn a_connection_registers_so_much_and_no_more() {
     let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let statuses = register(&mut client, "subscribe", "topic", MAX_SUBSCRIPTIONS + 1);
-    assert_eq!(statuses.len(), MAX_SUBSCRIPTIONS + 1);
-    assert_eq!(errors(&statuses), [MAX_SUBSCRIPTIONS]);
-    // A topic that is subscribed already may be subscribed again, and a withdrawn one makes room.
-    client.send(&json!({"op": "subscribe", "topic": "/5", "id": 5}));
-    assert_eq!(client.status()["level"], "info");
-    client.send(&json!({"op": "unsubscribe", "topic": "/5"}));
-    client.send(&json!({"op": "subscribe", "topic": "/new"}));
-    assert_eq!(client.status()["level"], "info");
+    let most = |names: usize| MAX_KEPT / (ENTRY_BYTES + 3 * names);
+    // Each name is five characters long.
+    for (op, field, withdraw) in [
+        ("subscribe", "topic", "unsubscribe"),
+        ("advertise", "topic", "unadvertise"),
+        ("advertise_service", "service", "unadvertise_service"),
+        ("advertise_action", "action", "unadvertise_action"),
+    ] {
+        let names: Vec<String> = (0..=most(5)).map(|n| format!("/{n:04}")).collect();
+        let mut client = runtime.connect();
+        let frames: String = names
+            .iter()
+            .map(|name| {
+                format!(
+                    "{}\n",
+                    json!({"op": op, field: name, "id": name, "type": ""})
+                )
+            })
+            .collect();
+        client.send_bytes(frames.as_bytes());
+        client.settle();
+        let statuses = std::mem::take(&mut client.kept);
+        let refused = errors(&statuses);
+        if op == "subscribe" {
+            // Its `id` is one of its names.
+            assert_eq!(refused.len(), most(5) + 1 - most(12), "{op}");
+        } else {
+            assert_eq!(refused, [&names[most(5)]], "{op}");
+        }
+        // What is registered already may be registered again, and what is withdrawn makes room.
+        for name in [&names[0], &names[1]] {
+            client.send(&json!({"op": op, field: name, "id": name, "type": ""}));
+        }
+        client.send(&json!({"op": withdraw, field: names[0]}));
+        client.send(&json!({"op": op, field: "/last", "id": "/last", "type": ""}));
+        client.settle();
+        assert!(errors(&client.kept).is_empty(), "{op}: {:?}", client.kept);
+    }
     // The limit is each connection's own.
     runtime.connect().subscribe("/another");
 }
 
 #[test]
-fn many_ids_of_one_topic_count_as_many_subscriptions() {
+fn a_service_that_another_client_takes_over_makes_room() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
-    let frames: String = (0..=MAX_SUBSCRIPTIONS)
-        .map(|n| format!("{}\n", json!({"op": "subscribe", "topic": "/t", "id": n})))
-        .collect();
-    client.send_bytes(frames.as_bytes());
-    client.settle();
-    assert_eq!(errors(&client.kept), [MAX_SUBSCRIPTIONS]);
-}
-
-#[test]
-fn a_connection_advertises_so_many_topics() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let statuses = register(&mut client, "advertise", "topic", MAX_ADVERTISED + 1);
-    assert_eq!(errors(&statuses), [MAX_ADVERTISED]);
-    client.send(&json!({"op": "unadvertise", "topic": "/5"}));
-    client.send(&json!({"op": "advertise", "topic": "/new"}));
-    client.send(&json!({"op": "advertise", "topic": "/6"}));
-    client.settle();
-    assert!(client.kept.is_empty(), "{:?}", client.kept);
-}
-
-#[test]
-fn a_connection_provides_so_many_services() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let statuses = register(
-        &mut client,
-        "advertise_service",
-        "service",
-        MAX_PROVIDED + 1,
-    );
-    assert_eq!(errors(&statuses), [MAX_PROVIDED]);
-    // A service that another connection takes over counts no more.
-    let mut other = runtime.connect();
-    provide(&mut other, "/5");
-    client.send(&json!({"op": "advertise_service", "service": "/new"}));
-    assert_eq!(client.status()["level"], "info");
-}
-
-#[test]
-fn so_many_calls_of_a_connection_wait_for_other_clients() {
-    let runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    let frames: String = (0..=MAX_WAITING_CALLS)
+    let most = MAX_KEPT / (ENTRY_BYTES + 3 * 5);
+    let frames: String = (0..most)
         .map(|n| {
             format!(
                 "{}\n",
-                json!({"op": "call_service", "service": "/s", "id": n})
+                json!({"op": "advertise_service", "service": format!("/{n:04}")})
             )
         })
         .collect();
-    caller.send_bytes(frames.as_bytes());
-    let refused = caller.receive();
-    assert_eq!(
-        (&refused["id"], &refused["result"]),
-        (&json!(MAX_WAITING_CALLS), &json!(false))
-    );
-    let call = provider.receive();
-    provider.send(
-        &json!({"op": "service_response", "service": "/s", "id": call["id"],
-        "values": {}, "result": true}),
-    );
-    assert_eq!(caller.receive()["id"], 0);
-    caller.send(&json!({"op": "call_service", "service": "/s", "id": "again"}));
-    caller.settle();
-    assert!(
-        caller.kept.is_empty(),
-        "there is room again: {:?}",
-        caller.kept
-    );
+    client.send_bytes(frames.as_bytes());
+    client.settle();
+    client.kept.clear();
+    client.send(&json!({"op": "advertise_service", "service": "/last"}));
+    assert_eq!(client.status()["level"], "error");
+    let mut other = runtime.connect();
+    provide(&mut other, "/0005");
+    client.send(&json!({"op": "advertise_service", "service": "/last"}));
+    assert_eq!(client.status()["level"], "info");
+}
+
+/// The `id` of each is kept too.
+#[test]
+fn so_many_calls_and_goals_of_a_connection_wait_for_other_clients() {
+    let runtime = Runtime::start();
+    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
+    provide(&mut provider, "/s");
+    provider.send(&json!({"op": "advertise_action", "action": "/a", "type": "t/A"}));
+    provider.status();
+    for (op, field, name, end) in [
+        ("call_service", "service", "/s", "service_response"),
+        ("send_action_goal", "action", "/a", "action_result"),
+    ] {
+        let id = "x".repeat(1000);
+        let mut forwarded = 0;
+        let refused = loop {
+            caller.send(&json!({"op": op, field: name, "id": id, "args": {}}));
+            caller.send(&json!({"op": "call_service", "service": "/nobody", "id": "n"}));
+            let mut answer = caller.receive();
+            // A goal is refused by a status first.
+            if answer["op"] == "status" {
+                answer = caller.receive();
+            }
+            if answer["id"] != "n" {
+                caller.receive();
+                break answer;
+            }
+            forwarded += 1;
+        };
+        assert_eq!(
+            (&refused["op"], &refused["result"]),
+            (&json!(end), &json!(false))
+        );
+        let why = if op == "call_service" {
+            &refused["status"]
+        } else {
+            &refused["values"]
+        };
+        assert!(why.as_str().unwrap().contains("keeps too much"), "{why}");
+        let most = MAX_KEPT / (ENTRY_BYTES + 3 * id.len());
+        assert!((most * 9 / 10..=most).contains(&forwarded), "{forwarded}");
+        caller = runtime.connect();
+    }
 }
 
 #[test]

@@ -22,6 +22,7 @@ mod advice;
 #[path = "../support/arm.rs"]
 mod arm;
 mod backpressure;
+mod broken_providers;
 mod cbor;
 mod client_actions;
 mod clock_diagnostics;
@@ -37,6 +38,7 @@ mod external_services;
 mod faults;
 mod faults_files;
 mod faults_slow;
+mod faults_threads;
 mod follow_path;
 mod fragments;
 mod framing;
@@ -59,6 +61,7 @@ mod latched;
 mod launch;
 mod limits;
 mod memory_slow;
+mod mishaps;
 mod names;
 mod opening;
 mod options;
@@ -66,11 +69,15 @@ mod order;
 mod parameters;
 mod pause_reset;
 mod pid;
+mod places;
 #[cfg(target_os = "linux")]
+mod present;
 mod priority;
 mod readme;
 #[cfg(feature = "record")]
 mod record;
+#[cfg(feature = "record")]
+mod record_words;
 mod rosapi;
 mod series;
 mod services;
@@ -85,6 +92,7 @@ mod tf_web;
 mod time;
 mod token;
 mod topics;
+mod two_clocks;
 #[path = "../support/web_client.rs"]
 mod web_client;
 mod websocket;

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
-use pendularm::actors::resources::budget::MAX_MEMORY;
+use pendularm::actors::gateway::limits::MAX_MEMORY;
 use serde_json::json;
 
 const MB: usize = 1_000_000;
@@ -83,7 +83,7 @@ fn be_honest(mut client: Client, stop: &AtomicBool) -> Duration {
 
 /// Lets the attackers do what they do, and says what it cost.
 fn attack(name: &str, attackers: Vec<Attacker>) -> usize {
-    attack_on(&Runtime::start(), name, attackers)
+    attack_on(&Runtime::with(&["--clients", "1024"]), name, attackers)
 }
 
 fn attack_on(runtime: &Runtime, name: &str, mut attackers: Vec<Attacker>) -> usize {
@@ -315,7 +315,7 @@ fn messages_that_have_to_be_read_to_be_encoded() {
 #[test]
 #[ignore = "make test-slow"]
 fn websockets_that_read_nothing() {
-    let runtime = Runtime::start();
+    let runtime = Runtime::with(&["--clients", "1024"]);
     let open = handshake(&runtime);
     let pings = frame(0x89, &[b'x'; 125]).repeat(2000);
     let one = attack_on(

@@ -14,6 +14,7 @@ fn openings() -> Vec<(Vec<u8>, &'static str)> {
     let methods = [
         #[cfg(not(feature = "web"))]
         "GET / HTTP/1.1",
+        #[cfg(not(feature = "web"))]
         "HEAD / HTTP/1.1",
         "POST /x HTTP/1.1",
         "PUT / HTTP/1.1",

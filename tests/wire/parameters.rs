@@ -4,7 +4,7 @@ use crate::common::{Client, Runtime};
 use pendularm::protocol::ros::parameters::MAX_NAMED;
 use serde_json::{Value, json};
 
-const NAMES: [&str; 9] = [
+const NAMES: [&str; 10] = [
     "gravity",
     "masses",
     "lengths",
@@ -13,6 +13,7 @@ const NAMES: [&str; 9] = [
     "kd",
     "integrator",
     "timestep",
+    "control_period",
     "robot_description",
 ];
 
@@ -42,12 +43,12 @@ fn parameters_are_listed_described_and_told_with_their_types() {
 
     let values = get(&mut client, &NAMES);
     let types: Vec<&Value> = values.iter().map(|value| &value["type"]).collect();
-    assert_eq!(types, [3, 8, 8, 8, 8, 8, 4, 3, 4]);
+    assert_eq!(types, [3, 8, 8, 8, 8, 8, 4, 3, 3, 4]);
     assert_eq!(values[0]["double_value"], 9.81);
     assert_eq!(values[2]["double_array_value"], json!([1.0, 1.0]));
     assert_eq!(values[6]["string_value"], "rk4");
     assert!(
-        values[8]["string_value"]
+        values[9]["string_value"]
             .as_str()
             .unwrap()
             .starts_with("<?xml")

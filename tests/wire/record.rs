@@ -15,14 +15,14 @@ use serde_json::{Value, json};
 use crate::common::{PATIENCE, Runtime, signal};
 
 /// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
+pub(super) fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("record-{name}"));
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).unwrap();
     folder
 }
 
-fn passages(file: &Path) -> (Vec<Passage>, RecordEnding) {
+pub(super) fn passages(file: &Path) -> (Vec<Passage>, RecordEnding) {
     let mut recording = Recording::new(File::open(file).unwrap());
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {
@@ -41,18 +41,18 @@ fn holds_call(file: &Path, args: &str) -> bool {
 }
 
 /// The program with other arguments than serving: its exit status and what it says.
-fn run(arguments: &[&str]) -> (Option<i32>, String) {
+pub(super) fn run(arguments: &[&str]) -> (Option<i32>, String) {
     let mut program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
     let output = program.args(arguments).output().unwrap();
     let said = [output.stdout, output.stderr].concat();
     (output.status.code(), String::from_utf8(said).unwrap())
 }
 
-fn text(path: &Path) -> &str {
+pub(super) fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-fn end(mut runtime: Runtime) {
+pub(super) fn end(mut runtime: Runtime) {
     signal(runtime.pid(), "TERM");
     let status = runtime.end().0;
     assert!(status.success());
@@ -84,6 +84,101 @@ fn a_run_is_recorded_whole_and_replayed() {
     let (status, said) = run(&["replay", text(&file)]);
     assert_eq!(status, Some(0), "{said}");
     assert!(said.ends_with("the same, bit for bit\n"), "{said}");
+}
+
+#[cfg(feature = "cli")]
+/// As rosbag2 reads it: with the metadata record of that name and no metadata in it, policies are numbers.
+#[test]
+fn each_channel_has_the_quality_of_service_that_rosbag2_plays_it_with() {
+    let file = folder("qos").join("run.mcap");
+    let runtime = Runtime::with(&["--record", text(&file)]);
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.subscribe("/joint_states");
+    client.message("/joint_states");
+    end(runtime);
+    let summary = mcap::Summary::read(&fs::read(&file).unwrap())
+        .unwrap()
+        .unwrap();
+    let latched = [
+        "/robot_description",
+        "/robot_description_semantic",
+        "/tf_static",
+    ];
+    let mut seen = 0;
+    for channel in summary.channels.values() {
+        let profiles = &channel.metadata["offered_qos_profiles"];
+        let documents = yaml_rust2::YamlLoader::load_from_str(profiles).unwrap();
+        let [profile] = documents[0].as_vec().unwrap().as_slice() else {
+            panic!("{profiles}");
+        };
+        let number = |name: &str| profile[name].as_i64().unwrap();
+        let is_latched = latched.contains(&channel.topic.as_str());
+        seen += usize::from(is_latched);
+        let (transient_local, volatile) = (1, 2);
+        let durability = if is_latched {
+            transient_local
+        } else {
+            volatile
+        };
+        assert_eq!(number("durability"), durability, "{}", channel.topic);
+        assert_eq!(
+            (
+                number("history"),
+                number("reliability"),
+                number("liveliness")
+            ),
+            (1, 1, 1)
+        );
+        assert!(number("depth") > 0);
+        for time in ["deadline", "lifespan", "liveliness_lease_duration"] {
+            assert_eq!(profile[time]["sec"].as_i64(), Some(9_223_372_036));
+            assert_eq!(profile[time]["nsec"].as_i64(), Some(854_775_807));
+        }
+        assert_eq!(
+            profile["avoid_ros_namespace_conventions"].as_bool(),
+            Some(false)
+        );
+    }
+    assert_eq!(seen, latched.len());
+    assert!(
+        summary
+            .metadata_indexes
+            .iter()
+            .any(|one| one.name == "rosbag2")
+    );
+}
+
+#[test]
+fn a_record_of_another_version_is_replayed_with_a_note() {
+    let file = folder("version").join("run.mcap");
+    let runtime = Runtime::with(&["--record", text(&file)]);
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    for _ in 0..10 {
+        client.message("/joint_states");
+    }
+    end(runtime);
+    let ours = env!("PENDULARM_VERSION");
+    let recorded = fs::read(&file).unwrap();
+    assert!(!run(&["replay", text(&file)]).1.contains("note:"));
+    let other = ours.replacen(|_| true, "9", 1);
+    let hostile = ours.replacen(|_| true, "\u{1b}", 1);
+    for version in [other, hostile] {
+        let mut bytes = recorded.clone();
+        // The library's name in the header, then the metadata.
+        for _ in 0..2 {
+            let at = bytes
+                .windows(ours.len())
+                .position(|part| part == ours.as_bytes());
+            bytes[at.unwrap()..][..ours.len()].copy_from_slice(version.as_bytes());
+        }
+        fs::write(&file, bytes).unwrap();
+        let (status, said) = run(&["replay", text(&file)]);
+        assert_eq!(status, Some(0), "{said}");
+        let note = format!("; note: recorded by version {version:?}, and this is {ours:?}\n");
+        assert!(said.ends_with(&note), "{said}");
+    }
 }
 
 #[test]
@@ -156,42 +251,6 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
         said.contains(": the same up to step ") && said.contains(", and at step "),
         "{said}"
     );
-}
-
-#[test]
-fn a_record_is_played_to_clients_at_the_speed_that_they_choose() {
-    let file = folder("played").join("run.mcap");
-    let runtime = Runtime::with(&["--links", "3", "--record", text(&file)]);
-    let mut client = runtime.connect();
-    client.ask("/arm_sim/set_params", json!({"gravity": 4.25}));
-    client.subscribe("/joint_states");
-    let live: Vec<Value> = (0..30).map(|_| client.message("/joint_states")).collect();
-    end(runtime);
-
-    let player = Runtime::replaying(text(&file));
-    let mut client = player.connect();
-    client.ask("/rosbag2_player/pause", json!({}));
-    let params = client.ask("/arm_sim/set_params", json!({}));
-    assert_eq!(params["lengths"].as_array().unwrap().len(), 3);
-    client.subscribe("/joint_states");
-    client.ask(
-        "/rosbag2_player/seek",
-        json!({"time": {"sec": 0, "nanosec": 0}}),
-    );
-    client.ask("/rosbag2_player/resume", json!({}));
-    for state in &live[1..] {
-        while client.message("/joint_states") != *state {}
-    }
-    // Backward they come the other way round.
-    client.ask("/rosbag2_player/set_rate", json!({"rate": -0.5}));
-    for state in live[2..28].iter().rev() {
-        while client.message("/joint_states") != *state {}
-    }
-    end(player);
-
-    let (status, said) = run(&["replay", "--serve", "--bind", "127.0.0.1:0", "nowhere.mcap"]);
-    assert_eq!(status, Some(1));
-    assert!(said.contains("nowhere.mcap: "), "{said}");
 }
 
 #[test]

@@ -48,7 +48,12 @@ fn a_paused_arm_takes_exactly_the_steps_that_are_asked_for() {
     for steps in [1, 1, 250, 10_000] {
         let values = client.ask(STEP, json!({"steps": steps}));
         offline.advance(steps);
-        assert_eq!(values, json!({"steps": steps, "time": offline.time()}));
+        let (state, effort) = (offline.state(), offline.effort());
+        assert_eq!(
+            values,
+            json!({"steps": steps, "time": offline.time(), "position": state.position,
+                "velocity": state.velocity, "effort": effort})
+        );
     }
     assert_same(&mut client, &offline);
 }
@@ -127,7 +132,11 @@ fn a_number_of_steps_that_is_none_is_refused_and_nothing_moves() {
         );
     }
     assert_eq!(client.refusal(STEP, json!({})), "steps is required");
-    assert!(client.refusal(STEP, json!([1, 2])).starts_with("args "));
+    assert!(
+        client
+            .refusal(STEP, json!([1, [1, 2], 3]))
+            .starts_with("args ")
+    );
     assert_same(&mut client, &offline);
 }
 
@@ -144,10 +153,8 @@ fn a_divergence_ends_the_steps_and_refuses_more_until_a_reset() {
 
     let response = client.call(STEP, json!({"steps": 10_000}));
     assert_eq!(response["result"], false);
-    assert_eq!(
-        response["values"],
-        json!({"steps": taken, "time": offline.time()})
-    );
+    assert_eq!(response["values"]["steps"], taken);
+    assert_eq!(response["values"]["time"], offline.time());
     assert_eq!(
         response["status"],
         "steps ended early: the simulation has diverged"

@@ -16,7 +16,7 @@ use serde_json::json;
 const TOKEN: &str = "s3cret-&%;=\"token";
 /// The same as a query and a cookie carry it.
 #[cfg(feature = "web")]
-const ENCODED: &str = "s3cret-%26%25%3B%3D%22token";
+const ENCODED: &str = "%73%33%63%72%65%74%2D%26%25%3B%3D%22%74%6F%6B%65%6E";
 
 fn guarded() -> Runtime {
     Runtime::with(&["--token", TOKEN])
@@ -277,7 +277,7 @@ fn the_token_is_shown_in_one_way_and_no_other_spelling_counts() {
             403,
         ),
         (
-            format!("/?token={}", ENCODED.replace("s3cret", "s3cret+")),
+            format!("/?token={}", ENCODED.replace("%73", "%73+")),
             String::new(),
             403,
         ),

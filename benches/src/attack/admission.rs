@@ -41,7 +41,7 @@ pub const ATTACKS: &[Attack] = &[
     .locked(),
     Attack::new(
         "slow-heads",
-        "500 clients send the head of a request at a line a second",
+        "200 clients send the head of a request at a line a second",
         slow_heads,
     ),
     Attack::new(
@@ -118,7 +118,7 @@ fn slow_heads() -> Vec<Client> {
         .repeats_bytes(b"X-Slow: 1\r\n")
         .drips(11, Duration::from_secs(1))
         .returns()
-        .times(500)
+        .times(200)
 }
 
 fn long_heads() -> Vec<Client> {

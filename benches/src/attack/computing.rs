@@ -46,7 +46,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "busy",
-        "300 clients ask for a computation without end",
+        "200 clients ask for a computation without end",
         busy,
     )
     .fills(),
@@ -140,5 +140,5 @@ fn left_behind() -> Vec<Client> {
 fn busy() -> Vec<Client> {
     Client::tcp()
         .says_each(0..2, |_| rollout(r#","timestep":1e-6,"reference":true"#))
-        .times(300)
+        .times(200)
 }

@@ -4,36 +4,36 @@ use super::Attack;
 use super::script::{Client, call, each, on_service, publish, subscribe};
 
 /// Subscribers, or callers: with those who attack them, nearly all places.
-const CROWD: usize = 800;
+const CROWD: usize = 180;
 /// Clients that ask for what others have registered.
-const ASKERS: usize = 900;
+const ASKERS: usize = 180;
 /// Calls of a client that may wait.
 const WAITING: usize = 256;
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "storm-beside-waiting",
-        "800 clients have 256 calls wait each; 50 connect, say nothing and go, over and over",
+        "180 clients have 256 calls wait each; 50 connect, say nothing and go, over and over",
         storm,
     ),
     Attack::new(
         "late-together",
-        "800 clients have 256 calls wait each, whose time is over at one instant",
+        "180 clients have 256 calls wait each, whose time is over at one instant",
         late_together,
     ),
     Attack::new(
         "left-together",
-        "a provider goes that 800 clients have 256 calls wait for, and another returns",
+        "a provider goes that 180 clients have 256 calls wait for, and another returns",
         left_together,
     ),
     Attack::new(
         "publishers-to-deaf",
-        "120 clients publish a message each every millisecond to 800 that read nothing",
+        "40 clients publish a message each every millisecond to 180 that read nothing",
         publishers_to_deaf,
     ),
     Attack::new(
         "publishers-to-throttled",
-        "the same to 800 that have all but one message a minute held back",
+        "the same to 180 that have all but one message a minute held back",
         publishers_to_throttled,
     ),
     Attack::new(
@@ -43,7 +43,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "census",
-        "36 clients register 12,288 names, 900 ask rosapi for a service's type at one instant, every second",
+        "36 clients register 12,288 names, 180 ask rosapi for a service's type at one instant, every second",
         census,
     ),
 ];
@@ -81,7 +81,7 @@ fn publishers(further: &str) -> Vec<Client> {
         .advertises("/crowd")
         .repeats_bytes(message.as_bytes())
         .drips(message.len(), std::time::Duration::from_millis(1));
-    [subscriber.times(CROWD), publisher.times(120)].concat()
+    [subscriber.times(CROWD), publisher.times(40)].concat()
 }
 
 fn publishers_to_deaf() -> Vec<Client> {

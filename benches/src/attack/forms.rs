@@ -15,8 +15,8 @@ pub const ATTACKS: &[Attack] = &[
         fragment_sizes_100,
     ),
     Attack::new(
-        "fragment-sizes-400",
-        "400 subscribers, each with a size of its own",
+        "fragment-sizes-200",
+        "200 subscribers, each with a size of its own",
         fragment_sizes_400,
     ),
     Attack::new(
@@ -110,7 +110,7 @@ fn fragment_sizes_100() -> Vec<Client> {
 
 fn fragment_sizes_400() -> Vec<Client> {
     sizes(
-        400,
+        200,
         Client::tcp,
         |k| format!(r#","fragment_size":{}"#, 1_000 + k),
         &text(3 * MIB),

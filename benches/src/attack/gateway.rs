@@ -110,13 +110,13 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "half-open",
-        "400 clients ask, stop sending and stay; 20 more come and go",
+        "200 clients ask, stop sending and stay; 20 more come and go",
         half_open,
     ),
-    Attack::new("idle", "1,100 clients connect and are silent", idle).fills(),
+    Attack::new("idle", "300 clients connect and are silent", idle).fills(),
     Attack::new(
         "byte-per-second",
-        "500 clients send a frame at a byte a second",
+        "200 clients send a frame at a byte a second",
         byte_per_second,
     ),
     Attack::new(
@@ -290,16 +290,16 @@ fn half_open() -> Vec<Client> {
         .says_each(0..10, |_| light(PAUSE))
         .half_closes();
     let returns = asks.clone().returns().times(20);
-    [asks.deaf().times(400), returns].concat()
+    [asks.deaf().times(200), returns].concat()
 }
 
 fn idle() -> Vec<Client> {
-    Client::tcp().times(1_100)
+    Client::tcp().times(300)
 }
 
 fn byte_per_second() -> Vec<Client> {
     let drip = std::time::Duration::from_secs(1);
-    Client::tcp().says(&light(PAUSE)).drips(1, drip).times(500)
+    Client::tcp().says(&light(PAUSE)).drips(1, drip).times(200)
 }
 
 fn few_files() -> Vec<Client> {

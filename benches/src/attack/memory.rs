@@ -20,7 +20,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "deaf-tiny",
-        "600 clients read no message of a flood of 40 bytes each",
+        "200 clients read no message of a flood of 40 bytes each",
         deaf_tiny,
     ),
     Attack::new(
@@ -35,7 +35,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "deaf-watchers",
-        "800 clients subscribe to all that the arm publishes and read nothing",
+        "200 clients subscribe to all that the arm publishes and read nothing",
         deaf_watchers,
     ),
     Attack::new(
@@ -55,7 +55,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "throttled-series",
-        "900 subscribers are throttled beside a flood of short messages",
+        "200 subscribers are throttled beside a flood of short messages",
         throttled_series,
     ),
     Attack::new(
@@ -70,7 +70,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "unfinished-frames",
-        "300 clients send all of a frame of 4 MiB but its end",
+        "200 clients send all of a frame of 4 MiB but its end",
         unfinished_frames,
     ),
     Attack::new(
@@ -119,7 +119,7 @@ fn deaf_tiny() -> Vec<Client> {
         Client::tcp()
             .says(&subscribe("/attack/tiny", ""))
             .deaf()
-            .times(600),
+            .times(200),
         flood,
     ]
     .concat()
@@ -159,7 +159,7 @@ fn deaf_watchers() -> Vec<Client> {
     Client::tcp()
         .says_each(0..TOPICS.len(), |k| subscribe(TOPICS[k], ""))
         .deaf()
-        .times(800)
+        .times(200)
 }
 
 fn deaf_log() -> Vec<Client> {
@@ -213,7 +213,7 @@ fn throttled_series() -> Vec<Client> {
         .after(400)
         .times(1);
     [
-        each(0..900, |k| {
+        each(0..200, |k| {
             Client::tcp().says(&subscribe("/attack/series", &further(k)))
         }),
         flood,
@@ -252,7 +252,7 @@ fn unfinished_frames() -> Vec<Client> {
         r#"{{"op":"publish","topic":"/t","msg":{{"data":"{}"#,
         filler(LONG - 64)
     );
-    Client::tcp().says_bytes(begun.as_bytes()).times(300)
+    Client::tcp().says_bytes(begun.as_bytes()).times(200)
 }
 
 fn fragment_bombs() -> Vec<Client> {

@@ -23,7 +23,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "half-chunks",
-        "900 clients send a frame of 31 KB each, four times a second",
+        "200 clients send a frame of 31 KB each, four times a second",
         half_chunks,
     )
     .fills(),
@@ -73,5 +73,5 @@ fn half_chunks() -> Vec<Client> {
     Client::tcp()
         .repeats(&frame)
         .drips(frame.len() + 1, Duration::from_millis(250))
-        .times(900)
+        .times(200)
 }

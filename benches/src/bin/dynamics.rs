@@ -35,43 +35,52 @@ fn main() {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["count", "2", gravity, what] => count::<2>(gravity, what),
         ["count", "3", gravity, what] => count::<3>(gravity, what),
-        _ => {
-            report::<2>();
-            report::<3>();
-        }
+        [runs] => report_both(runs.parse().expect("a number of runs")),
+        _ => report_both(RUNS),
     }
 }
 
-fn report<const N: usize>() {
+fn report_both(runs: usize) {
+    report::<2>(runs);
+    report::<3>(runs);
+}
+
+fn report<const N: usize>(runs: usize) {
     println!("{N} links, ns");
     let show = |time: f64, what: &str| println!("{time:8.1}  {what}");
     let states = states::<N>();
     let mut pairs = vec![([0.0; N], [0.0; N]); CALLS];
-    let time = shortest(|| sines(black_box(&states), black_box(&mut pairs), sin_cos));
+    let time = shortest(runs, || {
+        sines(black_box(&states), black_box(&mut pairs), sin_cos)
+    });
     show(time, "sines and cosines, throughput");
     let library = |q: &[f64; N]| (q.map(f64::sin), q.map(f64::cos));
-    let time = shortest(|| sines(black_box(&states), black_box(&mut pairs), library));
+    let time = shortest(runs, || {
+        sines(black_box(&states), black_box(&mut pairs), library)
+    });
     show(time, "the same by the C library");
 
     let arm = black_box(Arm::<N>::default());
     let effort = black_box([0.3; N]);
     let mut out = vec![[0.0; N]; CALLS];
-    let time = shortest(|| independent(&arm, &effort, black_box(&states), black_box(&mut out)));
+    let time = shortest(runs, || {
+        independent(&arm, &effort, black_box(&states), black_box(&mut out))
+    });
     show(time, "forward dynamics, throughput");
-    let time = shortest(|| chained(&arm, &effort, start()));
+    let time = shortest(runs, || chained(&arm, &effort, start()));
     show(time, "forward dynamics, chained");
     for method in Method::ALL.map(black_box) {
-        let time = shortest(|| steps(&arm, method, &effort, start()));
+        let time = shortest(runs, || steps(&arm, method, &effort, start()));
         show(time, &format!("{method} step, chained"));
-        let time = shortest(|| live(arm, method));
+        let time = shortest(runs, || live(arm, method));
         show(time, &format!("{method} simulation, PID on"));
     }
 }
 
 /// Nanoseconds per call of the fastest run.
-fn shortest<T>(mut run: impl FnMut() -> T) -> f64 {
+fn shortest<T>(runs: usize, mut run: impl FnMut() -> T) -> f64 {
     let mut shortest = f64::INFINITY;
-    for _ in 0..RUNS {
+    for _ in 0..runs {
         let begun = Instant::now();
         black_box(run());
         shortest = shortest.min(begun.elapsed().as_secs_f64());

@@ -27,9 +27,9 @@ use std::time::Duration;
 use arbitrary::Arbitrary;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_TIME, STALL_LIMIT};
-use pendularm::actors::resources::budget::Memory;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
-use pendularm::web::serve::TAKE_TIME;
+use pendularm::web::stream::ANSWER_TIME;
 use pendularm_client::websocket;
 use tokio::time::sleep;
 
@@ -272,8 +272,6 @@ impl Session {
 
     /// Looks at all that came.
     fn hear(&mut self) {
-        // Where room is scarce, whoever holds most is cut off.
-        let someone_gave_way = self.stage.gauges.memory().cut_off() > 0;
         for player in &mut self.players {
             for received in player.client.take() {
                 match received {
@@ -286,9 +284,9 @@ impl Session {
                 let patience = if player.client.is_greeted() {
                     STALL_LIMIT
                 } else {
-                    TAKE_TIME
+                    ANSWER_TIME
                 };
-                let stalled = player.idle >= patience || someone_gave_way;
+                let stalled = player.idle >= patience;
                 assert!(
                     player.is_excused || stalled,
                     "ended for no reason: {}",

@@ -13,6 +13,9 @@ __all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "read_see
 
 Floats = NDArray[np.float64]
 
+MOST_LISTED = 10_000_000
+"""Entries of a sequence that is no NumPy array."""
+
 
 def shown(value: Any) -> str:
     """A value as an error shows it; Python writes out no whole number of thousands of digits."""
@@ -69,6 +72,18 @@ def is_masked(value: Any, depth: int = 2) -> bool:
     return depth > 0 and any(is_masked(one, depth - 1) for one in parts)
 
 
+def is_too_long(value: Any, depth: int = 2) -> bool:
+    """Whether NumPy would allocate more than `MOST_LISTED` entries for it, all of a range for example."""
+    if hasattr(value, "__array__") or not hasattr(value, "__len__"):
+        return False
+    try:
+        if len(value) > MOST_LISTED:
+            return True
+    except OverflowError:
+        return True
+    return depth > 0 and isinstance(value, list | tuple) and any(is_too_long(one, depth - 1) for one in value)
+
+
 def number(name: str, value: Any) -> float:
     if is_masked(value):
         raise ValueError(f"{name} must have no masked numbers, got {shown(value)}")
@@ -81,7 +96,9 @@ def number(name: str, value: Any) -> float:
 
 
 def numbers(value: Any) -> Floats:
-    """The value as doubles; texts, `None` and complex numbers are none."""
+    """The value as doubles; texts, `None`, complex numbers and endless sequences are none."""
+    if is_too_long(value):
+        raise ValueError
     array = np.asarray(value)
     if array.dtype.kind == "O":
         # NumPy would read texts, make a NaN of None, and drop imaginary parts.

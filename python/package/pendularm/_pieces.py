@@ -68,12 +68,20 @@ class _Bar:
     """A progress bar where tqdm is installed and somebody is watching."""
 
     def __init__(self, total: int, already: int, wanted: bool) -> None:
+        # `None`: only on a terminal.
+        hidden = None
         try:
-            from tqdm.auto import tqdm
+            from tqdm import tqdm
+
+            if _in_notebook():
+                from tqdm import notebook
+
+                hidden = False
+                # Without ipywidgets the bar is of text. `tqdm.auto` would warn.
+                if notebook.IProgress is not None:
+                    tqdm = notebook.tqdm
         except ImportError:
             wanted = False
-        # `None`: only on a terminal.
-        hidden = False if _in_notebook() else None
         self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
 
     def __enter__(self) -> "_Bar":

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ._fields import is_masked, numbers, shown
+from ._fields import flag, is_masked, numbers, shown
 from ._native import Batch
 
 TRIED_AT_ONCE = 16_384
@@ -14,7 +14,7 @@ TRIED_AT_ONCE = 16_384
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
 STATES = ("setpoint", "q0", "qdot0")
-SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
+SETTINGS = (*PER_JOINT, "gravity", "timestep", "method", "control_period", "control_delay")
 
 
 def column(name: str, values: list[Any], links: int) -> Any:
@@ -25,6 +25,8 @@ def column(name: str, values: list[Any], links: int) -> Any:
         if not all(isinstance(value, str) for value in values):
             raise ValueError(f"every method must be a name, got {shown(values)}")
         return np.array([str(value) for value in values])
+    if name == "control_delay":
+        return np.array([flag(f"every {name}", value) for value in values])
     if is_masked(values):
         raise ValueError(f"every {name} must have no masked numbers, got {shown(values)}")
     try:
@@ -55,6 +57,7 @@ def begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
     if "method" in settings:
         batch.set_integrator(settings["method"].tolist())
     batch.set_integrator(**of("timestep"))
+    batch.set_control_period(**of("control_period", "control_delay"))
     batch.set_gains(**of("kp", "ki", "kd"))
     if "setpoint" in settings:
         batch.set_setpoint(settings["setpoint"])

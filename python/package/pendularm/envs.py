@@ -20,9 +20,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from . import dynamics
 from ._fields import is_masked, read_seeds, shown, whole_number
-from ._native import Arm, Batch
+from ._render import METADATA, Frame, Renderer
+from ._tasks import TIMESTEP, Action, Floats, Observation, Reach, SwingUp, Task
 
 __all__ = [
     "PendularmEnv",
@@ -30,119 +30,6 @@ __all__ = [
     "PendularmReachVectorEnv",
     "PendularmVectorEnv",
 ]
-
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
-Floats = NDArray[np.float64]
-
-SUBSTEPS = 2
-TIMESTEP = 0.025
-"""Steps of Runge-Kutta 4 in a step of an environment, which thus takes 0.05 s."""
-
-FASTEST = 25.0
-"""Joint rate [rad/s] at which an arm counts as lost: the method carries twice as much."""
-
-
-class _Task:
-    """Arms that all have the same to do: how they start, what is seen of them, and what they are rewarded for."""
-
-    strength: ClassVar[float]
-    """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
-    most_steps: ClassVar[int]
-    """Steps after which an episode is truncated, unless told otherwise."""
-
-    def __init__(self, arms: int, links: int, threads: int | None) -> None:
-        self.batch = Batch(arms, links, threads=threads)
-        self.batch.set_integrator("rk4", TIMESTEP)
-        arm = Arm(links)
-        self.links = links
-        self.reach = arm.reach
-        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))
-        self.action_space = spaces.Box(-1.0, 1.0, (links,), np.float32)
-        bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
-        self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
-
-    def further_bounds(self) -> list[float]:
-        return []
-
-    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
-        """Puts arms where they start, each from its own stream."""
-        raise NotImplementedError
-
-    def further(self) -> list[Floats]:
-        """Observations beside the joints, a row per arm."""
-        return []
-
-    def reward(self) -> Floats:
-        """From 0 to 1, one per arm: an end that comes early is never a gain."""
-        raise NotImplementedError
-
-    def go_on(self, actions: Action) -> None:
-        """Takes a step with every arm under its row of `actions`, (arms, links)."""
-        self.batch.step(SUBSTEPS, np.clip(actions, -1.0, 1.0) * self.efforts)
-
-    def observe(self) -> Observation:
-        position, rate = self.batch.position, self.batch.velocity
-        seen = [np.cos(position), np.sin(position), np.clip(rate, -FASTEST, FASTEST), *self.further()]
-        return np.concatenate(seen, axis=1, dtype=np.float32, casting="same_kind")
-
-    def lost(self) -> NDArray[np.bool_]:
-        return self.batch.diverged | (np.abs(self.batch.velocity) > FASTEST).any(axis=1)
-
-
-class _SwingUp(_Task):
-    strength = 0.5
-    most_steps = 200
-
-    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
-        off = np.array([one.uniform(-0.1, 0.1, (2, self.links)) for one in random])
-        off[:, 0, 0] -= np.pi / 2
-        self.batch.reset(list(arms))
-        self.batch.set_state(off[:, 0], off[:, 1], list(arms))
-
-    def reward(self) -> Floats:
-        height: Floats = self.batch.end_effector[:, 1]
-        return 0.5 + 0.5 * height / self.reach
-
-
-class _Reach(_Task):
-    strength = 2.0
-    most_steps = 100
-
-    def __init__(self, arms: int, links: int, threads: int | None) -> None:
-        super().__init__(arms, links, threads)
-        self.targets = np.zeros((arms, 2))
-        # Target less end effector, looked at twice a step.
-        self.away = np.zeros((arms, 2))
-
-    def further_bounds(self) -> list[float]:
-        reach = float(Arm(self.links).reach)
-        return [reach] * 2 + [2 * reach] * 2
-
-    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
-        drawn = np.array([one.uniform(0.0, 1.0, self.links + 2) for one in random])
-        # Every part of the disc that is not within a twentieth of its edge is as likely as any other of the same area.
-        distance = 0.95 * self.reach * np.sqrt(drawn[:, 0])
-        bearing = 2 * np.pi * drawn[:, 1]
-        self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
-        self.batch.reset(list(arms))
-        self.batch.set_state(np.pi * (2 * drawn[:, 2:] - 1), None, list(arms))
-        self.away = self.targets - self.batch.end_effector
-
-    def go_on(self, actions: Action) -> None:
-        super().go_on(actions)
-        self.away = self.targets - self.batch.end_effector
-
-    def further(self) -> list[Floats]:
-        return [self.targets, self.away]
-
-    def reward(self) -> Floats:
-        return 1.0 - np.hypot(self.away[:, 0], self.away[:, 1]) / (2 * self.reach)
-
-
-def _check_render_mode(render_mode: str | None) -> None:
-    if render_mode is not None:
-        raise ValueError(f"render_mode must be None, got {render_mode!r}")
 
 
 def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
@@ -160,13 +47,25 @@ def _named(refusal: ValueError, theirs: str, ours: str) -> ValueError:
     return ValueError(str(refusal).replace(theirs, ours, 1))
 
 
-class _Single(gymnasium.Env[Observation, Action]):
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
-    task_of: ClassVar[type[_Task]]
+def _need_reset(call: str, has_begun: bool) -> None:
+    if not has_begun:
+        raise gymnasium.error.ResetNeeded(f"{call} needs a reset before it, and another one after close")
 
-    def __init__(self, links: int = 2, render_mode: str | None = None) -> None:
-        _check_render_mode(render_mode)
-        self._task = self.task_of(1, links, 1)
+
+class _Single(gymnasium.Env[Observation, Action]):
+    metadata: dict[str, Any] = METADATA  # noqa: RUF012
+    task_of: ClassVar[type[Task]]
+
+    def __init__(
+        self,
+        links: int = 2,
+        method: str = "rk4",
+        timestep: float = TIMESTEP,
+        render_mode: str | None = None,
+    ) -> None:
+        self._task = self.task_of(1, links, 1, method, timestep)
+        self._picture = Renderer(render_mode, self._task)
+        self._has_begun = False
         self.render_mode = render_mode
         self.observation_space = self._task.observation_space
         self.action_space = self._task.action_space
@@ -176,20 +75,33 @@ class _Single(gymnasium.Env[Observation, Action]):
     ) -> tuple[Observation, dict[str, Any]]:
         super().reset(seed=seed, options=options)
         self._task.begin([0], [self.np_random])
+        self._has_begun = True
+        self._picture.update(np.ones(1, np.bool_))
         return self._task.observe()[0], {}
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        _need_reset("step", self._has_begun)
         action = _checked("action", action, self.action_space)
         try:
             self._task.go_on(action[None])
         except ValueError as refusal:
             raise _named(refusal, "effort[0]", "action") from None
+        self._picture.update(np.zeros(1, np.bool_))
         return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
+
+    def render(self) -> Frame | None:
+        _need_reset("render", self._has_begun)
+        frames = self._picture.frames()
+        return frames[0] if frames else None
+
+    def close(self) -> None:
+        self._has_begun = False
+        self._picture.close()
 
 
 class _Vector(VectorEnv[Observation, Action, Any]):
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
-    task_of: ClassVar[type[_Task]]
+    metadata: dict[str, Any] = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    task_of: ClassVar[type[Task]]
 
     def __init__(
         self,
@@ -197,20 +109,22 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         links: int = 2,
         max_episode_steps: int | None = None,
         threads: int | None = None,
+        method: str = "rk4",
+        timestep: float = TIMESTEP,
         render_mode: str | None = None,
     ) -> None:
-        _check_render_mode(render_mode)
         if max_episode_steps is None:
             max_episode_steps = self.task_of.most_steps
         most_steps = whole_number("max_episode_steps", max_episode_steps)
         if most_steps < 1 and most_steps != -1:
             raise ValueError(f"max_episode_steps must be at least 1, or -1 for no limit, got {shown(most_steps)}")
         try:
-            self._task = self.task_of(num_envs, links, threads)
+            self._task = self.task_of(num_envs, links, threads, method, timestep)
         except ValueError as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
         # No arm takes so many steps in a lifetime: the largest number is no limit.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
+        self._picture = Renderer(render_mode, self._task)
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_observation_space = self._task.observation_space
@@ -259,14 +173,15 @@ class _Vector(VectorEnv[Observation, Action, Any]):
                 if seeds[arm] is not None:
                     self._streams[arm] = seeding.np_random(seeds[arm])
         self._has_begun = True
+        self.closed = False
         self._begin(mask)
+        self._picture.update(mask)
         return self._task.observe(), {}
 
     def step(
         self, actions: Action
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        if not self._has_begun:
-            raise gymnasium.error.ResetNeeded("reset has to come before the first step")
+        _need_reset("step", self._has_begun)
         # Arms that have ended are stepped with the others, by no effort, and begin anew wherever that leads.
         again = self._ended
         actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
@@ -282,7 +197,17 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             lost[again] = False
         truncated = self._elapsed >= self._most_steps
         self._ended = lost | truncated
+        self._picture.update(again)
         return self._task.observe(), rewards, lost, truncated, {}
+
+    def render(self) -> tuple[Frame, ...] | None:
+        """A frame for each arm."""
+        _need_reset("render", self._has_begun)
+        return self._picture.frames()
+
+    def close_extras(self, **kwargs: Any) -> None:
+        self._has_begun = False
+        self._picture.close()
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         arms = np.flatnonzero(mask).tolist()
@@ -314,8 +239,14 @@ _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as s
     rad/s; truncated after 200 steps (10 s).
 
     ## Arguments
-    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`, and `max_episode_steps`, -1 for no
-    limit.
+    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
+    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
+    `Batch` does, and `max_episode_steps`, -1 for no limit.
+
+    ## Rendering
+    Drawn are the arm, the target (here that is the highest point) and the last 2 s of the end effector's path. A frame is
+    (480, 480, 3) of uint8; the vector environment returns a tuple with a frame per arm, and a window shows its first
+    16 arms. It needs pygame: `pip install "pendularm[render]"`.
 
     ## Versions
     v0: the first.
@@ -346,8 +277,14 @@ _REACH = """The end effector is to come to a target and stay, with efforts twice
     faster than 25 rad/s; truncated after 100 steps (5 s).
 
     ## Arguments
-    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`, and `max_episode_steps`, -1 for no
-    limit.
+    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
+    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
+    `Batch` does, and `max_episode_steps`, -1 for no limit.
+
+    ## Rendering
+    Drawn are the arm, the target (here that is the one observed) and the last 2 s of the end effector's path. A frame is
+    (480, 480, 3) of uint8; the vector environment returns a tuple with a frame per arm, and a window shows its first
+    16 arms. It needs pygame: `pip install "pendularm[render]"`.
 
     ## Versions
     v0: the first.
@@ -356,25 +293,26 @@ _REACH = """The end effector is to come to a target and stay, with efforts twice
 
 class PendularmEnv(_Single):
     __doc__ = _SWING_UP
-    task_of = _SwingUp
+    task_of = SwingUp
 
 
 class PendularmVectorEnv(_Vector):
     __doc__ = _SWING_UP
-    task_of = _SwingUp
+    task_of = SwingUp
 
 
 class PendularmReachEnv(_Single):
     __doc__ = _REACH
-    task_of = _Reach
+    task_of = Reach
 
 
 class PendularmReachVectorEnv(_Vector):
     __doc__ = _REACH
-    task_of = _Reach
+    task_of = Reach
 
 
-for _name, _task in [("Pendularm", _SwingUp), ("PendularmReach", _Reach)]:
+_TASKS: dict[str, type[Task]] = {"Pendularm": SwingUp, "PendularmReach": Reach}
+for _name, _task in _TASKS.items():
     gymnasium.register(
         f"{_name}-v0",
         entry_point=f"pendularm.envs:{_name}Env",

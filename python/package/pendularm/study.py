@@ -42,8 +42,12 @@ class Critical:
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """The largest stable timesteps of a control loop [s]. `None`: nothing limits; 0: unstable at every timestep."""
+    """The largest stable timesteps and control period of a control loop [s]. `None`: nothing limits; 0: unstable at every timestep."""
 
+    control_period_limit: float | None
+    """The longest stable control period at `equilibrium`, of an arm that moves exactly between two runs of the law."""
+    timestep_limit: float | None
+    """The longest stable timestep at `equilibrium`, at the control period that was asked about."""
     timestep_limit_held: float | None
     """At `equilibrium`, with the effort held over the step, as the live arm does."""
     timestep_limit_continuous: float | None
@@ -53,11 +57,13 @@ class Stability:
     equilibrium_kind: str
     """`setpoint`, `sagging`, `hanging`, `saddle` or `unstable`."""
     minimum_over_poses_held: float | None
-    """The smallest over all poses, effort held."""
+    """The smallest over all poses, effort held; 0 where a joint integrates and the loop runs away in some pose."""
     minimum_over_poses_continuous: float | None
     """The smallest over all poses, control in every stage."""
     minimum_over_poses_bound: float | None
-    """A timestep up to which every pose is proven to be stable; `None` where nothing useful is."""
+    """A timestep up to which every pose is stable; `None` where nothing useful is known."""
+    bound_is_proven: bool
+    """Whether that bound is proven; otherwise an estimate of gravity's part is inside."""
     certified: bool
     """Whether the bound is within 1 % of `minimum_over_poses_held`."""
     worst_pose: Floats | None
@@ -65,11 +71,13 @@ class Stability:
     critical: Critical | None
     """The motion that grows there first."""
     timestep_limit_motion: float | None
-    """Up to what timestep the method carries the motion that is ahead; `None` where nothing moves."""
+    """The largest timestep at which the coming motion does not overflow; `None` where nothing moves."""
     motion_speed: float
     """The speed of the fastest link in that motion [rad/s]."""
     advised_timestep: float | None
-    """0.8 of the smaller of that and the minimum over poses."""
+    """0.8 of the smaller of that and the minimum over poses; where that is 0 it is for this setpoint alone."""
+    advised_duration: float | None
+    """How long a free arm keeps its energy to a factor of two at that timestep [s]; `None` under control."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +102,10 @@ class Rollout:
     """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known so well."""
     error_uncertainty: float | None
     """Largest distance of two references from each other [rad]."""
+    sampling_error: float | None
+    """Largest distance of a joint from a loop whose law acts at every instant [rad]; `None` as for `error`."""
+    sampling_error_uncertainty: float | None
+    """Largest distance of two runs of that loop from each other [rad]."""
     divergence: tuple[int, float] | None
     """Step and time [s] at which the run left the finite numbers, if it did; the samples end before."""
 
@@ -106,7 +118,7 @@ class Plan:
     timestep: float
     """[s]."""
     control_period: float | None
-    """The timestep too [s]; `None` for an arm left to itself."""
+    """The timestep too [s], unless another was asked for; `None` for an arm left to itself."""
     evaluations_per_second: float
     """Evaluations of the dynamics per simulated second."""
     error: float
@@ -133,7 +145,7 @@ class SuggestedGains:
     timestep_limit: float | None
     """The smallest stable timestep over all poses [s]; `None` where nothing limits."""
     certified: bool
-    """Whether that is proven to 1 %."""
+    """Whether a lower bound comes within 1 % of it."""
     margin: float | None
     """How many timesteps it is."""
     settled_after: float
@@ -168,14 +180,17 @@ def stability(
     setpoint: ArrayLike | None = None,
     q: ArrayLike | None = None,
     qd: ArrayLike | None = None,
+    control_period: float = 0.0,
 ) -> Stability:
     """Predicts the largest timestep at which a control loop is stable, as ``/study/stability`` does.
 
     `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about
     an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
-    from which the motion is ahead.
+    from which the motion is ahead. The law runs once per `control_period` [s], 0 for every step.
     """
-    found = _native.stability(arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd)
+    found = _native.stability(
+        arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd, control_period=control_period
+    )
     critical = found.pop("critical")
     return Stability(**found, critical=None if critical is None else Critical(**critical))
 
@@ -192,13 +207,15 @@ def rollout(
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
     reference: bool | np.bool_ = False,
+    control_period: float = 0.0,
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
-    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
-    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and no `setpoint`
-    may be given; a member that is left out of them is zeros. With `reference` the run is compared with the true
-    motion under the same held control law.
+    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s], a timestep at least and
+    rounded to the nearest number of timesteps, and gives `samples`, start and end among them, or every step if there
+    are fewer. Without `gains` nothing controls the arm, and no `setpoint` may be given; a member that is left out of
+    them is zeros. With `reference` the run is compared with the true motion under the same held control law,
+    and with the loop whose law acts at every instant. The law runs once per `control_period` [s], 0 for every step.
     """
     return Rollout(
         **_native.rollout(
@@ -212,6 +229,7 @@ def rollout(
             setpoint=setpoint,
             samples=samples,
             reference=reference,
+            control_period=control_period,
         )
     )
 
@@ -225,13 +243,14 @@ def plan(
     qdot0: ArrayLike | None = None,
     gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
+    control_period: float = 0.0,
 ) -> Plan:
     """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan``
     does.
 
     Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s],
     and no `setpoint` may be given; with them it moves to `setpoint` [rad] (4 s unless given), and holding the effort
-    counts as error. A member that is left out of them is zeros. Raises `ValueError` where the motion cannot be known so
+    counts as error, unless the `control_period` [s] is given. A member that is left out of them is zeros. Raises `ValueError` where the motion cannot be known so
     well for so long.
     """
     return Plan(
@@ -243,5 +262,6 @@ def plan(
             qdot0=qdot0,
             gains=gains,
             setpoint=setpoint,
+            control_period=control_period,
         )
     )

@@ -4,6 +4,7 @@ A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor th
 results.
 """
 
+import errno
 import math
 import os
 import sys
@@ -13,6 +14,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from itertools import islice
 from typing import Any, Protocol
 
 import numpy as np
@@ -142,17 +144,17 @@ def sweep(
     """Runs an arm for every combination of the settings in `grid`, and answers what `metric` makes of each run.
 
     Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
-    `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and
-    `method`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
-    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s], a timestep at least,
-    and has `samples`, start and end among them.
+    `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s],
+    `method`, `control_period` [s] and `control_delay`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
+    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s], a timestep at least
+    and rounded to the nearest number of timesteps, and has `samples`, start and end among them.
 
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
     a `Run`, which an executor has to be able to send.
 
     Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
     hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
-    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
+    there are cores, fewer where the system has no more of them. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
     function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
     ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another
     sweep.
@@ -165,7 +167,7 @@ def sweep(
             # The parts of a text are characters, or numbers.
             if isinstance(values, str | bytes | bytearray):
                 raise TypeError
-            axes[name] = list(values)
+            axes[name] = list(islice(values, MOST_SETTINGS + 1))
         except TypeError:
             raise ValueError(f"grid[{name!r}] must be a sequence of values, got {shown(values)}") from None
     for name, choices in axes.items():
@@ -217,7 +219,7 @@ def sweep(
         hand_out(question, total, left, piece, executor, _solve, done, kept, progress)
     else:
         stopped = threading.Event()
-        with ThreadPoolExecutor(_cores()) as threads:
+        with _Threads(_cores()) as threads:
             try:
                 hand_out(question, total, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
             finally:
@@ -229,6 +231,17 @@ def sweep(
             raise ValueError(f"metric must answer the same names for all arms, got {names}")
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
+
+
+class _Threads(ThreadPoolExecutor):
+    """Threads, fewer than asked for where the system has no more of them."""
+
+    def _adjust_thread_count(self) -> None:
+        try:
+            super()._adjust_thread_count()
+        except RuntimeError:
+            if not self._threads:
+                raise OSError(errno.EAGAIN, "no thread can be started") from None
 
 
 def _cores() -> int:
@@ -259,10 +272,9 @@ class _Question:
             try_values(name, values, self.links)
         timesteps = settings.get("timestep", [TIMESTEP])
         longest = float(max(timesteps))
-        # A quotient that falls short of 1 by rounding alone counts as that, as in a rollout.
-        if self.duration / longest * (1 + 4 * sys.float_info.epsilon) < 1:
+        if _steps_in(self.duration, longest) < 1:
             raise ValueError(f"duration must be at least the timestep {longest}, got {self.duration}")
-        steps = self.duration / float(min(timesteps))
+        steps = np.rint(_steps_in(self.duration, float(min(timesteps))))
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
@@ -283,6 +295,11 @@ class _Question:
             "samples": self.samples,
             "servo": self.servo,
         }
+
+
+def _steps_in(duration: float, timestep: Any) -> Any:
+    """As `steps_in` of the library in Rust: rounded, half a step upwards, it is the number of steps of a run."""
+    return duration / timestep * (1 + 4 * sys.float_info.epsilon)
 
 
 def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:
@@ -310,8 +327,10 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     positions, velocities, efforts = np.empty(shape), np.empty(shape), np.empty(shape)
     times, energy = np.empty(shape[:2]), np.empty(shape[:2])
     taken = np.zeros(arms, np.int64)
-    for sample, time in enumerate(np.linspace(0.0, question.duration, question.samples)):
-        due = np.rint(time / timestep).astype(np.int64)
+    steps, intervals = np.floor(_steps_in(question.duration, timestep) + 0.5).astype(np.int64), question.samples - 1
+    for sample in range(question.samples):
+        # The nearest step, as in a rollout.
+        due = (2 * sample * steps + intervals) // (2 * intervals)
         _advance(batch, due - taken, stopped)
         taken = due
         positions[sample], velocities[sample], efforts[sample] = batch.position, batch.velocity, batch.effort

@@ -8,8 +8,8 @@ use pyo3::prelude::{PyAnyMethods, PyResult};
 use pyo3::types::{PyByteArray, PyBytes};
 
 use super::Batch;
-use crate::arrays::{Numbers, Rows, laid_out};
-use crate::fields::{self, Bound, Object, is_masked, refused, shown};
+use crate::arrays::{Numbers, Rows, collected, laid_out, room};
+use crate::fields::{self, Bound, Object, entries, is_masked, is_too_long, refused, shown};
 
 impl Batch {
     /// A row for each arm, or one for all, where something was handed in.
@@ -58,9 +58,11 @@ pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> 
     if let Some(alike) = fields::count(steps) {
         return Ok(vec![alike]);
     }
-    let each: Vec<Object<'_>> = steps.extract().map_err(|_| expected())?;
-    let each: Option<Vec<u64>> = each.iter().map(fields::count).collect();
-    each.filter(|each| each.len() == arms).ok_or_else(expected)
+    let mut each = room(arms)?;
+    for one in entries(steps, arms)?.ok_or_else(expected)? {
+        each.push(fields::count(&one).ok_or_else(expected)?);
+    }
+    Ok(each)
 }
 
 /// One method for all arms, or one for each.
@@ -68,21 +70,51 @@ pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Met
     if let Ok(alike) = method.extract::<String>() {
         return Ok(vec![fields::method("method", &alike)?]);
     }
-    match method.extract::<Vec<String>>() {
-        Ok(each) if each.len() == arms => each
-            .iter()
-            .map(|name| fields::method("method", name))
-            .collect(),
-        _ => Err(refused(format_args!(
+    let expected = || {
+        refused(format_args!(
             "method must be a name, or one for each of {arms} arms"
-        ))),
+        ))
+    };
+    let mut each = room(arms)?;
+    for one in entries(method, arms)?.ok_or_else(expected)? {
+        let name: String = one.extract().map_err(|_| expected())?;
+        each.push(fields::method("method", &name)?);
+    }
+    Ok(each)
+}
+
+/// One truth for all arms, or one for each.
+pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResult<Vec<bool>> {
+    let expected = || {
+        refused(format_args!(
+            "{field} must be True or False, or one of them for each of {arms} arms"
+        ))
+    };
+    if is_masked(flag)? {
+        return Err(expected());
+    }
+    if let Ok(alike) = flag.extract() {
+        return Ok(vec![alike]);
+    }
+    let mut each = room(arms)?;
+    for one in entries(flag, arms)?.ok_or_else(expected)? {
+        each.push(one.extract().map_err(|_| expected())?);
+    }
+    Ok(each)
+}
+
+/// The value for an arm, of one for all or one for each.
+pub(super) fn of_arm<T: Copy>(values: &[T], arm: usize) -> Option<T> {
+    match values {
+        [alike] => Some(*alike),
+        each => each.get(arm).copied(),
     }
 }
 
 /// The lanes that `arms` names: all, those that a mask has, or those of these numbers.
 pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<usize>> {
     let Some(arms) = arms else {
-        return Ok((0..count).collect());
+        return collected(count, 0..count);
     };
     if is_masked(arms)? {
         return Err(refused(format_args!(
@@ -95,6 +127,9 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
             "arms must be a mask of {count} or indices below that"
         ))
     };
+    if is_too_long(arms)? {
+        return Err(expected());
+    }
     let py = arms.py();
     let numpy = py.import("numpy")?;
     let mut array = numpy
@@ -108,17 +143,18 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
             .map_err(|_| expected())?;
     }
     if let Ok(mask) = array.cast::<PyArray1<bool>>() {
-        let mask = laid_out(mask)?.to_vec()?;
-        if mask.len() != count {
+        if mask.len()? != count {
             return Err(expected());
         }
-        return Ok((0..count)
-            .filter(|&lane| mask.get(lane) == Some(&true))
-            .collect());
+        let mask = laid_out(mask)?.to_vec()?;
+        let of_mask = (0..count).filter(|&lane| mask.get(lane) == Some(&true));
+        return collected(count, of_mask);
     }
-    let indices: Vec<usize> = array.extract().map_err(|_| expected())?;
-    if indices.iter().any(|&lane| lane >= count) {
-        return Err(expected());
+    let length = array.len().map_err(|_| expected())?;
+    let mut indices = room(length)?;
+    for one in entries(&array, length)?.ok_or_else(expected)? {
+        let lane = one.extract().ok().filter(|&lane: &usize| lane < count);
+        indices.push(lane.ok_or_else(expected)?);
     }
     Ok(indices)
 }

@@ -3,6 +3,7 @@
 //! **Invariant:** no lane knows of another, so that a lane has the bits of a single arm, however many threads share
 //! the work.
 
+use pyo3::prelude::PyResult;
 use rayon::prelude::*;
 
 use pendularm::math::arm::{Arm, State};
@@ -12,7 +13,7 @@ use pendularm::math::kinematics::forward;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::{Simulation, batch};
 
-use crate::arrays::Rows;
+use crate::arrays::{Rows, collected};
 
 /// Fewest lane-steps that are worth another thread: some tens of microseconds.
 const WORTH_A_THREAD: u64 = 3000;
@@ -160,25 +161,25 @@ pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: Ste
 }
 
 /// Kinetic plus potential energy of every lane \[J\].
-pub(crate) fn energies<const N: usize>(lanes: &[Simulation<N>]) -> Vec<f64> {
-    lanes
-        .iter()
-        .map(|one| energy(one.arm(), one.state()))
-        .collect()
+pub(crate) fn energies<const N: usize>(lanes: &[Simulation<N>]) -> PyResult<Vec<f64>> {
+    let energies = lanes.iter().map(|one| energy(one.arm(), one.state()));
+    collected(lanes.len(), energies)
 }
 
 /// The end effector of every lane \[m\], x and y in turn.
-pub(crate) fn end_effectors<const N: usize>(lanes: &[Simulation<N>]) -> Vec<f64> {
+pub(crate) fn end_effectors<const N: usize>(lanes: &[Simulation<N>]) -> PyResult<Vec<f64>> {
     let tips = lanes
         .iter()
         .map(|one| forward(one.arm().lengths(), &one.state().position));
-    tips.flat_map(|tip| tip.position.to_array()).collect()
+    let numbers = tips.flat_map(|tip| tip.position.to_array());
+    collected(2 * lanes.len(), numbers)
 }
 
 /// Arms in the starting pose, as a fresh runtime has one.
-pub(crate) fn fresh<const N: usize>(arms: usize) -> Vec<Simulation<N>>
+pub(crate) fn fresh<const N: usize>(arms: usize) -> PyResult<Vec<Simulation<N>>>
 where
     Gains<N>: Default,
 {
-    vec![Simulation::new(Arm::default(), Gains::default()); arms]
+    let fresh = Simulation::new(Arm::default(), Gains::default());
+    collected(arms, std::iter::repeat_n(fresh, arms))
 }

@@ -17,14 +17,14 @@ use std::thread::available_parallelism;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::arrays::Numbers;
+use crate::arrays::{Numbers, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
-use given::{chosen, read, read_methods, read_steps};
+use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
 use lanes::{Piece, Steps};
 use pool::pool;
 use windows::Windows;
@@ -50,10 +50,10 @@ enum Either {
 /// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and
 /// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
 /// handed in has one row per arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where
-/// they lie, if they can be written. `threads` share the work, as many as there are cores unless given; with 1 the
-/// caller does it alone. Calls that change one batch from several threads wait for each other; all that shows the arms
-/// may be read meanwhile, and shows how far each of them is. A batch can be neither copied nor pickled, and a process
-/// that is forked while another thread steps it must not use it.
+/// they lie, if they can be written. `threads` share the work, as many as there are cores unless given, and fewer where
+/// the system has no more of them; with 1 the caller does it alone. Calls that change one batch from several threads
+/// wait for each other; all that shows the arms may be read meanwhile, and shows how far each of them is. A batch can be
+/// neither copied nor pickled, and a process that is forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
@@ -78,8 +78,8 @@ impl Batch {
             .transpose()?;
         let links = fields::links(links)?;
         let own = match links {
-            2 => Either::Two(Mutex::new(lanes::fresh(n_arms))),
-            _ => Either::Three(Mutex::new(lanes::fresh(n_arms))),
+            2 => Either::Two(Mutex::new(lanes::fresh(n_arms)?)),
+            _ => Either::Three(Mutex::new(lanes::fresh(n_arms)?)),
         };
         Ok(Self {
             own,
@@ -113,7 +113,7 @@ impl Batch {
         };
         let effort = read("effort", effort)?;
         let effort = self.rows(effort.as_ref(), Bound::Finite)?;
-        let pool = pool(self.threads)?;
+        let pool = pool(self.threads);
         let arms = u64::try_from(self.arms).unwrap_or(u64::MAX);
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
@@ -290,14 +290,39 @@ impl Batch {
         let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
-                match methods.as_deref() {
-                    None => {}
-                    Some([alike]) => one.set_method(*alike),
-                    Some(each) => one.set_method(each.get(row).copied().unwrap_or(one.method())),
-                }
+                let method = methods.as_deref().and_then(|methods| of_arm(methods, row));
+                one.set_method(method.unwrap_or(one.method()));
                 if let Some(timestep) = &timestep {
                     one.set_timestep(timestep.number(row));
                 }
+            }
+        });
+        Ok(())
+    }
+
+    /// Changes what is given: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`, true
+    /// or false or one of them for each arm. As `Simulation.control_period` and `Simulation.control_delay`.
+    #[pyo3(signature = (control_period=None, control_delay=None))]
+    fn set_control_period(
+        &self,
+        py: Python<'_>,
+        control_period: Option<&Object<'_>>,
+        control_delay: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let delays = control_delay
+            .map(|delay| read_flags("control_delay", delay, self.arms))
+            .transpose()?;
+        let periods = read("control_period", control_period)?;
+        let periods = self.column(periods.as_ref(), Bound::NotNegative)?;
+        let _turn = self.turns.take(py)?;
+        for_either!(Either, &self.own, lanes => {
+            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
+                let present = one.control_period();
+                let delay = delays.as_deref().and_then(|delays| of_arm(delays, row));
+                one.set_control_period(ControlPeriod {
+                    period: periods.as_ref().map_or(present.period, |periods| periods.number(row)),
+                    delay: delay.unwrap_or(present.delay),
+                });
             }
         });
         Ok(())
@@ -333,7 +358,7 @@ impl Batch {
         }
     }
 
-    /// Number of threads that share the work.
+    /// Number of threads that share the work. Where the system has no more threads, fewer do.
     #[getter]
     fn threads(&self) -> usize {
         self.threads
@@ -372,15 +397,16 @@ impl Batch {
 
     /// Kinetic plus potential energy [J], (`n_arms`,), in a fresh array.
     #[getter]
-    fn energy<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
-        for_either!(Either, &self.own, lanes => lanes::energies(&hold(py, lanes)).into_pyarray(py))
+    fn energy<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray1<f64>>> {
+        let energies = for_either!(Either, &self.own, lanes => lanes::energies(&hold(py, lanes))?);
+        read_only(energies.into_pyarray(py))
     }
 
     /// Positions of the end effectors [m], (`n_arms`, 2), in a fresh array.
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray2<f64>>> {
-        let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes)));
-        flat.into_pyarray(py).reshape([self.arms, 2])
+        let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes))?);
+        read_only(flat.into_pyarray(py).reshape([self.arms, 2])?)
     }
 
     fn __len__(&self) -> usize {

@@ -2,11 +2,12 @@
 //!
 //! **Invariant:** they are made once, and whoever is given one cannot write it.
 
-use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray};
-use pyo3::prelude::{Py, PyAny, PyAnyMethods, PyDictMethods, PyResult, Python};
-use pyo3::types::PyDict;
+use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
+use pyo3::IntoPyObject;
+use pyo3::prelude::{Py, PyAny, PyAnyMethods, PyResult, Python};
 
 use super::lanes::Shown;
+use crate::arrays::read_only;
 use crate::fields::{Held, refused};
 
 /// An array that shows the arms, and the view of it that users get.
@@ -18,13 +19,10 @@ pub(super) struct Window<T, D> {
 
 impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
     pub(super) fn onto(array: Held<'_, PyArray<T, D>>) -> PyResult<Self> {
-        let view = array.call_method0("view")?;
-        let flags = PyDict::new(array.py());
-        flags.set_item("write", false)?;
-        view.call_method("setflags", (), Some(&flags))?;
+        let view = array.call_method0("view")?.cast_into()?;
         Ok(Self {
             array: array.unbind(),
-            view: view.unbind(),
+            view: read_only::<T, D>(view)?.into_any().unbind(),
         })
     }
 
@@ -34,6 +32,17 @@ impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
             refused("this batch's own arrays are in use elsewhere: hand in copies of them")
         })
     }
+}
+
+/// An array of zeros; `PyArray::zeros` panics where there is no memory.
+fn zeros<'py, T: Element, D: numpy::ndarray::Dimension>(
+    py: Python<'py>,
+    shape: impl IntoPyObject<'py>,
+) -> PyResult<Held<'py, PyArray<T, D>>> {
+    let numpy = py.import("numpy")?;
+    Ok(numpy
+        .call_method1("zeros", (shape, T::get_dtype(py)))?
+        .cast_into()?)
 }
 
 /// The arrays that show the arms.
@@ -49,13 +58,13 @@ pub(super) struct Windows {
 impl Windows {
     /// Arrays of zeros.
     pub(super) fn of(py: Python<'_>, arms: usize, links: usize) -> PyResult<Self> {
-        let joints = || Window::onto(PyArray2::zeros(py, [arms, links], false));
+        let joints = || Window::onto(zeros(py, (arms, links))?);
         Ok(Self {
             position: joints()?,
             velocity: joints()?,
             effort: joints()?,
-            time: Window::onto(PyArray1::zeros(py, [arms], false))?,
-            diverged: Window::onto(PyArray1::zeros(py, [arms], false))?,
+            time: Window::onto(zeros(py, (arms,))?)?,
+            diverged: Window::onto(zeros(py, (arms,))?)?,
         })
     }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::node::{Pieces, Reply, Unserved};
-use crate::actors::resources::budget::NoRoom;
+use crate::actors::resources::memory::NoRoom;
 use crate::actors::resources::work_clock;
 
 /// The longest number and the comma behind it, and the number itself while the answer is computed.
@@ -72,13 +72,9 @@ impl<T: Send> Computation for Answering<T> {
             self.stage = match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
                 AnsweringStage::Asked(work) => match self.reply.reserve(work.most_bytes()) {
                     Ok(()) => AnsweringStage::Working(work),
-                    Err(NoRoom::Yet) => {
+                    Err(NoRoom) => {
                         self.stage = AnsweringStage::Asked(work);
                         return Progress::Waiting;
-                    }
-                    Err(why) => {
-                        self.reply.refuse(why.into());
-                        AnsweringStage::Answered
                     }
                 },
                 AnsweringStage::Working(mut work) => match work.advance() {

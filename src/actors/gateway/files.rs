@@ -6,7 +6,6 @@
 //! **Invariant:** the clients that are served never need all files that there may be.
 
 use super::connection::admission::MAX_UNAUTHENTICATED;
-use super::limits::MAX_CONNECTIONS;
 
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
 /// report, and the clients that are just being refused for being too many.
@@ -23,18 +22,18 @@ pub struct Room {
     pub unauthenticated: usize,
 }
 
-/// Raises the limit of open files as far as is needed and allowed, and gives how many connections there can be: all
-/// that are wanted, or fewer, which is logged.
+/// Raises the limit of open files as far as so many clients need and the system allows. Returns how many connections
+/// there can be. They are fewer where the limit stays too low, which is logged.
 #[must_use]
-pub fn make_room(asks_token: bool) -> Room {
-    let wanted = MAX_CONNECTIONS + MAX_UNAUTHENTICATED + OTHER_FILES + REFUSED_AT_ONCE;
+pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
+    let wanted = wanted_clients + MAX_UNAUTHENTICATED + OTHER_FILES + REFUSED_AT_ONCE;
     // It is never lowered.
     match rlimit::increase_nofile_limit(wanted as u64) {
         Ok(files) => {
             let files = usize::try_from(files).unwrap_or(usize::MAX);
-            let room = room_with(files, asks_token);
+            let room = room_with(files, wanted_clients, asks_token);
             let clients = room.clients;
-            if clients < MAX_CONNECTIONS {
+            if clients < wanted_clients {
                 tracing::warn!(
                     files,
                     clients,
@@ -45,7 +44,7 @@ pub fn make_room(asks_token: bool) -> Room {
         }
         Err(error) => {
             tracing::warn!(%error, "the limit of open files is unknown");
-            room_with(usize::MAX, asks_token)
+            room_with(usize::MAX, wanted_clients, asks_token)
         }
     }
 }
@@ -53,7 +52,7 @@ pub fn make_room(asks_token: bool) -> Room {
 /// Counts the places for so many open files: there is at least one client. Where files are few, those without the token
 /// have half of them.
 #[must_use]
-pub fn room_with(files: usize, asks_token: bool) -> Room {
+pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room {
     let files = files.saturating_sub(OTHER_FILES);
     let unauthenticated = if asks_token {
         (files / 2).clamp(1, MAX_UNAUTHENTICATED)
@@ -61,7 +60,7 @@ pub fn room_with(files: usize, asks_token: bool) -> Room {
         0
     };
     Room {
-        clients: (files - unauthenticated.min(files)).clamp(1, MAX_CONNECTIONS),
+        clients: (files - unauthenticated.min(files)).clamp(1, wanted_clients.max(1)),
         unauthenticated,
     }
 }
@@ -70,14 +69,17 @@ pub fn room_with(files: usize, asks_token: bool) -> Room {
 mod tests {
     use super::*;
 
+    /// More than the 1,024 files that a process usually may have.
+    const WANTED: usize = 2000;
+
     fn clients_with(files: usize) -> usize {
-        room_with(files, false).clients
+        room_with(files, WANTED, false).clients
     }
 
     #[test]
     fn there_are_files_for_every_client_that_is_served() {
-        assert_eq!(clients_with(usize::MAX), MAX_CONNECTIONS);
-        assert_eq!(clients_with(MAX_CONNECTIONS + OTHER_FILES), MAX_CONNECTIONS);
+        assert_eq!(clients_with(usize::MAX), WANTED);
+        assert_eq!(clients_with(WANTED + OTHER_FILES), WANTED);
         assert_eq!(clients_with(1024), 1024 - OTHER_FILES);
         assert_eq!(clients_with(40), 8);
         assert_eq!(clients_with(3), 1);
@@ -86,7 +88,7 @@ mod tests {
     #[test]
     fn there_are_files_for_those_without_the_token_too() {
         for (files, clients, unauthenticated) in [
-            (usize::MAX, MAX_CONNECTIONS, MAX_UNAUTHENTICATED),
+            (usize::MAX, WANTED, MAX_UNAUTHENTICATED),
             (
                 1024,
                 1024 - OTHER_FILES - MAX_UNAUTHENTICATED,
@@ -95,7 +97,7 @@ mod tests {
             (64, 16, 16),
             (3, 1, 1),
         ] {
-            let room = room_with(files, true);
+            let room = room_with(files, WANTED, true);
             assert_eq!(
                 (room.clients, room.unauthenticated),
                 (clients, unauthenticated)

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use socket2::{SockRef, TcpKeepalive};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
 use super::connection::Connection;
 use super::connection::admission::Admission;
@@ -17,6 +17,10 @@ use super::ends::Ends;
 use super::registry::Registry;
 use crate::actors::resources::gauges::Gauges;
 
+/// Bytes that the system keeps for a client that does not read, beside as many of its own.
+pub const SEND_BUFFER: u32 = 128 * 1024;
+/// Connections that wait to be accepted.
+pub const BACKLOG: u32 = 1024;
 /// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
 const BACKOFF: Duration = Duration::from_millis(50);
 /// After so long a silence a client's machine is asked whether it is still there. That is seldom enough to cost
@@ -140,10 +144,41 @@ fn prepare(stream: &TcpStream) -> std::io::Result<()> {
     SockRef::from(stream).set_tcp_keepalive(&keepalive)
 }
 
-/// Binds a TCP socket in the present runtime.
+/// Binds a TCP socket in the present runtime, and listens.
 ///
 /// # Errors
 /// The operating system's, for instance when the port is in use.
-pub async fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
-    TcpListener::bind(address).await
+pub fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = match address {
+        SocketAddr::V4(_) => TcpSocket::new_v4(),
+        SocketAddr::V6(_) => TcpSocket::new_v6(),
+    }?;
+    // A port that was just given up may be taken at once.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    // Accepted sockets have it too.
+    socket.set_send_buffer_size(SEND_BUFFER)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpStream;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn many_clients_may_wait_to_be_accepted_and_their_send_buffers_are_small() {
+        const { assert!(BACKLOG >= 300) };
+        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let address = socket.local_addr().unwrap();
+        let waiting: Vec<_> = (0..300)
+            .map(|_| TcpStream::connect_timeout(&address, Duration::from_millis(900)).unwrap())
+            .collect();
+        let (stream, _) = socket.accept().await.unwrap();
+        let size = SockRef::from(&stream).send_buffer_size().unwrap();
+        assert!(size <= 2 * SEND_BUFFER as usize, "{size}");
+        drop(waiting);
+    }
 }

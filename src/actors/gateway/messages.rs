@@ -3,18 +3,18 @@
 //! **Invariant:** the registry has one mailbox, and so has each connection: what one sender sends takes effect in the
 //! order sent.
 
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::{Notify, oneshot};
+use tokio::sync::oneshot;
 
-use super::encoded::Encoded;
 use crate::actors::ConnectionId;
 pub use crate::actors::node::{Feedback, Publish, Respond};
-use crate::actors::resources::budget::Account;
+use crate::actors::resources::memory::Permit;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;
@@ -24,7 +24,19 @@ use crate::protocol::wire::payload::Payload;
 /// A new client. From its connection; the answer is its id.
 #[derive(Message)]
 #[rtype(result = "Result<ConnectionId, Refused>")]
-pub struct Connect(pub Outlets);
+pub struct Connect {
+    /// The ways to its connection.
+    pub outlets: Outlets,
+    /// Its address.
+    pub from: IpAddr,
+    /// Whether it may use a kept place.
+    pub may_use_kept: bool,
+}
+
+/// A client was refused because no place was free. From its connection.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CountRefusal;
 
 /// The ways to a connection. One mailbox is behind all of them, so order is kept between them.
 #[derive(Clone)]
@@ -43,10 +55,6 @@ pub struct Outlets {
     pub gone: Arc<AtomicBool>,
     /// Bytes of responses that wait to be written; kept by the connection.
     pub backlog: Arc<AtomicUsize>,
-    /// Counts the memory that the client makes the program hold.
-    pub account: Arc<Account>,
-    /// Notified when the client loses its place to one that comes.
-    pub displaced: Arc<Notify>,
 }
 
 impl Outlets {
@@ -69,19 +77,21 @@ pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
 /// Why a client was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
-    /// So many clients are the limit, and they are there.
-    #[error("too many connections: this runtime serves {0} clients at once")]
-    Full(usize),
+    /// No place is free.
+    #[error(
+        "too many connections: this runtime serves {clients} clients at once and keeps {kept} of these places for HTTP \
+         and WebSocket; --clients sets the number"
+    )]
+    Full {
+        /// How many clients are served.
+        clients: usize,
+        /// How many of their places are kept.
+        kept: usize,
+    },
     /// The runtime is ending.
     #[error("shutting down")]
     Closed,
 }
-
-/// The client's stream has ended; frames that came before may still wait. From its connection. Where all places are
-/// taken, the oldest client that only waits gives way to one that comes.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Ended(pub ConnectionId);
 
 /// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
 /// one, ends when the calls that it made have been answered.
@@ -104,6 +114,8 @@ pub struct Request {
     pub id: Option<Payload>,
     /// Its request.
     pub op: Op,
+    /// The room that the frame takes, if it is long: what becomes of it takes the same.
+    pub permit: Option<Permit>,
 }
 
 /// The op has been routed. Its effect may be still to come, in a node or at the subscribers' sockets: a receiver ends
@@ -112,7 +124,6 @@ pub struct Request {
 pub struct Handled {
     node: Option<oneshot::Receiver<()>>,
     subscribers: Option<oneshot::Receiver<()>>,
-    deliveries: usize,
 }
 
 impl Handled {
@@ -131,24 +142,13 @@ impl Handled {
         }
     }
 
-    /// The op's message has also gone to so many subscribers, if there is a receiver.
+    /// The op's message has also gone to subscribers, if there is a receiver.
     #[must_use]
-    pub fn and_by_subscribers(
-        self,
-        effect: Option<oneshot::Receiver<()>>,
-        deliveries: usize,
-    ) -> Self {
+    pub fn and_by_subscribers(self, effect: Option<oneshot::Receiver<()>>) -> Self {
         Self {
             subscribers: effect,
-            deliveries,
             ..self
         }
-    }
-
-    /// How many subscribers the op's message has gone to.
-    #[must_use]
-    pub const fn deliveries(&self) -> usize {
-        self.deliveries
     }
 
     /// Whether a node has yet to perform the op.
@@ -165,11 +165,6 @@ impl Handled {
         }
     }
 }
-
-/// Messages of a node that can wait: for [`Handled::effect`]. From the player.
-#[derive(Message)]
-#[rtype(result = "Handled")]
-pub struct PublishInTurn(pub Vec<Publish>);
 
 /// Asks for the topics and services that clients have. From `rosapi`; there is no answer where there are more of them.
 #[derive(Message, Debug, Clone, Copy)]
@@ -229,42 +224,21 @@ pub struct FinishAll;
 
 // ---- from the registry to a connection ------------------------------------------------------------------------------
 
-/// A topic message for this client, or several, one behind the other. From the registry; may be dropped, oldest
-/// first, when the client is slow.
+/// A topic message for this client, or a [series](crate::protocol::wire::series) of them. From the registry; may be
+/// dropped, oldest first, when the client is slow.
 #[derive(Message, Clone)]
 #[rtype(result = "()")]
 pub struct Deliver {
-    /// The topic, for throttling.
-    pub topic: Arc<str>,
-    /// The message or messages, shared by all subscribers.
-    pub frames: Frames,
+    /// The topic, for throttling; none for feedback of a goal.
+    pub topic: Option<Arc<str>>,
+    /// The message, shared by all subscribers who want it in this form.
+    pub frame: Bytes,
     /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
     pub underway: Option<Underway>,
 }
 
 /// Shared by the deliveries of a message whose publisher waits: it goes on when the last of them is dropped.
 pub type Underway = Arc<oneshot::Sender<()>>;
-
-/// Topic messages in the form that a subscriber wants.
-#[derive(Clone)]
-pub enum Frames {
-    /// A whole frame, or a [series](crate::protocol::wire::series) of them.
-    Plain(Bytes),
-    /// Frames in another encoding, made on demand. With `Some(n)`, all but the first and the last n may be skipped.
-    Encoded(Arc<Encoded>, Option<usize>),
-    /// Feedback of a goal: it waits for no message that is to be encoded, as the goal's result does not either.
-    Feedback(Bytes),
-}
-
-impl Frames {
-    /// The message or messages as they came.
-    pub(super) fn plain(&self) -> &Bytes {
-        match self {
-            Self::Plain(frame) | Self::Feedback(frame) => frame,
-            Self::Encoded(encoded, _) => encoded.plain(),
-        }
-    }
-}
 
 /// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
 #[derive(Message, Clone)]
@@ -291,8 +265,19 @@ pub struct Configure {
 pub struct Throttle {
     /// Least time between two deliveries; zero is no limit.
     pub interval: Duration,
-    /// How many messages may be held back, newest kept; at least 1.
-    pub queue_length: usize,
+    /// How many messages throttling may hold back, newest kept; at least 1.
+    pub held_back: usize,
+    /// How many messages may wait for a slow client, newest kept, if a subscription says so.
+    pub queue_length: Option<usize>,
+}
+
+impl Throttle {
+    /// No limit.
+    pub const NONE: Self = Self {
+        interval: Duration::ZERO,
+        held_back: 1,
+        queue_length: None,
+    };
 }
 
 /// Send what is queued, then end. From the registry when the runtime ends, and from the reader at the end of the

@@ -10,4 +10,4 @@ pub mod limits;
 pub mod listener;
 pub mod messages;
 pub mod registry;
-mod turns;
+pub(super) mod unbound;

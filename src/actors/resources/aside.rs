@@ -14,6 +14,7 @@ use tokio::task::{spawn_blocking, yield_now};
 
 use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
+use crate::protocol::limits::MODEST_MESSAGE;
 
 /// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other.
 pub const PLACES: usize = 2;
@@ -23,24 +24,21 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
-    /// The same with more than 256 KiB.
+    /// The same with more than [`MODEST_MESSAGE`]. Long ones have places of their own: what is shorter waits for less.
     ReadingLong,
     /// Writes messages in the forms that clients ask for.
     Writing,
-    /// The same with more than 256 KiB.
+    /// The same with more than [`MODEST_MESSAGE`].
     WritingLong,
     /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
     Listing,
 }
 
-/// Bytes of a long input or message. Long ones have places of their own: what is shorter waits for less.
-const LONG: usize = 256 * 1024;
-
 impl Errand {
     /// Reads so many bytes of a client's input.
     #[must_use]
     pub const fn reading(bytes: usize) -> Self {
-        if bytes > LONG {
+        if bytes > MODEST_MESSAGE {
             Self::ReadingLong
         } else {
             Self::Reading
@@ -50,7 +48,7 @@ impl Errand {
     /// Writes a message of so many bytes in another form.
     #[must_use]
     pub const fn writing(bytes: usize) -> Self {
-        if bytes > LONG {
+        if bytes > MODEST_MESSAGE {
             Self::WritingLong
         } else {
             Self::Writing

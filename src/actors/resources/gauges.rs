@@ -1,14 +1,14 @@
 //! Counters that one node writes and another reports: what `/diagnostics` says about the gateway, and work whose
-//! absence is to be shown. What clients hold is counted beside them.
+//! absence is to be shown. The pools for what is long lie beside them.
 //!
 //! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
 //! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
 //!
-//! **Invariant:** the counters are statistics: only by what clients hold anything is decided.
+//! **Invariant:** the counters are statistics: nothing is decided by them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::budget::Memory;
+use super::memory::Memory;
 
 /// Numbers about the runtime, shared by reference.
 #[derive(Debug, Default)]
@@ -20,7 +20,7 @@ pub struct Gauges {
 }
 
 impl Gauges {
-    /// Counters at zero, beside memory of one's own.
+    /// Counters at zero, beside these pools.
     #[must_use]
     pub fn with(memory: Memory) -> Self {
         Self {
@@ -29,7 +29,7 @@ impl Gauges {
         }
     }
 
-    /// Counts what clients hold.
+    /// The pools for long frames and long answers.
     #[must_use]
     pub fn memory(&self) -> &Memory {
         &self.memory

@@ -5,7 +5,7 @@
 
 pub mod aside;
 pub mod awake;
-pub mod budget;
 pub mod gauges;
+pub mod memory;
 pub mod priority;
 pub mod work_clock;

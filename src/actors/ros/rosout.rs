@@ -4,6 +4,7 @@
 
 use actix::prelude::*;
 use tokio::sync::mpsc;
+use tracing::Level;
 
 use crate::actors::arm::sim::SimulationTime;
 use crate::actors::node::{Interest, Publish};
@@ -78,14 +79,52 @@ impl Handler<Interest> for Rosout {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-fn message(warning: Warning, time: f64) -> Publish {
+fn message((metadata, msg): Warning, time: f64) -> Publish {
+    // The levels are those of ROS.
+    let level = if *metadata.level() == Level::ERROR {
+        40
+    } else {
+        30
+    };
     Publish::made(Topic::Rosout, move || LogMessage {
         stamp: Stamp::from_seconds(time),
-        level: warning.level,
-        name: warning.node,
-        msg: warning.text,
-        file: warning.file,
+        level,
+        name: node_of(metadata.target()),
+        msg,
+        file: metadata.file().unwrap_or_default(),
         function: "",
-        line: warning.line,
+        line: metadata.line().unwrap_or_default(),
     })
+}
+
+/// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
+fn node_of(target: &'static str) -> &'static str {
+    let modules = target.split("::").skip_while(|part| *part != "actors");
+    let modules: Vec<&'static str> = modules.skip(1).take(2).collect();
+    match modules[..] {
+        ["arm", "sim"] => "arm_sim",
+        // Folders, in which the actors stand.
+        ["arm" | "compute" | "gateway" | "resources" | "ros", actor] | [actor, ..] => actor,
+        [] => "pendularm",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_names_the_actor_and_not_the_folder_in_which_it_stands() {
+        for (target, node) in [
+            ("pendularm::actors::arm::sim::telemetry", "arm_sim"),
+            ("pendularm::actors::arm::ik_action", "ik_action"),
+            ("pendularm::actors::gateway::registry::ops", "registry"),
+            ("pendularm::actors::gateway::connection", "connection"),
+            ("pendularm::actors::compute::workers", "workers"),
+            ("pendularm::actors::runtime", "runtime"),
+            ("pendularm::logging", "pendularm"),
+        ] {
+            assert_eq!(node_of(target), node, "{target}");
+        }
+    }
 }

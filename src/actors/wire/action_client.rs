@@ -11,8 +11,7 @@ use serde::Serialize;
 
 use crate::actors::ConnectionId;
 use crate::actors::node::{Done, Feedback, FrameOut, Respond};
-use crate::actors::resources::budget::Share;
-use crate::protocol::messages;
+use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
 
@@ -72,8 +71,6 @@ pub struct ActionClient {
     pub wants_feedback: bool,
     /// Set when the client is gone.
     pub gone: Arc<AtomicBool>,
-    /// Its share of its client's account: a goal may last for as long as the client likes.
-    pub share: Share,
 }
 
 impl Canceller {
@@ -96,6 +93,13 @@ impl ActionClient {
     #[must_use]
     pub fn is(&self, goal: &SentGoal) -> bool {
         self.connection == goal.connection && self.id == goal.id
+    }
+
+    /// Tells by a status why the goal has no effect yet.
+    pub fn warn(&self, why: &str) {
+        let id = self.id.as_ref();
+        let status = Respond::status(self.connection, Level::Warning, why, id);
+        self.respond.do_send(status);
     }
 
     /// Tells how the goal goes, if that was asked for.

@@ -3,30 +3,22 @@
 //! **Invariant:** every call is answered once: a caller that is dropped unanswered says so itself.
 
 use std::fmt::Display;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::{Arc, Weak};
 
 use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 use tokio::sync::oneshot;
-use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
-use crate::actors::resources::budget::{Account, NoRoom, Promise};
+use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::trajectory::Heard;
-use crate::protocol::messages::{self, ErrorForm};
+use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
-
-/// Bytes of an answer that is computed without asking for room first: more than any answer has but those that list or
-/// compute something.
-pub const SMALL_ANSWER: usize = 16 * 1024;
-/// How long a computation waits for room that is taken by answers which wait for their clients, before it is refused.
-pub const ROOM_TIME: Duration = Duration::from_secs(2);
 
 /// A call of one of the runtime's own services, as the registry has it.
 pub struct ServiceCall {
@@ -46,6 +38,10 @@ pub struct TopicMessage {
     pub respond: Recipient<Respond>,
     /// The client.
     pub connection: ConnectionId,
+    /// Ends with the client's connection.
+    pub present: Weak<()>,
+    /// Ends with the client's connection, and when the client stops listening for what comes of its message.
+    pub listening: Weak<()>,
     /// The frame's `id`, if it had one.
     pub id: Option<Payload>,
     /// Dropped when the message has taken effect: the connection reads its next frame then.
@@ -71,10 +67,8 @@ pub struct Address {
     id: Option<Payload>,
     /// How the caller is told why the call failed.
     error_form: ErrorForm,
-    /// Counts what the caller makes the program hold: the answer, too, until it has been written.
-    account: Option<Arc<Account>>,
-    /// Room that was taken for an answer of megabytes.
-    promise: Option<Promise>,
+    /// The room that is taken for a long answer, or else for the long frame that asked.
+    permit: Option<Permit>,
 }
 
 impl Address {
@@ -116,13 +110,9 @@ impl Address {
         }
     }
 
-    /// The response, counted until it has been written to the client.
-    fn counted(self, frame: Bytes) -> Bytes {
-        match (self.promise, self.account) {
-            (Some(promise), _) => promise.cover(frame),
-            (None, Some(account)) => account.count(frame),
-            (None, None) => frame,
-        }
+    /// The response, with the room that was taken for it.
+    fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
     }
 }
 
@@ -134,8 +124,8 @@ pub struct Caller {
     pub(super) address: Option<Address>,
     gone: Arc<AtomicBool>,
     pub(super) done: Option<Done>,
-    /// The time since which waiting answers have left no room for one of megabytes.
-    asked_for_room: Option<Instant>,
+    /// Where there is room for a long answer; not everybody asks for one.
+    memory: Option<Memory>,
 }
 
 impl Caller {
@@ -155,8 +145,7 @@ impl Caller {
             name,
             id,
             error_form: ErrorForm::default(),
-            account: None,
-            promise: None,
+            permit: None,
         };
         let caller = Self {
             registry,
@@ -164,16 +153,17 @@ impl Caller {
             address: Some(address),
             gone,
             done: Some(done),
-            asked_for_room: None,
+            memory: None,
         };
         (caller, ended)
     }
 
-    /// The answer is charged to this account, the caller's, until it has been written.
+    /// Long answers find their room here. `asked` is the permit of the frame that asked, if that was long.
     #[must_use]
-    pub fn within(mut self, account: Arc<Account>) -> Self {
+    pub fn within(mut self, memory: Memory, asked: Option<Permit>) -> Self {
+        self.memory = Some(memory);
         if let Some(address) = &mut self.address {
-            address.account = Some(account);
+            address.permit = asked;
         }
         self
     }
@@ -206,33 +196,26 @@ impl Caller {
     }
 
     /// Takes room for an answer of at most so many bytes, beside the echo of the caller's `id`, before it is computed.
-    /// Small ones need none to be taken.
+    /// Short ones need none to be taken.
     ///
     /// # Errors
-    /// If there is none.
+    /// While there is none: answers on their way to clients have taken it.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        let Some(address) = self.address.as_mut().filter(|_| bytes > SMALL_ANSWER) else {
-            return Ok(());
-        };
-        let Some(account) = &address.account else {
+        let (Some(address), Some(memory)) = (&mut self.address, &self.memory) else {
             return Ok(());
         };
         let id = address.id.as_ref().map_or(0, |id| id.get().len());
-        let since = self.asked_for_room;
-        let is_out_of_patience = since.is_some_and(|since| since.elapsed() >= ROOM_TIME);
-        let bytes = bytes.saturating_add(2 * id + SMALL_ANSWER);
-        match account.promise(bytes, is_out_of_patience) {
-            Ok(promise) => {
-                address.promise = Some(promise);
-                Ok(())
-            }
-            Err(NoRoom::Now) if !is_out_of_patience => {
-                // Answers are on their way to clients that read them: those make room in a moment.
-                self.asked_for_room.get_or_insert_with(Instant::now);
-                Err(NoRoom::Yet)
-            }
-            Err(why) => Err(why),
+        let bytes = bytes.saturating_add(id);
+        if bytes > SHORT {
+            address.permit = Some(memory.answer(bytes)?);
         }
+        Ok(())
+    }
+
+    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
+    pub(super) fn warn(&self, why: &str) {
+        let status = Respond::status(self.connection, Level::Warning, why, self.id());
+        self.registry.do_send(status);
     }
 
     /// Answers `result: true`; the call ends when this is dropped.
@@ -255,7 +238,7 @@ impl Caller {
             let service = address.service;
             let write = move || {
                 let frame = write(&address);
-                address.counted(frame)
+                address.covered(frame)
             };
             self.send(service, FrameOut::unwritten(write), done);
         }
@@ -264,7 +247,7 @@ impl Caller {
     pub(super) fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
             let frame = write(&address);
-            self.send(address.service, address.counted(frame).into(), None);
+            self.send(address.service, address.covered(frame).into(), None);
         }
     }
 

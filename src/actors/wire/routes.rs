@@ -2,8 +2,7 @@
 //!
 //! **Invariant:** arguments are read here or aside, never on the thread of the node.
 
-use std::collections::{BTreeSet, HashMap};
-use std::sync::Arc;
+use std::collections::HashMap;
 
 use actix::prelude::*;
 
@@ -32,8 +31,6 @@ pub struct Nodes {
     pub listeners: HashMap<Topic, Route<TopicMessage>>,
     /// The node that publishes each of the runtime's topics.
     pub publishers: HashMap<Topic, Recipient<Interest>>,
-    /// The services as they are listed, where a record is replayed: those of the live arm are not among them.
-    pub replayed: Option<Arc<BTreeSet<Service>>>,
 }
 
 impl Nodes {

@@ -9,7 +9,7 @@ use bytes::Bytes;
 use super::caller::{Address, Caller};
 use crate::actors::ConnectionId;
 use crate::actors::node::{Ask, Asker, Done, Pieces, Unserved};
-use crate::actors::resources::budget::NoRoom;
+use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
@@ -77,6 +77,10 @@ impl<A: Answered> Asker<A::Answer> for ClientAsker<A> {
 
     fn is_gone(&self) -> bool {
         self.caller.is_gone()
+    }
+
+    fn warn(&self, why: &str) {
+        self.caller.warn(why);
     }
 
     fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {

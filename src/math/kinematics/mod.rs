@@ -18,7 +18,7 @@ mod inverse;
 
 use glam::DVec2;
 
-use super::shown::Shown;
+use super::shown::{Shown, shown_against};
 
 pub use angle::{nearest_turn, turn, wrap};
 pub use forward::{EndEffector, forward, heading, joints};
@@ -69,7 +69,7 @@ pub enum Unreachable {
     /// The end effector can't be put so far away.
     #[error(
         "target ({}, {}) is {} m from the base, beyond the arm's reach of {} m",
-        Shown(*.x), Shown(*.y), Shown(*.distance), Shown(*.limit)
+        Shown(*.x), Shown(*.y), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
     )]
     Beyond {
         /// Target \[m\].
@@ -84,7 +84,7 @@ pub enum Unreachable {
     /// The longest link can't be folded back so far by the others (for 2 links: nearer than `|l1 - l2|`).
     #[error(
         "target ({}, {}) is {} m from the base, closer than the {} m to which the arm can fold",
-        Shown(*.x), Shown(*.y), Shown(*.distance), Shown(*.limit)
+        Shown(*.x), Shown(*.y), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
     )]
     TooClose {
         /// Target \[m\].
@@ -99,7 +99,7 @@ pub enum Unreachable {
     /// With this orientation the last link would have to start farther away than the others reach.
     #[error(
         "phi = {} puts the wrist {} m from the base, beyond the reach of links 1 and 2, {} m",
-        Shown(*.phi), Shown(*.distance), Shown(*.limit)
+        Shown(*.phi), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
     )]
     WristBeyond {
         /// Orientation asked for \[rad\].
@@ -112,7 +112,7 @@ pub enum Unreachable {
     /// With this orientation the last link would have to start nearer to the base than the others fold.
     #[error(
         "phi = {} puts the wrist {} m from the base, closer than the {} m to which links 1 and 2 can fold",
-        Shown(*.phi), Shown(*.distance), Shown(*.limit)
+        Shown(*.phi), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
     )]
     WristTooClose {
         /// Orientation asked for \[rad\].

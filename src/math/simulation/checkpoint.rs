@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** a simulation that is continued takes the same steps, bit for bit, as the one that was kept.
 
+use super::hold::{Held, Hold};
 use super::{Disturbance, Divergence, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
@@ -20,6 +21,8 @@ pub struct Checkpoint<const N: usize> {
     pub integral: [f64; N],
     /// Whether the controller is on.
     pub enabled: bool,
+    /// When the control law runs, and the efforts that are held.
+    pub held: Held<N>,
     /// The method that takes the steps.
     pub method: Method,
     /// Length of a step \[s\], greater than 0.
@@ -52,6 +55,7 @@ impl<const N: usize> Simulation<N> {
             setpoint: *self.pid.setpoint(),
             integral: *self.pid.integral(),
             enabled: self.pid.is_enabled(),
+            held: self.hold.held,
             method: self.method,
             timestep: self.timestep,
             state: self.state,
@@ -75,6 +79,7 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm: from.arm,
             pid,
+            hold: Hold::new(from.held, from.timestep),
             method: from.method,
             timestep: from.timestep,
             state: from.state,

@@ -25,13 +25,15 @@ impl<const N: usize> Simulation<N> {
         partition_point(steps, |step| self.time_after(step + 1).is_finite())
     }
 
-    /// Changes the length of a step \[s\], greater than 0, from the next step on; time goes on from where it is. The
-    /// timestep already in force changes nothing, so that repeating it does not turn time into a running sum.
+    /// Changes the length of a step \[s\], greater than 0, from the next step on, with which a control period begins;
+    /// time goes on from where it is. The timestep already in force changes nothing, so that repeating it does not turn
+    /// time into a running sum.
     pub fn set_timestep(&mut self, timestep: f64) {
         if timestep.to_bits() != self.timestep.to_bits() {
             self.base = self.time();
             self.steps_since_base = 0;
             self.timestep = timestep;
+            self.hold.begin_period(timestep, |_| ());
         }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! **Invariant:** a simulation that is given the same inputs before the same steps takes the same steps, bit for bit.
 
-use super::Simulation;
-use crate::math::arm::Arm;
+use super::{ControlPeriod, Simulation};
+use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 
@@ -29,6 +29,14 @@ pub enum ArmInput<const N: usize> {
         /// Simulation time \[s\], greater than 0.
         duration: f64,
     },
+    /// When the control law runs.
+    Period(ControlPeriod),
+    /// Positions and velocities of the joints.
+    State(State<N>),
+    /// An effort that is applied while the controller is off \[N m\].
+    Command([f64; N]),
+    /// An effort that is applied instead of all others but a disturbance, or the end of that \[N m\].
+    Drive(Option<[f64; N]>),
     /// Takes the arm back to the starting pose.
     Reset,
 }
@@ -44,6 +52,10 @@ impl<const N: usize> Simulation<N> {
             ArmInput::Enabled(on) => self.enable(on),
             ArmInput::Setpoint(setpoint) => self.set_setpoint(setpoint),
             ArmInput::Disturbance { effort, duration } => self.disturb(effort, duration),
+            ArmInput::Period(period) => self.set_control_period(period),
+            ArmInput::State(state) => self.set_state(state),
+            ArmInput::Command(effort) => self.set_command(effort),
+            ArmInput::Drive(effort) => self.drive(effort),
             ArmInput::Reset => self.reset(),
         }
     }

@@ -2,8 +2,9 @@
 //!
 //! One step, from the state `(q, q̇)` at its start:
 //!
-//! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
-//!    has not ended ([`Disturbance`]) is added to it;
+//! 1. with the controller on, the control law runs ([`Pid::control`]) if a control period begins ([`ControlPeriod`]),
+//!    else its effort is held; off, the effort is what was commanded; a disturbance that has not ended
+//!    ([`Disturbance`]) is added to it;
 //! 2. that effort is held while the method's stages evaluate the dynamics ([`step_under`]);
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
@@ -22,12 +23,14 @@
 pub mod batch;
 mod checkpoint;
 mod clock;
+mod hold;
 mod increments;
 mod input;
 
 use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
+pub use self::hold::{ControlPeriod, Held, Hold};
 use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
 pub use self::input::ArmInput;
@@ -88,6 +91,7 @@ impl<const N: usize> Disturbance<N> {
 pub struct Simulation<const N: usize> {
     arm: Arm<N>,
     pid: Pid<N>,
+    hold: Hold<N>,
     method: Method,
     /// Length of a step \[s\].
     timestep: f64,
@@ -114,6 +118,7 @@ impl<const N: usize> Simulation<N> {
         Self {
             arm,
             pid: Pid::new(gains),
+            hold: Hold::new(Held::default(), DEFAULT_TIMESTEP),
             method: Method::Rk4,
             timestep: DEFAULT_TIMESTEP,
             state: State::rest(),
@@ -195,7 +200,10 @@ impl<const N: usize> Simulation<N> {
     /// Takes one step. If its result is not finite, changes nothing and returns `false`.
     #[inline]
     fn take_step<const WEIGHS: bool>(&mut self) -> bool {
-        let mut control = if self.pid.is_enabled() {
+        let mut held = None;
+        let mut control = if !self.hold.every_step {
+            self.begin_held_step(&mut held)
+        } else if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)
         } else {
             Control {
@@ -223,6 +231,9 @@ impl<const N: usize> Simulation<N> {
         if !next.is_finite() {
             return false;
         }
+        if let Some(held) = held {
+            self.hold.commit(held);
+        }
         self.state = next;
         self.carry = carry;
         self.effort = control.effort;
@@ -235,17 +246,21 @@ impl<const N: usize> Simulation<N> {
     /// The effort that the next step would be taken with \[N m\]: the controller's and the disturbance's together.
     #[must_use]
     pub fn effort_of_next_step(&self) -> [f64; N] {
-        let controlled = if self.pid.is_enabled() {
-            self.pid.control(&self.state, self.timestep).effort
-        } else {
-            [0.0; N]
-        };
+        let controlled = self.hold.begin_step(&self.pid, &self.state).0.effort;
         match self.disturbance {
             Some(push) if self.time() < push.ends => {
                 std::array::from_fn(|i| controlled[i] + push.effort[i])
             }
             _ => controlled,
         }
+    }
+
+    /// The control of a step in whose period there are others.
+    #[inline(never)]
+    fn begin_held_step(&self, after: &mut Option<Held<N>>) -> Control<N> {
+        let (control, held) = self.hold.begin_step(&self.pid, &self.state);
+        *after = Some(held);
+        control
     }
 
     /// Adds the disturbance to the effort of the step that begins now, or ends it if its time is over.
@@ -266,17 +281,18 @@ impl<const N: usize> Simulation<N> {
         self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
     }
 
-    /// Goes back to the starting pose at rest, at time 0. Setpoint and integral follow, the effort is zero, disturbance
-    /// and divergence end. Gains, arm, method, timestep, and whether the controller is on, stay.
+    /// Goes back to the starting pose at rest, at time 0. Setpoint and integral follow, all efforts are zero,
+    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period, and
+    /// whether the controller is on, stay.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
+        self.hold.forget(self.timestep);
         self.effort = [0.0; N];
         self.disturbance = None;
         self.base = 0.0;
         self.steps_since_base = 0;
         self.steps = 0;
-        self.divergence = None;
     }
 
     /// Joint positions and velocities.
@@ -285,10 +301,11 @@ impl<const N: usize> Simulation<N> {
         &self.state
     }
 
-    /// Puts the arm into another state, which must be finite; clock, controller and divergence stay.
+    /// Puts the arm into another state, which must be finite, and ends a divergence; clock and controller stay.
     pub fn set_state(&mut self, state: State<N>) {
         self.state = state;
         self.carry = State::rest();
+        self.divergence = None;
     }
 
     /// Effort of the latest step \[N m\], the controller's and the disturbance's together; zeros at once when the
@@ -338,12 +355,51 @@ impl<const N: usize> Simulation<N> {
         &self.pid
     }
 
-    /// Turns the controller on or off ([`Pid::enable`]). Off, the effort is zero at once.
+    /// Turns the controller on or off ([`Pid::enable`]). Off, the effort is zero at once. A change begins a control
+    /// period; commands end in either case, unless what is on is turned on.
     pub fn enable(&mut self, on: bool) {
+        if on && self.pid.is_enabled() {
+            return;
+        }
         self.pid.enable(on);
+        self.hold.forget(self.timestep);
         if !on {
             self.effort = [0.0; N];
         }
+    }
+
+    /// The time between two runs of the control law.
+    #[must_use]
+    pub fn control_period(&self) -> ControlPeriod {
+        self.hold.held.period
+    }
+
+    /// Changes the time between two runs of the control law, which must be finite and not negative; a period begins
+    /// with the next step. What is in force already changes nothing.
+    pub fn set_control_period(&mut self, period: ControlPeriod) {
+        if period != self.hold.held.period {
+            let change = |held: &mut Held<N>| held.period = period;
+            self.hold.begin_period(self.timestep, change);
+        }
+    }
+
+    /// The effort that was commanded last \[N m\]; zeros while the controller is on.
+    #[must_use]
+    pub fn command(&self) -> &[f64; N] {
+        &self.hold.held.command
+    }
+
+    /// Applies `effort` \[N m\] from the next step on, while the controller is off, until it is switched or the
+    /// simulation reset.
+    pub fn set_command(&mut self, effort: [f64; N]) {
+        self.hold.set_command(effort, self.timestep);
+    }
+
+    /// Applies `effort` \[N m\] instead of the controller's and of commands from the next step on, or no longer. The
+    /// controller stands still meanwhile; a control period begins afterwards.
+    pub fn drive(&mut self, effort: Option<[f64; N]>) {
+        let change = |held: &mut Held<N>| held.driven = effort;
+        self.hold.begin_period(self.timestep, change);
     }
 
     /// Changes the gains and keeps the integral.

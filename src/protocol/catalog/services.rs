@@ -6,7 +6,6 @@
 use super::entry::{Field, ServiceEntry, optional, required, service};
 use super::nested::{CRITICAL_TYPE, GAINS, GAINS_TYPE, PARAMS, PARAMS_TYPE};
 use super::node::Node;
-use super::playback::Playback;
 use super::rosapi::Rosapi;
 use super::table::{fields, table};
 use super::topics::{ARM_STATE, ARM_STATE_AND_FEEDBACK};
@@ -47,17 +46,27 @@ table! {
             .supersedes(ARM_STATE_AND_FEEDBACK),
         /// Back to the starting pose at time 0.
         Reset = of_arm("/arm_sim/reset", "pendularm_interfaces/srv/Reset")
-            .response(fields![
-                required("position", "float64[]", "rad"),
-                required("velocity", "float64[]", "rad/s"),
-            ])
+            .response(&STATE)
             .supersedes(ARM_STATE_AND_FEEDBACK),
+        /// Puts the arm into another state.
+        SetState = changes("/arm_sim/set_state", "pendularm_interfaces/srv/SetState")
+            .request(fields![
+                optional("position", "float64[]", "rad"),
+                optional("velocity", "float64[]", "rad/s"),
+            ])
+            .response(&STATE),
         /// Takes single steps of a paused arm.
         Step = changes("/arm_sim/step", "pendularm_interfaces/srv/Step")
-            .request(fields![required("steps", "uint64", "")])
+            .request(fields![
+                required("steps", "uint64", ""),
+                optional("effort", "float64[]", "N m"),
+            ])
             .response(fields![
                 required("steps", "uint64", ""),
                 required("time", "float64", "s"),
+                required("position", "float64[]", "rad"),
+                required("velocity", "float64[]", "rad/s"),
+                required("effort", "float64[]", "N m"),
             ])
             .all_or_nothing(),
         /// Pushes the arm for a while.
@@ -101,6 +110,17 @@ table! {
         SetGains = changes("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains")
             .request(&GAINS)
             .response(&GAINS),
+        /// How often the control law runs.
+        SetPeriod = changes("/pid_controller/set_period", "pendularm_interfaces/srv/SetPeriod")
+            .request(fields![
+                optional("period", "float64", "s"),
+                optional("delay", "bool", ""),
+            ])
+            .response(fields![
+                required("period", "float64", "s"),
+                required("effective_period", "float64", "s"),
+                required("delay", "bool", ""),
+            ]),
         /// Joint positions for an end effector position.
         Solve = service("/ik/solve", "pendularm_interfaces/srv/Solve", Node::Ik)
             .request(fields![
@@ -153,8 +173,11 @@ table! {
                 optional("gains", GAINS_TYPE, "SI"),
                 optional("params", PARAMS_TYPE, "SI"),
                 optional("setpoint", "float64[]", "rad"),
+                optional("control_period", "float64", "s"),
             ])
             .response(fields![
+                required("control_period_limit", "float64", "s"),
+                required("timestep_limit", "float64", "s"),
                 required("timestep_limit_held", "float64", "s"),
                 required("timestep_limit_continuous", "float64", "s"),
                 required("equilibrium", "float64[]", "rad"),
@@ -162,12 +185,14 @@ table! {
                 required("minimum_over_poses_held", "float64", "s"),
                 required("minimum_over_poses_continuous", "float64", "s"),
                 required("minimum_over_poses_bound", "float64", "s"),
+                required("bound_is_proven", "bool", ""),
                 required("certified", "bool", ""),
                 required("worst_pose", "float64[]", "rad"),
                 required("critical", CRITICAL_TYPE, "SI"),
                 required("timestep_limit_motion", "float64", "s"),
                 required("motion_speed", "float64", "rad/s"),
                 required("advised_timestep", "float64", "s"),
+                required("advised_duration", "float64", "s"),
             ])
             .computation()
             .all_or_nothing(),
@@ -184,6 +209,7 @@ table! {
                 optional("setpoint", "float64[]", "rad"),
                 optional("samples", "uint64", ""),
                 optional("reference", "bool", ""),
+                optional("control_period", "float64", "s"),
             ])
             .response(fields![
                 required("times", "float64[]", "s"),
@@ -195,6 +221,8 @@ table! {
                 required("wall_time", "float64", "s"),
                 required("error", "float64", "rad"),
                 required("error_uncertainty", "float64", "rad"),
+                required("sampling_error", "float64", "rad"),
+                required("sampling_error_uncertainty", "float64", "rad"),
             ])
             .computation()
             .all_or_nothing(),
@@ -229,6 +257,7 @@ table! {
                 optional("params", PARAMS_TYPE, "SI"),
                 optional("gains", GAINS_TYPE, "SI"),
                 optional("setpoint", "float64[]", "rad"),
+                optional("control_period", "float64", "s"),
             ])
             .response(fields![
                 required("integrator", "string", ""),
@@ -262,8 +291,6 @@ table! {
     }
     /// A question of rosapi, under either of its prefixes.
     Rosapi(Rosapi),
-    /// A service of the player, where a record is replayed.
-    Playback(Playback),
 }
 
 /// A service of the arm.
@@ -279,6 +306,10 @@ const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
 const METHOD: [Field; 2] = [
     optional("method", "string", ""),
     optional("timestep", "float64", "s"),
+];
+const STATE: [Field; 2] = [
+    required("position", "float64[]", "rad"),
+    required("velocity", "float64[]", "rad/s"),
 ];
 const NAMES: [Field; 1] = [required("names", "string[]", "")];
 const SWITCH: [Field; 1] = [optional("data", "bool", "")];
@@ -314,7 +345,6 @@ impl Service {
         let name = names::absolute(name);
         let own = Self::ALL.into_iter().find(|service| service.name() == name);
         own.or_else(|| Rosapi::from_name(&name).map(Self::Rosapi))
-            .or_else(|| Playback::from_name(&name).map(Self::Playback))
     }
 
     /// The service type, as ROS writes it.

@@ -18,6 +18,12 @@ table! {
             optional("joint_names", "string[]", ""),
             required("points", "trajectory_msgs/msg/JointTrajectoryPoint[]", "rad, rad/s"),
         ]),
+        /// Efforts that are applied while the controller is off.
+        EffortCommands =
+            subscribed("/effort_controller/commands", Node::ArmSim, "std_msgs/msg/Float64MultiArray", fields![
+            optional("layout", "std_msgs/msg/MultiArrayLayout", ""),
+            required("data", "float64[]", "N m"),
+        ]),
         /// The arm's state, 60 Hz.
         JointStates = published("/joint_states", Node::ArmSim, "sensor_msgs/msg/JointState", fields![
             required("header", "std_msgs/msg/Header", ""),
@@ -234,9 +240,11 @@ mod tests {
                 "/arm_sim/set_integrator",
                 "/arm_sim/set_parameters",
                 "/arm_sim/set_params",
+                "/arm_sim/set_state",
                 "/arm_sim/step",
                 "/pid_controller/enable",
                 "/pid_controller/set_gains",
+                "/pid_controller/set_period",
                 "/rosapi/set_param",
             ]
         );

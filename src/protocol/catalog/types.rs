@@ -112,7 +112,22 @@ const TIME: [Field; 2] = [
 ];
 
 /// The types inside others.
-const PARTS: [Type; 16] = [
+const PARTS: [Type; 18] = [
+    message(
+        "std_msgs/msg/MultiArrayLayout",
+        &[
+            required("dim", "std_msgs/msg/MultiArrayDimension[]", ""),
+            required("data_offset", "uint32", ""),
+        ],
+    ),
+    message(
+        "std_msgs/msg/MultiArrayDimension",
+        &[
+            required("label", "string", ""),
+            required("size", "uint32", ""),
+            required("stride", "uint32", ""),
+        ],
+    ),
     message(
         "std_msgs/msg/Header",
         &[

@@ -13,7 +13,7 @@ use serde_json::value::RawValue;
 
 pub use super::rejections::{Bound, Reason, RejectedField, Rejections};
 
-use crate::protocol::catalog::{Action, Field, Service};
+use crate::protocol::catalog::{Action, Field, Service, Topic};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::json;
 use crate::protocol::wire::text;
@@ -47,6 +47,14 @@ impl<'a> Fields<'a> {
     /// Where a positional array has more entries than a goal has fields.
     pub fn of_goal(args: &'a Arguments, action: Action) -> Result<Self, RejectedField> {
         Self::with(action.goal_fields(), true).filled(args)
+    }
+
+    /// Sorts the fields of a message. One bad field rejects the whole message.
+    ///
+    /// # Errors
+    /// Where it is no message.
+    pub fn of_message(msg: &'a Arguments, topic: Topic) -> Result<Self, RejectedField> {
+        Self::with(topic.fields(), true).filled(msg)
     }
 
     fn filled(self, args: &'a Arguments) -> Result<Self, RejectedField> {

@@ -24,7 +24,7 @@ pub struct FollowGoal {
     pub path_tolerance: Vec<JointTolerance>,
     /// How far off joints may be at the end.
     pub goal_tolerance: Vec<JointTolerance>,
-    /// How long after the end joints may take to get there \[s\]; 0 for the default.
+    /// How long after the end joints may take to get there \[s\]; 0 for the default, negative for no limit.
     pub goal_time_tolerance: f64,
 }
 
@@ -76,7 +76,7 @@ impl FollowGoal {
             path_tolerance: path_tolerance?,
             goal_tolerance: goal_tolerance?,
             goal_time_tolerance: match patience {
-                Some(raw) => seconds(raw, "goal_time_tolerance")?,
+                Some(raw) => seconds(raw, "goal_time_tolerance", Bound::Finite)?,
                 None => 0.0,
             },
         })
@@ -140,7 +140,7 @@ fn point(raw: &RawValue, field: &str, order: &[usize]) -> Result<FollowPoint, Re
     let positions = positions.ok_or_else(|| missing("positions"))?;
     let time = time.ok_or_else(|| missing("time_from_start"))?;
     Ok(FollowPoint {
-        time: seconds(time, &named("time_from_start"))?,
+        time: seconds(time, &named("time_from_start"), Bound::NonNegative)?,
         position: by_joint(positions, &named("positions"), order)?,
         velocity: match velocities.filter(|raw| !is_empty(raw)) {
             Some(raw) => Some(by_joint(raw, &named("velocities"), order)?),
@@ -191,16 +191,16 @@ fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedFiel
     Ok(value)
 }
 
-/// A duration in seconds, under the names of ROS 2 or of ROS 1.
+/// A duration in seconds, under the names of ROS 2 or of ROS 1: the sum of its parts, each within `bound`.
 ///
 /// # Errors
 /// If it is none; the reason names `field`.
-pub fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
+pub fn seconds(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedField> {
     let names = ["sec", "nanosec", "secs", "nsecs"];
     let [sec, nanosec, secs, nsecs] = json::members(raw.get(), &names)
         .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;
     let part = |raw: Option<&RawValue>, name: &str| match raw {
-        Some(raw) => finite(raw, &format!("{field}.{name}"), Bound::NonNegative),
+        Some(raw) => finite(raw, &format!("{field}.{name}"), bound),
         None => Ok(0.0),
     };
     let sum = part(sec.or(secs), "sec")? + 1e-9 * part(nanosec.or(nsecs), "nanosec")?;

@@ -23,7 +23,7 @@ use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
-pub use reader::{OPS, read};
+pub use reader::{OPS, read, read_start};
 
 /// Longest `args` and trajectory for a node of ours, without the members that it has no use for: the gateway's thread
 /// reads them, within some tenth of a millisecond. For computations, which workers read, and for other clients they may
@@ -127,8 +127,10 @@ pub enum Op {
     },
     /// Shows who the sender is, where the runtime asks for that.
     Auth {
-        /// The token that it shows.
-        token: String,
+        /// The token that it shows; a command of this program has none where none was given.
+        token: Option<String>,
+        /// Whether the sender is a command of this program, which may use a kept place.
+        is_command: bool,
     },
     /// A provider's answer to a forwarded call.
     ServiceResponse {
@@ -140,6 +142,15 @@ pub enum Op {
         result: bool,
         /// The provider's own `status`, if it is a string.
         status: Option<String>,
+    },
+    /// An answer that cannot be passed on. Its call or goal fails; without an id, the only one of its sender.
+    BadAnswer {
+        /// Whether it is for a goal.
+        of_goal: bool,
+        /// The service or action, if the frame names one.
+        name: Option<String>,
+        /// The fault.
+        problem: Problem,
     },
 }
 
@@ -189,7 +200,8 @@ pub struct Subscribe {
     pub type_name: Option<String>,
     /// Least time between deliveries; zero for no throttling; at most [`MAX_THROTTLE`].
     pub throttle: Duration,
-    /// How many messages throttling may hold back; 1 to [`MAX_QUEUE_LENGTH`].
+    /// How many messages may wait, and be held back by throttling; 0 where it is not given; at most
+    /// [`MAX_QUEUE_LENGTH`].
     pub queue_length: usize,
     /// How messages are to be written.
     pub encoding: Encoding,
@@ -341,6 +353,9 @@ pub enum OpError {
 /// A fault of an operation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
+    /// Not a frame; says why.
+    #[error("{0}")]
+    NotAFrame(String),
     /// Not a JSON object; holds the parser's complaint, shortened.
     #[error("malformed frame: {0}")]
     NotJson(String),

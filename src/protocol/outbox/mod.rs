@@ -6,69 +6,126 @@
 //!
 //! A [series](crate::protocol::wire::series) is queued as one piece, and dropped and held back message by message.
 //!
+//! A message that has waited for longer than [`MAX_AGE`] is dropped, except the newest of its topic.
+//!
 //! It is told the time, and knows no socket and no clock.
 //!
-//! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages
-//! wait, held back ones included.
+//! **Invariant:** dropping removes whole messages, never reorders; of topic messages, held back ones included, at most
+//! [`MAX_TOPIC_BYTES`] wait.
 
-pub(crate) mod blocks;
 mod dropping;
+mod queues;
 mod throttle;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use crate::protocol::limits::MAX_FRAME;
-use crate::protocol::outbox::blocks::Blocks;
-use crate::protocol::outbox::throttle::Throttles;
+use crate::protocol::limits::{MAX_FRAME, MODEST_MESSAGE, SHORT};
+use crate::protocol::outbox::queues::{Queues, Timestamp, counted};
+use crate::protocol::outbox::throttle::{HeldMessage, Throttles};
 use crate::protocol::wire::series::{first_message, last_messages, messages};
 
-/// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the
-/// newline behind it), or minutes of the arm's own.
-pub const MAX_TOPIC_BYTES: usize = MAX_FRAME + 1;
-/// Bytes that a frame takes beside its own: its reference count, its place in a queue that may be twice as long as what
-/// is in it, and what the allocator adds to each.
-pub const FRAME_BYTES: usize = 192;
-/// Bytes of a place in the queue of topic messages, or among those that are held back or to be encoded. The queue may
-/// be twice as long as what is in it, and three times while it grows.
-pub const PLACE_BYTES: usize = 128;
+/// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
+/// own. A longer message than [`MODEST_MESSAGE`] has room elsewhere, and counts as one of these: no two of them wait.
+pub const MAX_TOPIC_BYTES: usize = 400 * 1024;
+/// The longest topic message: the longest that a client may send, and the newline behind it.
+pub const MAX_MESSAGE: usize = MAX_FRAME + 1;
+/// How long a topic message may wait before it is dropped, unless it is the newest of its topic.
+pub const MAX_AGE: Duration = Duration::from_secs(1);
+/// The same once a message has been too old, until nothing waits any more: the client is slower than its topics, and
+/// what it reads is late by this and by what it has not read.
+const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
+/// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
+pub const MESSAGE_BYTES: usize = 160;
+
+/// A message that is queued without the series that it is part of, if it is: it keeps none of the others in memory.
+fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
+    if is_part {
+        Bytes::copy_from_slice(&frame)
+    } else {
+        frame
+    }
+}
 
 /// The outgoing queue of one connection.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Outbox {
-    /// Topic messages in order, each with its number.
-    topics: Blocks<(u64, Bytes)>,
+    /// Topic messages in order, by their numbers.
+    topics: BTreeMap<u64, QueuedMessage>,
+    /// The topics of these, and how many messages of each may wait.
+    queues: Queues,
+    /// Messages with lower numbers have been looked at for their age. Those that are left are the newest of their
+    /// topics.
+    looked_at: u64,
+    /// Whether a message has been too old since the queue was last empty.
+    is_behind: bool,
+    /// Bytes of topic messages that may be taken, unless a response is behind them.
+    room: usize,
+    /// How old a topic message may be that is taken only because a response is behind it.
+    fresh: Duration,
+    /// The time that ages are counted from.
+    epoch: Option<Instant>,
     /// Responses and statuses in order, each with its number.
-    responses: Blocks<(u64, Bytes)>,
+    responses: VecDeque<(u64, Bytes)>,
     throttles: Throttles,
+    /// The number of the last response.
+    last_response: u64,
     /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
     produced: u64,
-    /// Bytes of queued topic messages, without those held back.
+    /// Bytes of queued topic messages that count, without those held back.
     topic_bytes: usize,
-    /// Bytes of responses that are queued or being written.
+    /// Bytes of responses that are queued or being written, and those of the short ones among them.
     response_bytes: usize,
+    short_bytes: usize,
     /// The frames that are being written.
     in_flight: VecDeque<InFlight>,
-    /// Bytes of the topic messages among them, each whole, their places included.
-    writing_cost: usize,
-    /// Responses that are queued or being written.
-    response_count: usize,
     dropped: u64,
-    /// Topic messages that are wanted no more.
-    given_up: Vec<Bytes>,
+}
+
+/// A topic message that waits, or a series of them.
+#[derive(Debug)]
+struct QueuedMessage {
+    frame: Bytes,
+    /// Its topic; feedback of a goal has none.
+    topic: Option<Arc<str>>,
+    /// When it was produced.
+    since: Timestamp,
+}
+
+impl Default for Outbox {
+    fn default() -> Self {
+        Self {
+            topics: BTreeMap::new(),
+            queues: Queues::default(),
+            looked_at: 0,
+            is_behind: false,
+            room: usize::MAX,
+            fresh: MAX_AGE,
+            epoch: None,
+            responses: VecDeque::new(),
+            throttles: Throttles::default(),
+            last_response: 0,
+            produced: 0,
+            topic_bytes: 0,
+            response_bytes: 0,
+            short_bytes: 0,
+            in_flight: VecDeque::new(),
+            dropped: 0,
+        }
+    }
 }
 
 /// A frame that is being written.
 #[derive(Debug)]
 struct InFlight {
-    /// Bytes of the whole.
-    length: usize,
-    /// Bytes of it that have not been written.
+    /// Bytes that have not been written.
     left: usize,
     is_response: bool,
+    /// Bytes of the whole.
+    length: usize,
 }
 
 impl Outbox {
@@ -81,31 +138,47 @@ impl Outbox {
     /// Adds a message on a topic, or a series: queued, or held back if the topic is throttled. If it does not fit,
     /// the oldest go.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
+        let since = self.timestamp(now);
         self.release(now);
+        self.drop_old(now);
         if !self.may_fit(&frame) {
             return;
         }
         if self.throttles.concerns(topic) {
-            self.offer(topic, frame, now);
+            self.offer(topic, since, frame, now);
+        } else if self.queues.bound(topic).is_some() {
+            let is_series = first_message(&frame) < frame.len();
+            for frame in messages(frame) {
+                let number = self.number();
+                self.enqueue(number, topic, since, by_itself(frame, is_series));
+            }
         } else {
             let number = self.number();
-            self.enqueue(number, frame);
+            self.enqueue(number, topic, since, frame);
         }
         self.keep_bounded();
     }
 
     /// Adds feedback of a goal. It may be lost as a message may, but no throttle holds it back, not even that of a
     /// topic with the action's name.
-    pub fn push_feedback(&mut self, frame: Bytes) {
+    pub fn push_feedback(&mut self, frame: Bytes, now: Instant) {
+        let since = self.timestamp(now);
         if !self.may_fit(&frame) {
             return;
         }
         let number = self.number();
-        self.enqueue(number, frame);
+        self.topic_bytes += counted(&frame);
+        let topic = None;
+        let message = QueuedMessage {
+            frame,
+            topic,
+            since,
+        };
+        self.topics.insert(number, message);
         self.keep_bounded();
     }
 
-    /// Whether [`push`](Self::push) and [`take_frames`](Self::take_frames) look at the time that they are given.
+    /// Whether a topic is throttled.
     #[must_use]
     pub fn is_throttled(&self) -> bool {
         !self.throttles.is_empty()
@@ -115,13 +188,14 @@ impl Outbox {
     /// are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
-            let held = self.throttles.discard(topic);
-            self.give_up(held);
+            self.throttles.discard(topic);
         }
         self.response_bytes += frame.len();
-        self.response_count += 1;
-        let number = self.number();
-        self.responses.push_back((number, frame));
+        if frame.len() <= SHORT {
+            self.short_bytes += frame.len();
+        }
+        self.last_response = self.number();
+        self.responses.push_back((self.last_response, frame));
     }
 
     /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
@@ -129,22 +203,34 @@ impl Outbox {
     pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
         match throttle.filter(|(interval, _)| !interval.is_zero()) {
             Some((interval, queue_length)) => {
-                let given_up = &mut self.given_up;
-                self.throttles.set(topic, interval, queue_length, given_up);
+                self.throttles.set(topic, interval, queue_length);
             }
             None => {
-                for (_, frame) in self.throttles.forget(topic) {
+                for held in self.throttles.forget(topic) {
                     let number = self.number();
-                    self.enqueue(number, frame);
+                    self.enqueue(number, topic, held.since, held.frame);
                 }
             }
         }
     }
 
+    /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
+    /// kept; `None` for any number.
+    pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
+        self.queues.set_bound(topic, queue_length);
+    }
+
+    /// Sets how many bytes of topic messages may be taken from now on. What is ahead of a response is taken all the
+    /// same, unless it is older than `fresh`; then it is dropped, except the newest of its topic.
+    pub const fn allow(&mut self, room: usize, fresh: Duration) {
+        self.room = room;
+        self.fresh = fresh;
+    }
+
     /// Forgets a topic after an unsubscription: its throttle, and what is held back. What is queued still leaves.
     pub fn forget(&mut self, topic: &str) {
-        let held = self.throttles.forget(topic);
-        self.give_up(held);
+        self.throttles.forget(topic);
+        self.queues.forget_bound(topic);
     }
 
     /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
@@ -158,20 +244,29 @@ impl Outbox {
         frames: &mut Vec<Bytes>,
     ) {
         self.release(now);
+        self.drop_old(now);
         let mut bytes = 0;
-        for taken in 0..max_frames.max(1) {
-            let is_response = match (self.topics.front(), self.responses.front()) {
+        let mut taken = 0;
+        while taken < max_frames.max(1) {
+            let is_response = match (self.topics.first_key_value(), self.responses.front()) {
                 (Some((topic, _)), Some((response, _))) => response < topic,
                 (Some(_), None) => false,
                 (None, Some(_)) => true,
                 (None, None) => break,
             };
-            let queue = if is_response {
-                &mut self.responses
+            if !is_response && !self.may_take_topic() {
+                break;
+            }
+            if !is_response && self.room == 0 && self.drop_stale(now) {
+                continue;
+            }
+            let next = if is_response {
+                self.responses.front_mut().map(|(_, frame)| frame)
             } else {
-                &mut self.topics
+                let first = self.topics.first_entry();
+                first.map(|entry| &mut entry.into_mut().frame)
             };
-            let Some((_, next)) = queue.front_mut() else {
+            let Some(next) = next else {
                 break;
             };
             let single = max_frames <= 1 && !is_response;
@@ -184,25 +279,45 @@ impl Outbox {
             if taken > 0 && bytes > max_bytes {
                 break;
             }
+            taken += 1;
             let frame = if length < next.len() {
-                next.split_to(length)
+                self.topic_bytes -= counted(next);
+                let first = next.split_to(length);
+                self.topic_bytes += counted(next);
+                first
+            } else if is_response {
+                let Some((_, whole)) = self.responses.pop_front() else {
+                    break;
+                };
+                whole
             } else {
-                let Some((_, whole)) = queue.pop_front() else {
+                let Some(whole) = self.take_out_first() else {
                     break;
                 };
                 whole
             };
             if !is_response {
-                self.topic_bytes -= length;
-                self.writing_cost += length + FRAME_BYTES;
+                self.room = self.room.saturating_sub(length);
             }
             self.in_flight.push_back(InFlight {
-                length,
                 left: length,
                 is_response,
+                length,
             });
             frames.push(frame);
         }
+        self.is_behind &= !self.topics.is_empty();
+    }
+
+    /// Whether anything may be taken now.
+    #[must_use]
+    pub fn may_take(&self) -> bool {
+        self.has_responses() || (!self.topics.is_empty() && self.room > 0)
+    }
+
+    /// Whether the next topic message may be taken.
+    fn may_take_topic(&self) -> bool {
+        self.room > 0 || self.has_responses()
     }
 
     /// Notes that the next `bytes` of what was taken have been written.
@@ -213,31 +328,24 @@ impl Outbox {
             bytes -= done;
             if frame.is_response {
                 self.response_bytes -= done;
+                if frame.length <= SHORT {
+                    self.short_bytes -= done;
+                }
             }
             if frame.left > 0 {
                 return;
-            }
-            if frame.is_response {
-                self.response_count -= 1;
-            } else {
-                self.writing_cost -= frame.length + FRAME_BYTES;
             }
             self.in_flight.pop_front();
         }
     }
 
-    /// Moves out all that waits. What is being written stays, and counts until it has been.
+    /// Whether a long topic message waits or is being written, what is held back aside.
     #[must_use]
-    pub fn take_waiting(&mut self) -> Self {
-        let responses = || self.in_flight.iter().filter(|frame| frame.is_response);
-        let left = Self {
-            response_bytes: responses().map(|frame| frame.left).sum(),
-            response_count: responses().count(),
-            writing_cost: self.writing_cost,
-            in_flight: std::mem::take(&mut self.in_flight),
-            ..Self::default()
-        };
-        std::mem::replace(self, left)
+    pub fn has_long(&self) -> bool {
+        let mut waiting = self.topics.values();
+        let mut writing = self.in_flight.iter();
+        waiting.any(|message| message.frame.len() > MODEST_MESSAGE)
+            || writing.any(|frame| frame.length > MODEST_MESSAGE && !frame.is_response)
     }
 
     /// When the next held back message is due, if any is held back: the time to take frames again.
@@ -263,10 +371,10 @@ impl Outbox {
         self.response_bytes
     }
 
-    /// Bytes of the waiting responses, their places included.
+    /// The same without those that take a permit.
     #[must_use]
-    pub const fn response_cost(&self) -> usize {
-        self.response_bytes + self.response_count * FRAME_BYTES
+    pub const fn short_bytes(&self) -> usize {
+        self.short_bytes
     }
 
     /// How many topic messages, or series of them, wait, those held back included.
@@ -275,23 +383,10 @@ impl Outbox {
         self.topics.len() + self.throttles.count()
     }
 
-    /// Bytes of the topic messages that are being written, their places included. They can't be dropped any more, and
-    /// each is there until its last byte has been taken.
-    #[must_use]
-    pub const fn writing_cost(&self) -> usize {
-        self.writing_cost
-    }
-
-    /// Bytes of topic messages that wait, those held back included; at most [`MAX_TOPIC_BYTES`].
+    /// Bytes of topic messages that wait, as they count, those held back included.
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
         self.topic_bytes + self.throttles.bytes()
-    }
-
-    /// Bytes of topic messages that may be taken now: without those held back.
-    #[must_use]
-    pub const fn queued_bytes(&self) -> usize {
-        self.topic_bytes
     }
 
     /// Topic messages dropped so far for want of room. What throttling replaces by something newer is not counted.
@@ -300,20 +395,33 @@ impl Outbox {
         self.dropped
     }
 
+    /// Whether topic messages wait, without those held back.
+    #[must_use]
+    pub fn has_topics(&self) -> bool {
+        !self.topics.is_empty()
+    }
+
     fn number(&mut self) -> u64 {
         self.produced += 1;
         self.produced
     }
 
+    fn timestamp(&mut self, time: Instant) -> Timestamp {
+        let epoch = *self.epoch.get_or_insert(time);
+        let since = time.saturating_duration_since(epoch).as_micros();
+        Timestamp::try_from(since).unwrap_or(Timestamp::MAX)
+    }
+
     /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
     /// newest would be left.
-    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
+    fn offer(&mut self, topic: &Arc<str>, since: Timestamp, mut frames: Bytes, now: Instant) {
+        let is_series = first_message(&frames) < frames.len();
         while !frames.is_empty() {
-            let frame = frames.split_to(first_message(&frames));
-            if !self.offer_one(topic, frame, now) {
+            let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
+            if !self.offer_one(topic, since, frame, now) {
                 let left = self.throttles.queue_length(topic);
                 for frame in messages(last_messages(frames, left)) {
-                    self.offer_one(topic, frame, now);
+                    self.offer_one(topic, since, by_itself(frame, true), now);
                 }
                 return;
             }
@@ -321,29 +429,61 @@ impl Outbox {
     }
 
     /// Gives the throttle a message; false if it is held back.
-    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
+    fn offer_one(
+        &mut self,
+        topic: &Arc<str>,
+        since: Timestamp,
+        frame: Bytes,
+        now: Instant,
+    ) -> bool {
+        if self.throttles.holds_for_long(topic, &frame, now) {
+            self.dropped += 1;
+            return false;
+        }
         let number = self.number();
-        let frame = self.throttles.offer(topic, number, frame, now);
-        let goes = frame.is_some();
-        if let Some(frame) = frame {
-            self.enqueue(number, frame);
+        let held = HeldMessage {
+            number,
+            since,
+            frame,
+        };
+        let given_back = self.throttles.offer(topic, held, now);
+        let goes = given_back.is_some();
+        if let Some(message) = given_back {
+            self.enqueue(number, topic, since, message.frame);
         }
         goes
     }
 
-    fn enqueue(&mut self, number: u64, frame: Bytes) {
-        self.topic_bytes += frame.len();
-        self.topics.push_back((number, frame));
+    fn enqueue(&mut self, number: u64, topic: &Arc<str>, since: Timestamp, frame: Bytes) {
+        let before = self.queues.enter(topic, number);
+        if before.is_some_and(|before| before < self.looked_at) {
+            // It was too old, and is the newest no more.
+            self.drop_message(before);
+        }
+        self.topic_bytes += counted(&frame);
+        let message = QueuedMessage {
+            frame,
+            topic: Some(Arc::clone(topic)),
+            since,
+        };
+        self.topics.insert(number, message);
+        if !self.in_flight.is_empty() || self.room == 0 {
+            while let Some(surplus) = self.queues.surplus(topic) {
+                self.drop_message(Some(surplus));
+            }
+        }
     }
 
-    /// Queues the held back messages whose time has come.
+    /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
+    /// now.
     fn release(&mut self, now: Instant) {
         if !self.is_throttled() {
             return;
         }
-        while let Some(frame) = self.throttles.release(now) {
+        let since = self.timestamp(now);
+        while let Some((topic, held)) = self.throttles.release(now) {
             let number = self.number();
-            self.enqueue(number, frame);
+            self.enqueue(number, &topic, since, held.frame);
         }
     }
 }

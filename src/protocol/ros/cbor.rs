@@ -7,6 +7,7 @@
 
 use super::cdr;
 use super::sink::Sink;
+use super::stamps::member;
 use super::tree::{Branch, BranchKind};
 use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types;
@@ -78,7 +79,7 @@ fn stamp(msg: Branch<'_, '_>) -> (u64, u64) {
         "/transforms/0/header/stamp",
     ];
     let found = places.into_iter().find_map(|place| msg.pointer(place));
-    let part = |name: &str| found.and_then(|one| one.get(name)?.as_u64());
+    let part = |name: &str| found.and_then(|one| member(one, name)?.as_u64());
     (
         part("sec").unwrap_or_default(),
         part("nanosec").unwrap_or_default(),
@@ -130,12 +131,14 @@ fn float(out: &mut Sink, value: f64) {
     out.extend(&value.to_be_bytes());
 }
 
-/// Writes every field that is there, in the type's order. Members that the type does not have are left out.
+/// Writes every field that is there, in the type's order. Members that the type does not have are left out, but for the
+/// names of ROS 1 beside those of ROS 2.
 fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
-    if msg.members().is_none() {
+    let has = |name: &str| msg.get(name).is_some();
+    if msg.members().is_none() || (has("sec") && has("secs")) {
         return untyped(out, msg);
     }
-    let found = |field: &'static Field| Some((field, msg.get(field.name)?));
+    let found = |field: &'static Field| Some((field, member(msg, field.name)?));
     let there = one.fields.iter().filter_map(found);
     length(out, MAP, there.clone().count() as u64);
     for (field, value) in there {

@@ -8,6 +8,7 @@
 use serde_json::Value;
 
 use super::sink::Sink;
+use super::stamps::member;
 use super::tree::{Branch, BranchKind, MessageTree};
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
@@ -53,7 +54,7 @@ struct Writer {
 impl Writer {
     fn message(&mut self, one: Type, msg: Branch<'_, '_>) {
         for field in one.fields {
-            let value = msg.get(field.name).unwrap_or(ABSENT);
+            let value = member(msg, field.name).unwrap_or(ABSENT);
             let (kind, count) = field.element();
             // The type is looked up once, however many entries there are.
             let inner = message_type(kind);

@@ -27,6 +27,11 @@ table! {
         },
         /// The timestep \[s\].
         Timestep = field_of(Service::SetIntegrator, "timestep"),
+        /// The time between two runs of the control law \[s\].
+        ControlPeriod = ParameterEntry {
+            name: "control_period",
+            ..field_of(Service::SetPeriod, "period")
+        },
         /// The arm as URDF, made from lengths and masses; can't be set.
         RobotDescription = ParameterEntry { name: "robot_description", field: None },
     }

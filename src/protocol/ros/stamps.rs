@@ -1,9 +1,11 @@
-//! Stamps under the names that ROS 1 has for their members too, for clients that know a topic by its type of ROS 1.
+//! Stamps and durations under the names that ROS 1 has for their members too: written for clients that know a topic by
+//! its type of ROS 1, and read from every client.
 //!
 //! **Invariant:** the members of ROS 2 stay as they are: some clients use ROS 1's name of a type for ROS 2's messages.
 
 use bytes::Bytes;
 
+use super::tree::Branch;
 use crate::protocol::names;
 
 /// How a stamp of ours begins, between its two numbers, and what the two are called in ROS 1.
@@ -14,6 +16,16 @@ const NANOSECONDS: &[u8] = b",\"nanosec\":";
 #[must_use]
 pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
     asked != type_name && asked == names::short_type(type_name)
+}
+
+/// The member of a message for a field of its type in ROS 2. Seconds and nanoseconds may have their names of ROS 1.
+pub(super) fn member<'t, 'a>(msg: Branch<'t, 'a>, field: &str) -> Option<Branch<'t, 'a>> {
+    let ros1_name = match field {
+        "sec" => "secs",
+        "nanosec" => "nsecs",
+        _ => return msg.get(field),
+    };
+    msg.get(field).or_else(|| msg.get(ros1_name))
 }
 
 /// A frame of ours in which every stamp has `secs` and `nsecs` beside `sec` and `nanosec`. A text can't look like a

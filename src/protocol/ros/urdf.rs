@@ -11,8 +11,8 @@ use crate::protocol::messages::scene::{END_EFFECTOR, WORLD, link_name};
 
 /// Thickness of a link as it is drawn \[m\]; it has none in the dynamics.
 const THICKNESS: f64 = 0.05;
-/// A thin rod has no inertia about its own axis \[kg m²\]; parsers want one greater than 0.
-const LEAST_INERTIA: f64 = 1e-6;
+/// A thin rod has no inertia about its own axis. Parsers want one greater than 0, and at most the sum of the other two.
+const AXIAL_PART: f64 = 1e-6;
 
 /// The description of an arm with these lengths \[m\] and masses \[kg\].
 #[must_use]
@@ -24,14 +24,17 @@ pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String
     {
         let link = link_name(index);
         let middle = length / 2.0;
-        let across = mass * length * length / 12.0;
+        // The inertia of the lightest and shortest rod would be 0 as a double.
+        let across =
+            (mass * length * length / 12.0).clamp(f64::MIN_POSITIVE / AXIAL_PART, f64::MAX);
+        let along = across * AXIAL_PART;
         // A `String` takes whatever is written to it.
         let _ = write!(
             xml,
             "  <joint name=\"{joint}\" type=\"continuous\">\n    <parent link=\"{parent}\"/>\n    \
              <child link=\"{link}\"/>\n    <origin xyz=\"{at:?} 0 0\"/>\n    <axis xyz=\"0 0 1\"/>\n  </joint>\n  \
              <link name=\"{link}\">\n    <inertial>\n      <origin xyz=\"{middle:?} 0 0\"/>\n      \
-             <mass value=\"{mass:?}\"/>\n      <inertia ixx=\"{LEAST_INERTIA:?}\" ixy=\"0\" ixz=\"0\" \
+             <mass value=\"{mass:?}\"/>\n      <inertia ixx=\"{along:?}\" ixy=\"0\" ixz=\"0\" \
              iyy=\"{across:?}\" iyz=\"0\" izz=\"{across:?}\"/>\n    </inertial>\n    <visual>\n      \
              <origin xyz=\"{middle:?} 0 0\"/>\n      <geometry>\
              <box size=\"{length:?} {THICKNESS} {THICKNESS}\"/></geometry>\n    \
@@ -67,5 +70,23 @@ mod tests {
             assert!(xml.contains(part), "no {part} in {xml}");
         }
         assert_eq!(xml.matches("type=\"continuous\"").count(), 2);
+    }
+
+    /// Each inertia is greater than 0 and at most the sum of the other two, whatever the rod.
+    #[test]
+    fn inertias_are_those_of_a_body() {
+        let numbers = [5e-324, 1e-200, 1e-9, 0.002, 0.05, 1.0, 1e9, 1e200, f64::MAX];
+        for (mass, length) in numbers.iter().flat_map(|m| numbers.map(|l| (*m, l))) {
+            let xml = describe(&["joint1"], &[length], &[mass]);
+            let inertia = |name: &str| -> f64 {
+                let rest = xml.split_once(&format!("{name}=\"")).unwrap().1;
+                rest.split_once('"').unwrap().0.parse().unwrap()
+            };
+            let [x, y, z] = ["ixx", "iyy", "izz"].map(inertia);
+            for (one, others) in [(x, y + z), (y, x + z), (z, x + y)] {
+                assert!(one > 0.0 && one.is_finite(), "{mass} kg, {length} m: {xml}");
+                assert!(one <= others, "{mass} kg, {length} m: {xml}");
+            }
+        }
     }
 }

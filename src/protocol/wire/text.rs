@@ -50,6 +50,7 @@ pub(crate) fn push_plain(text: &mut String, character: char) {
 }
 
 /// The same within the quotation marks of JSON, which YAML reads too.
+#[cfg(feature = "cli")]
 pub(crate) fn push_quoted(text: &mut String, character: char) {
     match character {
         '"' | '\\' => text.extend(['\\', character]),

@@ -8,14 +8,17 @@
 //! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the
 //! others.
 
-use super::error::{OUTPUTS, REACH_GAINS, REACH_SETPOINT, SAMPLES};
+use super::error::{REACH_GAINS, REACH_SETPOINT};
 use super::reference::{DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference};
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::study::control_loop::ControlLoop;
 
-/// The parts of an error \[rad\], each the largest over all outputs and joints.
+/// Comparisons of a run, and a power of two: after every step, or every second, every fourth...
+const MOST_LOOKS: usize = 1024;
+
+/// The parts of an error \[rad\], each the largest over all comparisons and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parts {
     /// Length of a step \[s\].
@@ -30,7 +33,7 @@ pub struct Parts {
     pub hold: f64,
 }
 
-/// The reach of the study, 2 links, `duration` \[s\] in `steps` steps, a multiple of [`OUTPUTS`].
+/// The reach of the study, 2 links, `duration` \[s\] in a number of steps that is a power of two.
 #[derive(Debug)]
 pub struct Budget {
     arm: Arm<2>,
@@ -50,7 +53,8 @@ impl Budget {
             Law::FREE
         };
         let (arm, start) = (Arm::default(), State::rest());
-        let law = ReferenceMotion::of(&arm, &start, &law, duration / in_f64(OUTPUTS), SAMPLES);
+        let spacing = duration / length_in_f64(MOST_LOOKS);
+        let law = ReferenceMotion::of(&arm, &start, &law, spacing, MOST_LOOKS);
         Self {
             arm,
             start,
@@ -64,31 +68,32 @@ impl Budget {
     #[must_use]
     pub fn parts(&self, methods: &[Method], steps: u64) -> Vec<Parts> {
         let timestep = self.duration / in_f64(steps);
-        let every = steps / OUTPUTS;
+        let looks = usize::try_from(steps).map_or(MOST_LOOKS, |steps| steps.clamp(1, MOST_LOOKS));
+        let every = steps / looks as u64;
+        let truth = || {
+            let stride = MOST_LOOKS / looks;
+            self.law.samples().iter().skip(stride - 1).step_by(stride)
+        };
         let held = Law::Held {
             gains: REACH_GAINS,
             setpoint: REACH_SETPOINT,
             period: timestep,
         };
         let plant = self.control.then(|| {
-            let spacing = self.duration / in_f64(OUTPUTS);
-            ReferenceMotion::of(&self.arm, &self.start, &held, spacing, SAMPLES)
+            let spacing = self.duration / length_in_f64(looks);
+            ReferenceMotion::of(&self.arm, &self.start, &held, spacing, looks)
         });
         let law = if self.control { held } else { Law::FREE };
-        let plant = plant.as_ref().unwrap_or(&self.law).samples();
+        let plant: Vec<_> = match &plant {
+            Some(plant) => plant.samples().iter().collect(),
+            None => truth().collect(),
+        };
         methods
             .iter()
             .map(|&method| {
-                let exact = exact_steps(
-                    &self.arm,
-                    &self.start,
-                    &law,
-                    method,
-                    timestep,
-                    every,
-                    SAMPLES,
-                );
-                let live = self.live(method, timestep, every);
+                let exact =
+                    exact_steps(&self.arm, &self.start, &law, method, timestep, every, looks);
+                let live = self.live(method, timestep, every, looks);
                 let mut parts = Parts {
                     timestep,
                     total: 0.0,
@@ -96,7 +101,7 @@ impl Budget {
                     rounding: 0.0,
                     hold: 0.0,
                 };
-                let samples = self.law.samples().iter().zip(plant).zip(&exact).zip(&live);
+                let samples = truth().zip(&plant).zip(&exact).zip(&live);
                 for ((((law, _), (plant, _)), (exact, _)), live) in samples {
                     parts.total = larger(parts.total, largest_difference(law, live));
                     parts.rounding = larger(parts.rounding, largest_difference(exact, live));
@@ -108,7 +113,7 @@ impl Budget {
             .collect()
     }
 
-    fn live(&self, method: Method, timestep: f64, every: u64) -> Vec<[f64; 2]> {
+    fn live(&self, method: Method, timestep: f64, every: u64, looks: usize) -> Vec<[f64; 2]> {
         let control = if self.control {
             ControlLoop::new(self.arm, REACH_GAINS, REACH_SETPOINT)
         } else {
@@ -116,7 +121,7 @@ impl Budget {
         };
         let stepped = control.with_method(method).with_timestep(timestep);
         let mut simulation = stepped.simulation(self.start);
-        (0..SAMPLES)
+        (0..looks)
             .map(|_| {
                 let whole = simulation.advance(every) == every;
                 let position = simulation.state().position;

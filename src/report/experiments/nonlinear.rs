@@ -33,7 +33,10 @@ const MOVE: f64 = 6.0;
 const ARRIVED: f64 = 0.02;
 
 /// Time of a swing \[s\].
-const SWING: f64 = 4.0;
+pub const SWING: f64 = 4.0;
+
+/// The part of its energy that a swing keeps in that time, and how many times as much it may have.
+pub const ENERGY_FACTOR: f64 = 2.0;
 
 /// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default
 /// gains.
@@ -84,8 +87,8 @@ pub fn spun(spin: f64) -> State<2> {
     }
 }
 
-/// Whether each of the free swings, stepped side by side, keeps its energy, above that of the hanging arm, below three
-/// times what it had.
+/// Whether each of the free swings, stepped side by side, keeps its energy above that of the hanging arm to a factor of
+/// [`ENERGY_FACTOR`] for [`SWING`].
 #[must_use]
 pub fn are_carried(swings: &[(ControlLoop<2>, State<2>)]) -> Vec<bool> {
     let mut watched: Vec<_> = swings
@@ -95,9 +98,10 @@ pub fn are_carried(swings: &[(ControlLoop<2>, State<2>)]) -> Vec<bool> {
     batch::advance_with(watched.iter_mut().map(|(live, carried)| {
         let (arm, steps) = (*live.arm(), first_step_from(SWING, live.timestep()));
         let lowest = potential_energy(&arm, &[-FRAC_PI_2, 0.0]);
-        let most = 3.0 * (energy(&arm, live.state()) - lowest);
+        let first = energy(&arm, live.state()) - lowest;
+        let kept = first / ENERGY_FACTOR..=first * ENERGY_FACTOR;
         let observe = move |state: &State<2>| {
-            *carried = energy(&arm, state) - lowest <= most;
+            *carried = kept.contains(&(energy(&arm, state) - lowest));
             if *carried {
                 ControlFlow::Continue(())
             } else {
@@ -120,16 +124,44 @@ pub struct PeriodicSwing {
     pub period: f64,
 }
 
+/// Stride in amplitude from one swing to the next \[rad\], and how far the next may be from where it is predicted.
+const STRIDE: f64 = 0.02;
+const NEAR: f64 = 0.05;
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "bounded below by 1 and above by 1000"
+)]
+fn strides(amplitude: f64) -> u32 {
+    (amplitude / STRIDE).ceil().clamp(1.0, 1000.0) as u32
+}
+
 /// Steps to the hanging pose while a swing is looked for.
 const FINE: f64 = 1e-3;
 
 impl PeriodicSwing {
-    /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest; none if none is found near
-    /// the one of small amplitude.
+    /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest, continued from the one of small
+    /// amplitude; none where it can't be continued so far.
     #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
-        // Amplitudes of the slow mode of two equal rods: q₂ per q₁.
-        let (mut one, mut other) = (0.43 * amplitude, 0.45 * amplitude);
+        let strides = strides(amplitude);
+        // The slow mode of two equal rods: q₂ per q₁.
+        let (mut before, mut ratio) = (0.44, 0.44);
+        let mut swing = None;
+        for stride in 1..=strides {
+            let reached = amplitude * f64::from(stride) / f64::from(strides);
+            let found = Self::near(reached, reached * (2.0 * ratio - before))?;
+            (before, ratio) = (ratio, found.start.position[1] / reached);
+            swing = Some(found);
+        }
+        swing
+    }
+
+    /// The swing of this amplitude whose second joint is about `predicted` \[rad\] at rest. Another periodic orbit
+    /// further away is none.
+    fn near(amplitude: f64, predicted: f64) -> Option<Self> {
+        let (mut one, mut other) = (predicted - 1e-4, predicted);
         let mut off_one = through_hanging(amplitude, one)?.0;
         for _ in 0..60 {
             let (off, time) = through_hanging(amplitude, other)?;
@@ -142,7 +174,12 @@ impl PeriodicSwing {
             }
             let next = other - off * (other - one) / (off - off_one);
             (one, off_one) = (other, off);
-            other = if next.is_finite() { next } else { return None };
+            other = next;
+            // NaN is nowhere near.
+            let is_near = (other - predicted).abs() <= NEAR;
+            if !is_near {
+                return None;
+            }
             if (other - one).abs() < 1e-15 {
                 other += 1e-14;
             }

@@ -76,24 +76,35 @@ pub fn energy_error(method: Method, h: f64, steps: u64, adding: Adding) -> Vec<(
     points
 }
 
-/// The exponent of growth over the last two decades of steps: 1/2 of a random walk, 1 of what leans to one side; `None`
-/// where there is too little to fit.
+/// The exponents of growth over each of the last three decades of steps, the least and the largest: 1/2 of a random
+/// walk, 1 of what leans to one side. One walk has no sharper law. `None` where there is too little to fit.
 #[must_use]
-pub fn law(points: &[(f64, f64)]) -> Option<f64> {
+pub fn law(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let end = points.last()?.0;
-    let late: Vec<(f64, f64)> = points
-        .iter()
-        .filter(|point| point.0 >= 0.01 * end && point.1 > 0.0)
-        .map(|point| (point.0.ln(), point.1.ln()))
-        .collect();
-    let count = length_in_f64(late.len());
-    if late.len() < 8 {
+    let mut range: Option<(f64, f64)> = None;
+    for decade in 0..3 {
+        let from = end * 0.1_f64.powi(decade + 1);
+        let of_decade = points
+            .iter()
+            .filter(|point| point.0 >= from && point.0 <= 10.000_001 * from && point.1 > 0.0);
+        let exponent = exponent(&of_decade.copied().collect::<Vec<_>>())?;
+        range = Some(range.map_or((exponent, exponent), |(least, most)| {
+            (least.min(exponent), most.max(exponent))
+        }));
+    }
+    range
+}
+
+fn exponent(points: &[(f64, f64)]) -> Option<f64> {
+    let points: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let count = length_in_f64(points.len());
+    if points.len() < 8 {
         return None;
     }
-    let mean = |of: fn(&(f64, f64)) -> f64| late.iter().map(of).sum::<f64>() / count;
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(|point| point.0), mean(|point| point.1));
     let (mut along, mut across) = (0.0, 0.0);
-    for point in &late {
+    for point in &points {
         along += (point.0 - x) * (point.0 - x);
         across += (point.0 - x) * (point.1 - y);
     }

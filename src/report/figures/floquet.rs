@@ -11,14 +11,25 @@ use crate::report::svg::{
 };
 
 /// Amplitudes of the periodic swings \[rad\], and steps of a method in one of their periods.
-const SWINGS: [f64; 7] = [0.1, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8];
+const SWINGS: [f64; 9] = [0.1, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 1.9, 2.0];
 const PER_PERIOD: [u32; 7] = [16, 32, 64, 128, 256, 512, 1024];
 
 /// The swing whose multipliers are shown by timestep.
 const SHOWN: f64 = 0.6;
 
+/// Steps of order 4 in a period whose multipliers are the true ones.
+const TRUE_STEPS: u32 = 4096;
+
+/// A multiplier beyond this is unstable: a double one on the unit circle is good to the root of the rounding error.
+const UNSTABLE: f64 = 1.001;
+
+/// Halvings of the last stride between a stable amplitude and an unstable one.
+const HALVINGS: u32 = 4;
+
 /// Multipliers of the methods, by amplitude and by timestep.
 pub(super) struct Floquet {
+    /// The largest amplitude up to which the swings are stable, and an unstable one close by.
+    turns: Option<(f64, f64)>,
     /// Amplitude, period, and the true multiplier's modulus.
     true_ones: Vec<(f64, f64, f64)>,
     /// Method, amplitude, timestep, modulus.
@@ -28,6 +39,7 @@ pub(super) struct Floquet {
 impl Floquet {
     pub(super) fn of_swings() -> Self {
         let mut floquet = Self {
+            turns: None,
             true_ones: vec![],
             of_methods: vec![],
         };
@@ -35,8 +47,7 @@ impl Floquet {
             let Some(swing) = PeriodicSwing::of(amplitude) else {
                 continue;
             };
-            // So many steps of order 4 are the truth.
-            let truth = swing.transverse(Method::Rk4, 4096);
+            let truth = swing.transverse(Method::Rk4, TRUE_STEPS);
             floquet.true_ones.push((amplitude, swing.period, truth));
             for method in Method::ALL {
                 for steps in PER_PERIOD {
@@ -46,7 +57,24 @@ impl Floquet {
                 }
             }
         }
+        floquet.turns = floquet.turning_point();
         floquet
+    }
+
+    /// Between the last stable amplitude and the first unstable one.
+    fn turning_point(&self) -> Option<(f64, f64)> {
+        let first = self.true_ones.iter().position(|one| one.2 > UNSTABLE)?;
+        let mut unstable = self.true_ones.get(first)?.0;
+        let mut stable = self.true_ones.get(first.checked_sub(1)?)?.0;
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (stable + unstable);
+            if PeriodicSwing::of(middle)?.transverse(Method::Rk4, TRUE_STEPS) > UNSTABLE {
+                unstable = middle;
+            } else {
+                stable = middle;
+            }
+        }
+        Some((stable, unstable))
     }
 
     pub(super) fn csv(&self) -> Csv {
@@ -78,20 +106,16 @@ impl Floquet {
     }
 
     pub(super) fn finding(&self) -> String {
-        let first_unstable = self.true_ones.iter().find(|swing| swing.2 > 1.001);
-        let words = first_unstable.map_or_else(
-            || "none of these swings is unstable by itself".to_owned(),
-            |(amplitude, _, modulus)| {
-                format!(
-                    "from an amplitude of {} rad on the swing itself is unstable (multiplier {}), and no method can \
-                     follow it for long",
-                    number(*amplitude),
-                    number(*modulus)
-                )
-            },
-        );
+        let swing = "**The periodic swing of 2 links that begins at small amplitude";
+        let (Some((stable, _)), Some(last)) = (self.turns, self.true_ones.last()) else {
+            return format!("{swing} is stable by itself at every amplitude that was tried**.");
+        };
         format!(
-            "**Beside a periodic swing of 2 links deviations stay small only while the swing is small**: {words}."
+            "{swing} is stable by itself up to {} rad of the first joint**: beyond, a deviation grows in every period \
+             ({}-fold at {} rad), and no method can follow it for long.",
+            number((100.0 * stable).floor() / 100.0),
+            number(last.2),
+            number(last.0),
         )
     }
 
@@ -130,7 +154,7 @@ impl Floquet {
     pub(super) fn figure(&self) -> Figure {
         let mut by_amplitude = Plot::new(
             "The swing itself",
-            Axis::linear("amplitude of the first joint [rad]", 0.0, 2.0),
+            Axis::linear("amplitude of the first joint [rad]", 0.0, 2.1),
             Axis::log_between("largest multiplier of a period", Unit::Number, 0.5, 1e3),
         );
         let points = self.true_ones.iter().map(|(amplitude, period, modulus)| {

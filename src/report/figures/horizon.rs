@@ -6,7 +6,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
+use crate::report::experiments::chaos::{HORIZON_ERROR, horizon, lyapunov_rates, separation};
 use crate::report::experiments::reference::{Law, ReferenceMotion};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
@@ -24,12 +24,16 @@ const FINE: [u64; 2] = [4096, 16384];
 /// Steps per sample of the runs that are shown over time.
 const SHOWN: u64 = 64;
 
+/// Swings of the ensemble that the Lyapunov time is taken from, and the length of each \[s\].
+const SWINGS: u32 = 48;
+const SWING_TIME: f64 = 100.0;
+
 struct Swing {
     links: usize,
     /// Samples for which the reference is known to 1 % of the horizon's error.
     known: usize,
-    /// Lyapunov rate, whole and by halves \[1/s\].
-    rate: [f64; 3],
+    /// Lyapunov rates of an ensemble \[1/s\].
+    rates: Vec<f64>,
     /// Method, steps per sample, errors.
     runs: Vec<(Method, u64, Vec<f64>)>,
 }
@@ -91,12 +95,12 @@ fn swing<const N: usize>(making: &mut Making<'_>, samples: usize, before: usize)
         errors.truncate(known);
         runs.push((Method::Rk4, every, errors));
     }
-    let rate = lyapunov_rate(&arm, &start, making.choose(600.0, 60.0));
+    let rates = lyapunov_rates(&arm, &start, making.choose(SWINGS, 4), SWING_TIME);
     making.at((before + 1) * parts, 2 * parts);
     Swing {
         links: N,
         known,
-        rate,
+        rates,
         runs,
     }
 }
@@ -128,8 +132,24 @@ impl Swing {
         time(self.known.saturating_sub(1))
     }
 
+    /// How long an error takes to grow by e, over the whole ensemble \[s\].
     fn lyapunov_time(&self) -> f64 {
-        1.0 / self.rate[0]
+        length_in_f64(self.rates.len()) / self.rates.iter().sum::<f64>()
+    }
+
+    /// The same, with the shortest and the longest of a member, one digit each.
+    fn lyapunov_words(&self) -> String {
+        let of = |rate: f64| format!("{:.1}", 1.0 / rate);
+        let least = self.rates.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = self.rates.iter().copied().fold(0.0, f64::max);
+        format!(
+            "{:.1} s ({} to {} s in {} swings of {} s)",
+            self.lyapunov_time(),
+            of(most),
+            of(least),
+            self.rates.len(),
+            number(SWING_TIME)
+        )
     }
 }
 
@@ -171,9 +191,10 @@ fn figure(swings: &[Swing]) -> Figure {
             }
             // e-fold per Lyapunov time, as far as the paper goes.
             let from = 0.25 * swing.known_until();
-            let to =
-                (from + 9.0 * std::f64::consts::LN_10 / swing.rate[0]).min(swing.known_until());
-            let growth = [from, to].map(|t| (t, 1e-15 * (swing.rate[0] * (t - from)).exp()));
+            let to = (from + 9.0 * std::f64::consts::LN_10 * swing.lyapunov_time())
+                .min(swing.known_until());
+            let growth =
+                [from, to].map(|t| (t, 1e-15 * ((t - from) / swing.lyapunov_time()).exp()));
             plot.series.push(Curve {
                 dashed: true,
                 ..Curve::line("soft", growth)
@@ -225,8 +246,8 @@ fn table(swings: &[Swing]) -> Table {
     let mut table = Table::new(
         "horizon",
         "Horizon: when the error passes 0.01 rad [s]",
-        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; \
-         in brackets from each half alone.",
+        "The Lyapunov time is how long an error takes to grow by e, from an ensemble of swings that begin within 0.01 \
+         rad; in brackets the shortest and the longest of one of them.",
         &head,
     );
     for swing in swings {
@@ -246,13 +267,8 @@ fn table(swings: &[Swing]) -> Table {
                         .detail("where the reference ends"),
                 });
             }
-            let [_, first, second] = swing.rate;
             row.push(if method == Method::Euler {
-                Cell::new(format!("{} s", number(swing.lyapunov_time()))).detail(format!(
-                    "{} s, {} s",
-                    number(1.0 / first),
-                    number(1.0 / second)
-                ))
+                Cell::new(swing.lyapunov_words())
             } else {
                 Cell::default()
             });
@@ -273,23 +289,23 @@ fn finding(swing: &Swing) -> Option<String> {
         let ratio = timestep(1024) / timestep(every);
         let bought = ratio.powi(4).ln() * swing.lyapunov_time();
         format!(
-            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends \
-             it.",
+            " With steps of {} it is {} s, {} s later, where truncation alone would have bought some {:.0} s: \
+             rounding ends it.",
             seconds(timestep(every)),
             number(at),
             number(at - fine),
-            number(bought)
+            bought
         )
     });
     Some(format!(
         "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every \
-         {} s, so sixteen times the work buys {} s.{}",
+         {}, so sixteen times the work buys {} s.{}",
         swing.links,
         number(coarse),
         seconds(timestep(64)),
         number(fine),
         seconds(timestep(1024)),
-        number(swing.lyapunov_time()),
+        swing.lyapunov_words(),
         number(fine - coarse),
         end.unwrap_or_default()
     ))

@@ -143,7 +143,8 @@ fn findings(lines: &[MovingLine], distances: &[Distance]) -> Vec<String> {
     ) {
         found.push(format!(
             "**A setpoint that moves costs an order as a held effort does**: along {REACH}, on a smooth path of {} s, \
-             RK4 at {} is {} rad off with law and setpoint once a step, as the live arm has them (order {live_order}), \
+             RK4 at {} is off the law and the setpoint of every instant by {} rad with law and setpoint once a step, \
+             as the live arm has them (order {live_order}), \
              {} rad with the setpoint alone held for the step (order {held_order}), and {} rad with both known in \
              every stage (order {known_order}).",
             number(DURATION),

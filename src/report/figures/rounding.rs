@@ -7,7 +7,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::rounding::{Adding, energy_error, law};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Curve, Key, Plot, Unit, number, power, scientific, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Unit, power, scientific, seconds};
 
 /// Timestep \[s\]: so short that truncation of Runge-Kutta 4 is out of sight for 1e8 steps.
 const TIMESTEP: f64 = 2e-5;
@@ -83,14 +83,19 @@ fn finding(runs: &[EnergyRun]) -> Option<String> {
     let plain = of(runs, Method::Rk4, Adding::Plain)?;
     Some(format!(
         "**After {} steps of RK4 at {} the energy of a regular 2-link swing is off by {} of its scale; without \
-         carrying the rounding of sums by {}**, which has grown \
-         with the power {} of the number of steps.",
+         carrying the rounding of sums by {}**, which grew with {} of the number of steps in the last three decades.",
         power(carried.0.log10().round()),
         seconds(TIMESTEP),
         scientific(carried.1),
         scientific(plain.end().1),
-        law(&plain.points).map_or_else(|| "?".to_owned(), number)
+        law(&plain.points)
+            .map_or_else(|| "?".to_owned(), |law| format!("powers of {}", range(law)))
     ))
+}
+
+/// From the least to the largest, in tenths.
+fn range((least, most): (f64, f64)) -> String {
+    format!("{least:.1} to {most:.1}")
 }
 
 fn verdict(runs: &[EnergyRun]) -> Option<Verdict> {
@@ -165,8 +170,8 @@ fn table(runs: &[EnergyRun]) -> Table {
     let mut table = Table::new(
         "rounding",
         "Laws of growth",
-        "The exponent is fitted over the last two decades of steps: 0 where nothing grows or the error is bounded, \
-         1/2 of a random walk, 1 in proportion to the steps.",
+        "The exponent is fitted over each of the last three decades of steps; given are the least and the largest: 0 \
+         where nothing grows or the error is bounded, 1/2 of a random walk, 1 in proportion to the steps.",
         &[
             "Method",
             "Sums",
@@ -182,7 +187,7 @@ fn table(runs: &[EnergyRun]) -> Table {
             Cell::new(run.sums),
             Cell::new(power(steps.log10().round())),
             Cell::new(scientific(error)),
-            Cell::new(law(&run.points).map_or_else(|| "–".to_owned(), |law| format!("{law:.2}"))),
+            Cell::new(law(&run.points).map_or_else(|| "–".to_owned(), range)),
         ]);
     }
     table

@@ -226,14 +226,22 @@ pub(crate) fn scientific(value: f64) -> String {
     mantissa_and_power(value)
 }
 
+/// A size of which one digit is known: `2·10⁻⁹`.
+pub(crate) fn one_digit(value: f64) -> String {
+    with_power(&format!("{value:.0e}"))
+}
+
 fn mantissa_and_power(value: f64) -> String {
-    let text = format!("{value:.1e}");
+    with_power(&format!("{value:.1e}"))
+}
+
+fn with_power(text: &str) -> String {
     match text.split_once('e') {
         Some((mantissa, exponent)) => {
             let digits: String = exponent.chars().map(superscript).collect();
             format!("{mantissa}·10{digits}")
         }
-        None => text,
+        None => text.to_owned(),
     }
 }
 

@@ -11,7 +11,7 @@ mod bars;
 mod heat;
 mod plot;
 
-pub(crate) use axis::{Axis, Unit, number, plain, power, scientific, seconds};
+pub(crate) use axis::{Axis, Unit, number, one_digit, plain, power, scientific, seconds};
 pub(crate) use bars::Bars;
 pub(crate) use heat::Heat;
 pub(crate) use plot::Plot;

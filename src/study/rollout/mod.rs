@@ -1,10 +1,14 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
 //! The run is the live loop, [`Simulation`], from any state. Its reference obeys the same control law, evaluated at the
-//! same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]). So the
-//! difference is the error of the method alone. (Against a law that acts at every instant, holding the effort would
-//! cost an error of first order that no method can mend.) A second reference, in steps half as long and of an arm that
-//! differs in its last digits, says how far the first can be trusted, which is some twenty seconds on a chaotic swing.
+//! same instants and held for the same period, and follows the arm in between to rounding ([`Follower`]). So the
+//! difference is the error of the method alone. Against a law that acts at every instant ([`Rollout::from_ideal`])
+//! holding the effort costs an error of first order in the control period, which no method can mend.
+//!
+//! Three more references of arms that differ in their last digits, one of them in steps half as long, say how far the
+//! first can be trusted: some twenty seconds on a chaotic swing. All of them err along the one direction that grows.
+//! Two may come near each other by chance; four hardly do, so that `SPREAD` times the largest distance between any
+//! two of them holds the truth.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -14,16 +18,19 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
+mod ideal;
 mod request;
 
 pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
 
+use self::ideal::Ideal;
 use super::follower::Follower;
+use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::energy;
 use crate::math::pid::Pid;
-use crate::math::simulation::{Divergence, Simulation};
+use crate::math::simulation::{Divergence, Held, Hold, Simulation};
 
 /// Longest span that a reference without control is asked to follow at once \[s\].
 const MAX_SPAN: f64 = 0.05;
@@ -33,9 +40,15 @@ const MAX_SPAN: f64 = 0.05;
 pub struct Deviation {
     /// Largest error of a joint position, per sample \[rad\].
     pub errors: Vec<f64>,
-    /// How far two references are apart, per sample \[rad\]; an error below this says nothing.
+    /// How far the errors may be off, per sample \[rad\]: what the references are apart, at least a last digit.
     pub uncertainties: Vec<f64>,
 }
+
+/// References of a run.
+const REFERENCES: usize = 4;
+
+/// How many times the largest distance between two references the first one may be off.
+const SPREAD: f64 = 3.0;
 
 /// How many times its uncertainty a known error is at least: in a smaller one the reference's own error would show.
 const ABOVE_UNCERTAINTY: f64 = 4.0;
@@ -51,13 +64,13 @@ impl Deviation {
     /// The largest error \[rad\].
     #[must_use]
     pub fn largest(&self) -> f64 {
-        self.errors.iter().copied().fold(0.0, f64::max)
+        largest(self.errors.iter().copied())
     }
 
     /// The largest uncertainty \[rad\].
     #[must_use]
     pub fn largest_uncertainty(&self) -> f64 {
-        self.uncertainties.iter().copied().fold(0.0, f64::max)
+        largest(self.uncertainties.iter().copied())
     }
 }
 
@@ -67,13 +80,16 @@ pub struct Rollout<const N: usize> {
     simulation: Simulation<N>,
     steps: u64,
     samples: u64,
-    references: Option<[Reference<N>; 2]>,
+    references: Option<[Reference<N>; REFERENCES]>,
+    /// The loop whose law acts at every instant, twice: in longer and in shorter steps.
+    ideals: Option<[Ideal<N>; 2]>,
     times: Vec<f64>,
     positions: Vec<[f64; N]>,
     velocities: Vec<[f64; N]>,
     efforts: Vec<[f64; N]>,
     energy: Vec<f64>,
     deviation: Deviation,
+    from_ideal: Deviation,
 }
 
 impl<const N: usize> Rollout<N> {
@@ -85,14 +101,17 @@ impl<const N: usize> Rollout<N> {
         let steps = request.check()?;
         let simulation = request.control.simulation(request.start);
         let references = request.reference.then(|| {
-            [1, 2].map(|cuts| Reference {
-                arm: if cuts == 1 {
-                    request.control.arm
-                } else {
-                    neighbour(&request.control.arm)
-                },
-                follower: Follower::new(request.start).cut(cuts),
+            std::array::from_fn(|index| Reference {
+                arm: neighbour(&request.control.arm, index),
+                follower: Follower::new(request.start).cut(if index == 1 { 2 } else { 1 }),
                 pid: simulation.pid().clone(),
+                hold: Hold::new(
+                    Held {
+                        period: request.control.period,
+                        ..Held::default()
+                    },
+                    request.control.timestep,
+                ),
                 lost: false,
                 behind: Behind::default(),
             })
@@ -102,12 +121,15 @@ impl<const N: usize> Rollout<N> {
             steps,
             samples: request.samples.min(steps + 1),
             references,
+            ideals: (request.reference && !request.control.is_free())
+                .then(|| [1, 2].map(|cuts| Ideal::new(&request.control, request.start, cuts))),
             times: vec![],
             positions: vec![],
             velocities: vec![],
             efforts: vec![],
             energy: vec![],
             deviation: Deviation::default(),
+            from_ideal: Deviation::default(),
         };
         rollout.sample();
         Ok(rollout)
@@ -129,10 +151,16 @@ impl<const N: usize> Rollout<N> {
                 for reference in self.references.iter_mut().flatten() {
                     reference.fall_behind(timestep, taken);
                 }
+                for ideal in self.ideals.iter_mut().flatten() {
+                    ideal.fall_behind(taken);
+                }
             }
             let mut left = bound.saturating_sub(self.all_evaluations());
             for reference in self.references.iter_mut().flatten() {
                 left = left.saturating_sub(reference.follow(left));
+            }
+            for ideal in self.ideals.iter_mut().flatten() {
+                left = left.saturating_sub(ideal.follow(left));
             }
             let at_sample = self.simulation.steps() == self.next_sample();
             if at_sample && !self.is_behind() && self.simulation.divergence().is_none() {
@@ -149,6 +177,7 @@ impl<const N: usize> Rollout<N> {
     fn is_behind(&self) -> bool {
         let mut references = self.references.iter().flatten();
         references.any(|one| one.behind.steps > 0)
+            || self.ideals.iter().flatten().any(Ideal::is_behind)
     }
 
     /// Steps that are made in one go: a reference without control is asked for spans of [`MAX_SPAN`] at most, and
@@ -167,12 +196,13 @@ impl<const N: usize> Rollout<N> {
         }
     }
 
-    /// The step at which the next sample is due: the samples are spread evenly, start and end among them.
+    /// The step at which the next sample is due: the one nearest to its place. The places are spread evenly, start and
+    /// end among them.
     fn next_sample(&self) -> u64 {
         let index = self.times.len() as u64;
         let intervals = self.samples.saturating_sub(1).max(1);
         // At most 1e5 times 1e7.
-        index * self.steps / intervals
+        (2 * index * self.steps + intervals) / (2 * intervals)
     }
 
     fn sample(&mut self) {
@@ -182,13 +212,21 @@ impl<const N: usize> Rollout<N> {
         self.velocities.push(state.velocity);
         self.efforts.push(*self.simulation.effort());
         self.energy.push(energy(self.simulation.arm(), &state));
-        if let Some([first, second]) = &self.references
-            && !first.lost
-            && !second.lost
+        let last_digit = last_digit(&state);
+        if let Some(references) = &self.references
+            && references.iter().all(|one| !one.lost)
         {
-            let (first, second) = (first.follower.state(), second.follower.state());
-            self.deviation.errors.push(apart(&state, first));
-            self.deviation.uncertainties.push(apart(first, second));
+            let states = references.each_ref().map(|one| one.follower.state());
+            let spread = SPREAD * largest_distance(&states);
+            self.deviation.errors.push(apart(&state, states[0]));
+            self.deviation.uncertainties.push(spread.max(last_digit));
+        }
+        if let Some([first, second]) = &self.ideals
+            && let (Some(first), Some(second)) = (first.state(), second.state())
+        {
+            let uncertainty = apart(first, second).max(last_digit);
+            self.from_ideal.errors.push(apart(&state, second));
+            self.from_ideal.uncertainties.push(uncertainty);
         }
     }
 
@@ -222,6 +260,12 @@ impl<const N: usize> Rollout<N> {
         self.evaluations()
             + references
                 .map(|one| one.follower.coefficients())
+                .sum::<u64>()
+            + self
+                .ideals
+                .iter()
+                .flatten()
+                .map(Ideal::evaluations)
                 .sum::<u64>()
     }
 
@@ -261,6 +305,24 @@ impl<const N: usize> Rollout<N> {
         self.references.as_ref().map(|_| &self.deviation)
     }
 
+    /// Errors against the loop whose law acts at every instant, if there is a law and a reference was asked for: those
+    /// of the method, and of holding the effort.
+    #[must_use]
+    pub fn from_ideal(&self) -> Option<&Deviation> {
+        self.ideals.as_ref().map(|_| &self.from_ideal)
+    }
+
+    /// The largest error of a deviation of this run and its uncertainty \[rad\], where they are known for all samples:
+    /// an error of some of them can't be compared with another run's.
+    #[must_use]
+    pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
+        let whole = deviation.filter(|deviation| deviation.errors.len() == self.times.len());
+        (
+            whole.and_then(Deviation::known),
+            whole.map(Deviation::largest_uncertainty),
+        )
+    }
+
     /// The place at which a step led out of the finite numbers, if one did; the samples end before.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
@@ -274,6 +336,7 @@ struct Reference<const N: usize> {
     arm: Arm<N>,
     follower: Follower<N>,
     pid: Pid<N>,
+    hold: Hold<N>,
     /// Whether the motion was too wild to be followed.
     lost: bool,
     behind: Behind<N>,
@@ -325,9 +388,11 @@ impl<const N: usize> Reference<N> {
             if !self.behind.begun {
                 let timestep = self.behind.stretch;
                 if self.pid.is_enabled() {
-                    let control = self.pid.control(self.follower.state(), timestep);
+                    let state = self.follower.state();
+                    let (control, held) = self.hold.begin_step(&self.pid, state);
                     self.behind.effort = control.effort;
                     self.pid.commit(control.integral);
+                    self.hold.commit(held);
                 }
                 self.follower.begin(timestep);
                 self.behind.begun = true;
@@ -346,17 +411,43 @@ impl<const N: usize> Reference<N> {
     }
 }
 
-/// An arm that differs in the last digit of a length and a mass. The equations of motion lose as much by rounding their
-/// constants, and lose the same in every step, so that steps of another length would not show it.
-fn neighbour<const N: usize>(arm: &Arm<N>) -> Arm<N> {
+/// An arm that differs in the last digit of a length and a mass, in another way for every index; that of index 0 does
+/// not. The equations of motion lose as much by rounding their constants, and lose the same in every step, so that
+/// steps of another length would not show it.
+fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
     let (mut lengths, mut masses) = (*arm.lengths(), *arm.masses());
     if let (Some(length), Some(mass)) = (lengths.first_mut(), masses.last_mut()) {
-        (*length, *mass) = (length.next_up(), mass.next_up());
+        (*length, *mass) = match index {
+            0 => (*length, *mass),
+            1 => (length.next_up(), mass.next_up()),
+            2 => (length.next_down(), mass.next_up()),
+            _ => (length.next_up(), mass.next_down()),
+        };
     }
     Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
 }
 
+/// Largest distance of any two states in a joint position \[rad\]; NaN counts as the largest.
+fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
+    let mut largest = 0.0;
+    for (index, one) in states.iter().enumerate() {
+        for other in &states[..index] {
+            let distance = apart(one, other);
+            if distance > largest || distance.is_nan() {
+                largest = distance;
+            }
+        }
+    }
+    largest
+}
+
+/// The worth of the last digit of a joint position \[rad\].
+fn last_digit<const N: usize>(state: &State<N>) -> f64 {
+    let largest = largest(state.position.iter().map(|q| q.abs()));
+    f64::EPSILON * largest.max(1.0)
+}
+
 /// Largest difference of a joint position \[rad\].
 fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
-    super::matrix::largest((0..N).map(|i| (a.position[i] - b.position[i]).abs()))
+    largest((0..N).map(|i| (a.position[i] - b.position[i]).abs()))
 }

@@ -3,12 +3,12 @@
 //! **Invariant:** a request that passes has a bounded number of steps and samples, and no number that is not finite.
 
 use crate::math::arm::State;
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, steps_in};
 use crate::math::pid::Gains;
-use crate::math::shown::Shown;
+use crate::math::shown::{Shown, shown_against};
 use crate::study::control_loop::ControlLoop;
 
-/// Most steps of one run: some seconds of one core, with a reference under control up to a minute.
+/// Most steps of one run: some seconds of one core, with a reference under control up to two minutes.
 pub const MAX_STEPS: u64 = 10_000_000;
 
 /// Most samples of one run, some 30 MB of JSON.
@@ -21,7 +21,7 @@ pub struct RolloutRequest<const N: usize> {
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
-    /// How long \[s\]; the run ends with the last whole step within it.
+    /// How long \[s\]; the run has the nearest number of steps.
     pub duration: f64,
     /// How many samples, start and end among them, if there are as many steps.
     pub samples: u64,
@@ -56,8 +56,12 @@ pub enum RolloutError {
         /// The given value.
         value: f64,
     },
-    /// Not one whole step.
-    #[error("duration must be at least the timestep {}, got {}", Shown(*.timestep), Shown(*.duration))]
+    /// Less than one step.
+    #[error(
+        "duration must be at least the timestep {}, got {}",
+        shown_against(*.timestep, *.duration),
+        shown_against(*.duration, *.timestep)
+    )]
     TooShort {
         /// The given time \[s\].
         duration: f64,
@@ -65,7 +69,10 @@ pub enum RolloutError {
         timestep: f64,
     },
     /// More steps than [`MAX_STEPS`].
-    #[error("duration / timestep must be at most {MAX_STEPS:e} steps, got {}", Shown(*.steps))]
+    #[error(
+        "duration / timestep must be at most {MAX_STEPS:e} steps, got {}",
+        shown_against(*.steps, in_f64(MAX_STEPS))
+    )]
     TooManySteps {
         /// The given value.
         steps: f64,
@@ -79,8 +86,7 @@ pub enum RolloutError {
 }
 
 impl<const N: usize> RolloutRequest<N> {
-    /// How many whole steps the duration holds. A quotient that falls short of a whole number by rounding counts as
-    /// that.
+    /// The number of steps that is nearest to the duration.
     ///
     /// # Errors
     /// The first value that is out of bounds.
@@ -123,10 +129,11 @@ impl<const N: usize> RolloutRequest<N> {
                 return Err(RolloutError::NotPositive { field, value });
             }
         }
-        let steps = (duration / timestep * (1.0 + 4.0 * f64::EPSILON)).floor();
+        let steps = steps_in(duration, timestep);
         if steps < 1.0 {
             return Err(RolloutError::TooShort { duration, timestep });
         }
+        let steps = steps.round();
         if steps > in_f64(MAX_STEPS) {
             return Err(RolloutError::TooManySteps { steps });
         }

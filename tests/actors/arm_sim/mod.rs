@@ -220,9 +220,11 @@ where
     async fn trajectory(&self, msg: Value, id: Option<Value>) {
         let (done, ended) = oneshot::channel();
         self.routes.listeners[&Topic::JointTrajectory](TopicMessage {
+            present: std::sync::Weak::new(),
             heard: Payload::from(to_raw_value(&msg).unwrap()).into(),
             respond: self.ear.clone().recipient(),
             connection: CALLER,
+            listening: std::sync::Weak::new(),
             id: id.map(|id| to_raw_value(&id).unwrap().into()),
             done,
         });

@@ -43,7 +43,7 @@ enum Said {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Answer {
-    Stepped(Stepped),
+    Stepped(Stepped<3>),
     NotStepped(Rejections),
     Unserved(Unserved),
     /// To another question.
@@ -81,7 +81,8 @@ impl<T: 'static> Asker<T> for Client {
         let answer = match answer {
             Err(why) => Answer::Unserved(why),
             Ok(answer) => {
-                let stepped = (&answer as &dyn Any).downcast_ref::<Result<Stepped, Rejections>>();
+                let stepped =
+                    (&answer as &dyn Any).downcast_ref::<Result<Stepped<3>, Rejections>>();
                 match stepped {
                     Some(Ok(stepped)) => Answer::Stepped(*stepped),
                     Some(Err(rejected)) => Answer::NotStepped(rejected.clone()),
@@ -144,7 +145,15 @@ impl TurnsBench {
     fn step(&self, client: u64, steps: u64) -> Arc<AtomicBool> {
         let steps = Some(steps);
         let rejected = Rejections::default();
-        self.ask(client, Step { steps, rejected })
+        let effort = None::<[f64; 3]>;
+        self.ask(
+            client,
+            Step {
+                steps,
+                effort,
+                rejected,
+            },
+        )
     }
 
     /// Lets the arm have its turns, a millisecond each, until so many answers have come; gives the number of turns.
@@ -196,7 +205,7 @@ impl TurnsBench {
 }
 
 /// All of the steps that were asked for, or fewer.
-fn stepped(answer: &Answer) -> Stepped {
+fn stepped(answer: &Answer) -> Stepped<3> {
     match answer {
         Answer::Stepped(stepped) => *stepped,
         other => panic!("{other:?}"),

@@ -5,6 +5,7 @@
 
 mod calls;
 mod ending;
+mod pace;
 mod stalls;
 mod throttling;
 mod writes;
@@ -18,7 +19,7 @@ use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
-use tokio::time::sleep;
+use tokio::time::{sleep, sleep_until};
 
 const PARAMS: &str = Service::SetParams.name();
 const STEP: &str = Service::IntegrationStep.name();

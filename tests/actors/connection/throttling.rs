@@ -117,30 +117,3 @@ fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
         );
     });
 }
-
-#[test]
-fn a_response_of_the_arm_discards_what_waits_to_be_encoded_of_its_state() {
-    in_virtual_time(async {
-        let (gateway, _, calls) = held_back().await;
-        let mut client = gateway.connect(WIDE);
-        client
-            .send(json!({"op": "subscribe", "topic": "/joint_states", "fragment_size": 1000}))
-            .await;
-        client.receive().await;
-        let publish = |n: u64, pad: usize| Publish {
-            topic: Topic::JointStates,
-            frame: messages::publish("/joint_states", &json!({"n": n, "pad": "x".repeat(pad)}))
-                .into(),
-        };
-        client.call(PARAMS, 7).await;
-        settle().await;
-        for n in 0..4 {
-            gateway.registry.do_send(publish(n, 1_000_000));
-        }
-        calls.answer();
-        while client.receive().await["id"] != 7 {}
-        assert!(client.hears_nothing_for(Duration::from_secs(5)).await);
-        gateway.registry.do_send(publish(4, 0));
-        assert_eq!(client.receive().await["msg"]["n"], 4);
-    });
-}

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::virtual_time::{Held, Node};
-use pendularm::actors::gateway::limits::READ_HERE;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
+use pendularm::protocol::limits::SHORT;
 use pendularm::protocol::op::MAX_ARGS;
 
 /// Everything about a frame that is read elsewhere comes before everything about the next one.
@@ -13,7 +13,7 @@ fn long_frames_are_answered_in_their_place() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
-        let pad = "[1e5,\"\\u00e9\"],".repeat(READ_HERE / 8);
+        let pad = "[1e5,\"\\u00e9\"],".repeat(SHORT / 8);
         for id in 0..20 {
             let long = format!(
                 "{{\"op\":\"call_service\",\"service\":\"/none\",\"id\":{id},\"pad\":[{pad}0]}}\n"

@@ -239,6 +239,7 @@ impl Handler<TrackGoal<2>> for Noting {
         Tracking {
             positions: goal.solution,
             before: None,
+            obstacle: None,
         }
     }
 }

@@ -39,6 +39,7 @@ impl StandIn {
             time: self.born.elapsed().as_secs_f64(),
             resets: 0,
             simulated: self.born.elapsed().as_secs_f64(),
+            obstacle: None,
         }
     }
 }
@@ -141,6 +142,7 @@ fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
                 time: 0.101,
                 resets: 0,
                 simulated: 0.101,
+                obstacle: None,
             },
             outcome: Some(Outcome::Reached),
         });
@@ -175,6 +177,7 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
                 time: born.elapsed().as_secs_f64(),
                 resets: 0,
                 simulated: born.elapsed().as_secs_f64(),
+                obstacle: None,
             },
             outcome: Some(Outcome::Reached),
         };

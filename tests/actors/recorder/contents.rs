@@ -13,9 +13,11 @@ fn every_topic_is_recorded_though_nobody_subscribes_and_none_is_made_afterwards(
     in_virtual_time(async {
         let stage = Stage::<2>::start().await;
         let mut client = stage.connect();
-        client.enable().await;
         let notes = Notes::default();
         notes.take(&stage).await;
+        let command = json!({"op": "publish", "topic": "/effort_controller/commands", "msg": {"data": [0, 0]}});
+        client.send(&command).await;
+        client.enable().await;
         client.ask("/ik_trial/start", json!({"duration": 3})).await;
         sleep(ms(4000)).await;
         stop(&stage).await;

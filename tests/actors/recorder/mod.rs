@@ -103,7 +103,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()
     };
     let (poses, weights) = (numbers(-2.0, 2.0), numbers(0.5, 2.0));
-    let (service, args) = match rng.u32(..12) {
+    let (service, args) = match rng.u32(..16) {
         0 => ("/pid_controller/enable", json!({"data": rng.bool()})),
         1 => ("/pid_controller/set_gains", json!({"kp": weights})),
         2 => (
@@ -128,6 +128,16 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
         8 => ("/arm_sim/step", json!({"steps": rng.u32(1..50)})),
         9 => ("/ik_trial/start", json!({})),
         10 => ("/pid_controller/set_gains", json!({})),
+        11 => (
+            "/pid_controller/set_period",
+            json!({"period": 0.02 * rng.f64(), "delay": rng.bool()}),
+        ),
+        12 => ("/arm_sim/set_state", json!({"position": poses})),
+        13 => (
+            "/arm_sim/step",
+            json!({"steps": rng.u32(1..50), "effort": weights}),
+        ),
+        14 => return client.command_effort(json!(weights)).await,
         _ => return client.publish_trajectory(json!(poses)).await,
     };
     client.call(service, args).await;

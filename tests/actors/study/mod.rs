@@ -19,7 +19,7 @@ use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, Consult, HeldLimit, LEAST_PAUSE, Present, Reset, SetGains, SetIntegrator,
-    SetParams, TakeSnapshot,
+    SetParams, SetPeriod, TakeSnapshot,
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{
@@ -31,8 +31,9 @@ use pendularm::actors::resources::work_clock;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
 use pendularm::study::gains::{GainsRequirements, GainsSearch};
@@ -66,6 +67,7 @@ fn settings<const N: usize>() -> Present<N> {
             },
             method: Method::Midpoint,
             timestep: 0.002,
+            period: ControlPeriod::default(),
         },
         state: State {
             position: [0.3; N],

@@ -4,11 +4,16 @@ use super::*;
 use crate::system::in_real_time;
 
 /// The values that the service gives of these limits and this motion.
-fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Value {
+fn stability_values<const N: usize>(
+    limits: &Limits<N>,
+    clocks: &ClockLimits,
+    motion: &Motion,
+) -> Value {
     let critical = limits.critical.unwrap();
     let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
-    let advised = [limits.advised, bears.map(|timestep| 0.8 * timestep)];
     json!({
+        "control_period_limit": clocks.period,
+        "timestep_limit": clocks.timestep,
         "timestep_limit_held": limits.held,
         "timestep_limit_continuous": limits.continuous,
         "equilibrium": limits.equilibrium.to_vec(),
@@ -16,6 +21,7 @@ fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Valu
         "minimum_over_poses_held": limits.minimum_held,
         "minimum_over_poses_continuous": limits.minimum_continuous,
         "minimum_over_poses_bound": limits.bound,
+        "bound_is_proven": limits.bound_is_proven,
         "certified": limits.certified,
         "worst_pose": limits.worst_pose.map(|pose| pose.to_vec()),
         "critical": {
@@ -25,7 +31,8 @@ fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Valu
         },
         "timestep_limit_motion": bears,
         "motion_speed": motion.speed,
-        "advised_timestep": advised.into_iter().flatten().reduce(f64::min),
+        "advised_timestep": limits.advised_for(motion),
+        "advised_duration": null,
     })
 }
 
@@ -38,7 +45,7 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     assert!(expected.held.is_some_and(|limit| limit > 0.0));
     let predicted = bench.ask(PredictStability::default()).await.unwrap();
     assert_eq!((predicted.limits, predicted.motion), (expected, motion));
-    let written = stability_values(&expected, &motion);
+    let written = stability_values(&expected, &clock_limits(&control), &motion);
     let all = settings_as_args::<N>();
     let nulls =
         json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
@@ -68,6 +75,7 @@ fn members_that_are_left_out_of_an_object_are_the_arms_own() {
                 params: Some(gravity(0.0)),
                 method: Some(Method::Rk4),
                 setpoint: None,
+                control_period: None,
             })
             .await
             .unwrap();
@@ -147,7 +155,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         };
         let run = bench.ask(plan_with(0.05)).await.unwrap();
         assert_eq!(run.planned, planned);
-        assert!(run.controlled);
+        assert_eq!(run.control_period, Some(run.best.timestep));
         let args = json!({"error": 0.05, "servo": true});
         let values = client.values(Service::Plan, &args).await;
         let best = planned.best().unwrap();
@@ -166,7 +174,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let refused = bench.ask(tiny).await.unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "settling_time / timestep must be at most 1e6 steps, got 4.194304e6"
+            "settling_time / timestep must be at most 1e6 steps, got 4.1943e6"
         );
         let too_long = PlanRun {
             duration: Some(1e9),
@@ -203,6 +211,24 @@ fn refused_advice_names_a_field_and_spells_no_number_out() {
     });
 }
 
+/// A controller of 250 Hz is given: holding its efforts is no error of the plan's.
+#[test]
+fn a_plan_for_a_given_control_period_has_whole_parts_of_it_as_timesteps() {
+    in_real_time(async {
+        let bench = study::<2>();
+        let given = PlanRun {
+            control_period: Some(0.004),
+            ..plan_with(1e-4)
+        };
+        let run = bench.ask(given).await.unwrap();
+        assert_eq!(run.control_period, Some(0.004));
+        for one in &run.planned.candidates {
+            let steps = 0.004 / one.timestep;
+            assert!((steps - steps.round()).abs() < 1e-9 && one.error <= 1e-4);
+        }
+    });
+}
+
 /// A servo's plan of which only the allowed error is said.
 fn plan_with(error: f64) -> PlanRun<2> {
     PlanRun {
@@ -214,6 +240,7 @@ fn plan_with(error: f64) -> PlanRun<2> {
         params: None,
         gains: None,
         setpoint: None,
+        control_period: None,
     }
 }
 

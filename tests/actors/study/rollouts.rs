@@ -59,7 +59,8 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                 assert_eq!(values["error"], Value::Null, "no reference was asked for");
                 assert_eq!(values["error_uncertainty"], Value::Null);
                 assert!(values["wall_time"].as_f64().unwrap() > 0.0);
-                assert_eq!(values.as_object().unwrap().len(), 9);
+                assert_eq!(values["sampling_error"], Value::Null);
+                assert_eq!(values.as_object().unwrap().len(), 11);
             }
         }
     });

@@ -134,7 +134,8 @@ fn the_arms_own_question_is_answered_by_the_pool() {
         let bench = study::<2>();
         let control = settings::<2>().control;
         let limit = bench.node.send(HeldLimit(control)).await.unwrap();
-        assert_eq!(limit, limit_held(&control));
+        assert_eq!(limit, Some(clock_limits(&control)));
+        assert_eq!(limit.unwrap().timestep, limit_held(&control));
         let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
         let free = ControlLoop {
             arm,
@@ -142,6 +143,10 @@ fn the_arms_own_question_is_answered_by_the_pool() {
             ..control
         };
         let limit = bench.node.send(HeldLimit(free)).await.unwrap();
-        assert_eq!(limit, Some(f64::INFINITY));
+        let nothing = ClockLimits {
+            period: None,
+            timestep: None,
+        };
+        assert_eq!(limit, Some(nothing));
     });
 }

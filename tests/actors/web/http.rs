@@ -1,19 +1,20 @@
 //! Requests of HTTP: heads that do not come, and answers that are not taken.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::*;
-use pendularm::actors::gateway::connection::admission::MAX_HEADS;
+use pendularm::web::Site;
 use pendularm::web::access::Access;
-use pendularm::web::serve::{ANSWER_TIME, STRETCH, TAKE_TIME};
-use pendularm::web::{MAX_REQUESTS, Site};
+use pendularm::web::report::{FILES, MAX_FILE};
+use pendularm::web::stream::{ANSWER_TIME, IDLE_TIME};
+use tokio::io::{AsyncRead, split};
 
 const HEAD: &str = "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n";
 /// From the first bytes to the end of the head, and to the token.
 const HEAD_TIME: Duration = Duration::from_secs(5);
 
 /// All that comes up to the end of the stream.
-async fn rest(stream: &mut DuplexStream) -> String {
+async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
     let mut text = String::new();
     stream
         .read_to_string(&mut text)
@@ -90,149 +91,117 @@ fn file_request() -> String {
     HEAD.replace("GET /", "GET /report/a.csv") + "\r\n"
 }
 
-/// The pipe takes all of it at once, as a system's buffer takes megabytes.
+/// Clients that take nothing of a file hold the permits for files until they are closed. The next one gets its file.
 #[test]
-fn a_file_of_a_report_is_sent_in_turns() {
-    const LONG: usize = 4 << 20;
+fn clients_that_take_no_byte_of_a_file_keep_others_from_files_for_a_time_only() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let (folder, admission) = report_of("turns", LONG as u64);
-        let mut stream = connect_through(&gateway, &admission, WIDE);
-        stream.write_all(file_request().as_bytes()).await.unwrap();
-        assert_eq!(stream.read_u8().await.unwrap(), b'H');
-        let mut rest = vec![0; LONG];
-        let (turns, _) = turns_of_others(stream.read_exact(&mut rest)).await;
-        // One piece has come with the first byte.
-        assert!(turns >= LONG / TURN - 1, "{turns} turns");
-        std::fs::remove_dir_all(&folder).unwrap();
-    });
-}
-
-/// Far longer than there is memory; of as many that don't read as there may be, the oldest makes room.
-#[test]
-fn a_file_of_a_report_may_have_any_length_and_is_sent_to_everybody() {
-    const LONG: u64 = 1 << 36;
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let (folder, admission) = report_of("long", LONG);
+        let (folder, admission) = report_of("long", MAX_FILE);
         let request = file_request();
+        let began = Instant::now();
         let mut deaf = Vec::new();
-        for _ in 0..MAX_REQUESTS {
+        for _ in 0..FILES {
             let mut stream = connect_through(&gateway, &admission, 1024);
             stream.write_all(request.as_bytes()).await.unwrap();
             assert_eq!(stream.read_u8().await.unwrap(), b'H');
             deaf.push(stream);
         }
-        settle().await;
-        #[cfg(target_os = "linux")]
-        assert_eq!(open_files_in(&folder), 0, "all wait for their clients");
+        sleep(ANSWER_TIME - Duration::from_secs(1)).await;
         let mut late = connect_through(&gateway, &admission, WIDE);
         late.write_all(request.as_bytes()).await.unwrap();
-        let mut begins = vec![0; 4 << 20];
-        late.read_exact(&mut begins).await.unwrap();
-        let head = String::from_utf8_lossy(&begins[..1024]);
-        assert!(head.starts_with("HTTP/1.1 200 "), "{head}");
-        let length = format!("\r\nContent-Length: {LONG}\r\n");
-        assert!(head.contains(&length), "{head}");
-        assert!(rest(&mut deaf[0]).await.len() < 2048, "the oldest gave way");
-        let mut more = vec![0; 4096];
-        for stream in &mut deaf[1..] {
-            stream.read_exact(&mut more).await.unwrap();
-        }
+        assert_eq!(late.read_u8().await.unwrap(), b'H');
+        assert_elapsed(began, ANSWER_TIME);
+        let mut text = vec![0; MAX_FILE as usize];
+        late.read_exact(&mut text).await.unwrap();
+        let head = String::from_utf8_lossy(&text[..1024]);
+        let length = format!("\r\nContent-Length: {MAX_FILE}\r\n");
+        assert!(
+            head.starts_with("TTP/1.1 200 ") && head.contains(&length),
+            "{head}"
+        );
         std::fs::remove_dir_all(&folder).unwrap();
     });
 }
 
-/// How many files of a folder this process has open.
-#[cfg(target_os = "linux")]
-fn open_files_in(folder: &Path) -> usize {
-    let open = std::fs::read_dir("/proc/self/fd").unwrap();
-    open.filter_map(|entry| std::fs::read_link(entry.unwrap().path()).ok())
-        .filter(|path| path.starts_with(folder))
-        .count()
-}
-
-/// A client that takes 320 KiB a second gets 48 MiB, in two stretches of time; one that takes a piece just before it
-/// would be given up for taking none gets a short file's time.
 #[test]
-fn a_file_of_a_report_has_time_for_its_length() {
-    const PIECE: usize = 64 * 1024;
+fn a_file_of_a_report_that_is_too_long_is_refused() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let long = STRETCH + STRETCH / 2;
-        for (length, pause, arrives) in [
-            (long, Duration::from_millis(200), true),
-            (STRETCH / 2, TAKE_TIME - Duration::from_secs(1), false),
-        ] {
-            let (folder, admission) = report_of("time", length);
-            let mut stream = connect_through(&gateway, &admission, PIECE);
-            let began = Instant::now();
-            let request = file_request();
-            stream.write_all(request.as_bytes()).await.unwrap();
-            let (mut piece, mut taken) = (vec![0; PIECE], 0);
-            loop {
-                let read = stream.read(&mut piece).await.unwrap();
-                if read == 0 {
-                    break;
-                }
-                taken += read as u64;
-                sleep(pause).await;
-            }
-            assert_eq!(taken > length, arrives, "{taken} bytes of {length}");
-            if arrives {
-                assert!(began.elapsed() > ANSWER_TIME);
-            } else {
-                let late = began.elapsed() - ANSWER_TIME;
-                assert!(late <= 2 * pause, "{late:?}");
-            }
-            std::fs::remove_dir_all(&folder).unwrap();
-        }
+        let (folder, admission) = report_of("longer", MAX_FILE + 1);
+        let mut stream = connect_through(&gateway, &admission, WIDE);
+        stream.write_all(file_request().as_bytes()).await.unwrap();
+        let answer = rest(&mut stream).await;
+        assert!(answer.starts_with("HTTP/1.1 503 "), "{answer}");
+        assert!(answer.contains("longer than 4194304 bytes"), "{answer}");
+        std::fs::remove_dir_all(&folder).unwrap();
     });
 }
 
-/// Clients that take no byte of their answers keep nobody from one, nor do those that don't get to the end of their
-/// heads.
+/// A request behind an answer has a short time to come, also in pieces: each connection takes a place.
 #[test]
-fn of_too_many_requests_at_once_the_oldest_makes_room() {
+fn a_connection_without_a_next_request_is_closed_after_two_seconds() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let admission = Arc::default();
-        let request = format!("{HEAD}\r\n");
-        let mut begun = Vec::new();
-        for _ in 0..=MAX_HEADS {
-            let mut stream = connect_through(&gateway, &admission, WIDE);
-            stream.write_all(HEAD.as_bytes()).await.unwrap();
-            begun.push(stream);
-        }
-        let told = rest(&mut begun.remove(0)).await;
-        assert!(told.starts_with("HTTP/1.1 408 "), "{told}");
-        // The page is longer than the pipe.
-        let mut deaf = Vec::new();
-        for _ in 0..MAX_REQUESTS {
-            let mut stream = connect_through(&gateway, &admission, 512);
-            stream.write_all(request.as_bytes()).await.unwrap();
-            deaf.push(stream);
+        for further in ["", "GET", HEAD] {
+            let mut stream = connect(&gateway, WIDE);
+            let request = format!("{HEAD}\r\n");
+            let mut page = Vec::new();
+            for _ in 0..3 {
+                page.clear();
+                stream.write_all(request.as_bytes()).await.unwrap();
+                while !page.ends_with(b"</html>\n") {
+                    page.push(stream.read_u8().await.unwrap());
+                }
+                sleep(IDLE_TIME - Duration::from_millis(100)).await;
+            }
+            let began = Instant::now();
+            stream.write_all(further.as_bytes()).await.unwrap();
+            assert_eq!(rest(&mut stream).await, "", "{further}");
+            assert_elapsed(began, Duration::from_millis(100));
         }
         settle().await;
-        let mut stream = connect_through(&gateway, &admission, WIDE);
-        stream.write_all(request.as_bytes()).await.unwrap();
-        let page = rest(&mut stream).await;
-        assert!(page.starts_with("HTTP/1.1 200 "), "{page}");
-        drop(stream);
-        // One of them has made room, the oldest; the others get all of it as soon as they read.
-        for (number, mut stream) in deaf.into_iter().enumerate() {
-            let whole = rest(&mut stream).await == page;
-            assert_eq!(whole, number > 0, "{number}");
-        }
-        for mut stream in begun {
-            stream.write_all(b"\r\n").await.unwrap();
-            assert_eq!(rest(&mut stream).await, page);
-        }
+        assert_eq!(gateway.gauges.connections(), 0);
     });
 }
 
 #[test]
-fn a_browser_that_takes_no_byte_of_its_answer_is_given_up() {
+fn a_client_that_takes_a_few_bytes_at_a_time_gets_the_last_answer_whole() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let request = format!("{HEAD}\r\n");
+        let missing = request.replace("/ HTTP", "/nothing HTTP");
+        for (request, status) in [
+            (missing.clone() + "not a request\r\n\r\n", "400 Bad Request"),
+            (
+                request.replace("\r\n\r\n", "\r\nContent-Length: 9\r\n\r\n"),
+                "400 Bad Request",
+            ),
+            (
+                missing.clone() + &request.replace("GET", "DELETE"),
+                "405 Method Not Allowed",
+            ),
+            (missing.replace("HTTP/1.1", "HTTP/1.0"), "404 Not Found"),
+        ] {
+            let (mut answers, mut requests) = split(connect(&gateway, 16));
+            let send = async {
+                requests.write_all(request.as_bytes()).await.unwrap();
+                requests.shutdown().await.unwrap();
+            };
+            let ((), answers) = tokio::join!(send, rest(&mut answers));
+            let (_, last) = answers.rsplit_once("HTTP/1.").expect(&answers);
+            assert_eq!(last.get(2..2 + status.len()), Some(status), "{answers}");
+            let (head, body) = last.split_once("\r\n\r\n").expect(last);
+            let head = head.to_ascii_lowercase();
+            let (_, length) = head.split_once("content-length: ").expect(last);
+            let length = length.lines().next().expect(last);
+            assert_eq!(body.len().to_string(), length, "{last}");
+        }
+        open(&gateway, 16).await;
+    });
+}
+
+#[test]
+fn a_browser_that_does_not_take_its_answer_is_given_up() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         // The answer is longer than the pipe.
@@ -243,7 +212,7 @@ fn a_browser_that_takes_no_byte_of_its_answer_is_given_up() {
             .unwrap();
         settle().await;
         assert_eq!(gateway.gauges.connections(), 1);
-        sleep(Duration::from_secs(11)).await;
+        sleep(ANSWER_TIME).await;
         assert_eq!(gateway.gauges.connections(), 0);
     });
 }

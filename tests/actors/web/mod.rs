@@ -6,8 +6,10 @@
 #![cfg(feature = "web")]
 
 mod closing;
+mod heads;
 mod http;
 mod life;
+mod lines;
 mod messages;
 mod unread;
 
@@ -23,7 +25,7 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::limits::FRAME_TIME;
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::resources::budget::Memory;
+use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::Service;
 use pendularm_client::codec::Event;
 use pendularm_client::pipe::Client;

@@ -5,25 +5,29 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{House, PENDULARM};
 
 /// Floors that a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 14] = [
+const FLOORS: [(&str, &[&str]); 16] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
-    ("output", &[]),
+    ("output", &["protocol"]),
+    ("address", &[]),
+    ("value", &[]),
     ("study", &["math"]),
     ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
-    ("command", &["protocol", "output"]),
+    ("command", &["protocol", "output", "address", "value"]),
+    ("plan", &["math", "study", "value"]),
     (
         "options",
-        &["protocol", "study", "web", "report", "command", "logging"],
+        &[
+            "protocol", "web", "report", "command", "logging", "address", "value", "plan",
+        ],
     ),
-    ("plan", &["math", "study", "options"]),
     (
         "actors",
         &[
-            "math", "protocol", "logging", "study", "record", "web", "options",
+            "math", "protocol", "logging", "study", "record", "web", "options", "value",
         ],
     ),
     ("lib", &[]),

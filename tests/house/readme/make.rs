@@ -35,6 +35,74 @@ fn the_papers_list_the_targets_that_make_help_lists() {
     assert_eq!(readme, documented);
 }
 
+/// A target that CI does not run breaks unseen. Functions that no step calls do not count.
+#[test]
+fn ci_runs_every_target() {
+    let makefile = text("Makefile");
+    let script: String = text(".ci/run")
+        .lines()
+        .filter(|line| !line.trim_start().starts_with('#'))
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let words = |part: &str| -> BTreeSet<String> {
+        let split = part.split(|c: char| !(c.is_alphanumeric() || "_-".contains(c)));
+        split.map(str::to_owned).collect()
+    };
+    // Functions by name; a body ends with a brace alone.
+    let mut bodies = std::collections::BTreeMap::new();
+    let mut reached = String::new();
+    let mut open: Option<&str> = None;
+    for line in script.lines() {
+        if let Some(name) = line.strip_suffix("() {") {
+            open = Some(name);
+        } else if line == "}" {
+            open = None;
+        } else if let Some(name) = open {
+            *bodies.entry(name).or_insert_with(String::new) += &format!("{line}\n");
+        } else {
+            reached += &format!("{line}\n");
+        }
+    }
+    while let Some(name) = bodies
+        .keys()
+        .copied()
+        .find(|&name| words(&reached).contains(name))
+    {
+        reached += &bodies.remove(name).unwrap();
+    }
+    let mut run: BTreeSet<&str> = BTreeSet::new();
+    for line in reached.lines() {
+        let mut given = line.split_whitespace().skip_while(|word| *word != "make");
+        given.next();
+        while let Some(word) = given.next() {
+            match word {
+                "-o" | "-C" => drop(given.next()),
+                word => drop(run.insert(word)),
+            }
+        }
+    }
+    // Prerequisites are run with their target.
+    let rules: Vec<(&str, &str)> = makefile
+        .lines()
+        .filter(|line| line.contains("## ") && !line.starts_with(['\t', '#']))
+        .filter_map(|line| line.split_once(": "))
+        .collect();
+    for _ in &rules {
+        for (target, rule) in &rules {
+            if run.contains(target) {
+                let needs = rule.split("##").next().unwrap_or_default();
+                run.extend(needs.split([' ', ',', ')']).filter(|word| !word.is_empty()));
+            }
+        }
+    }
+    let forgotten: Vec<&str> = rules
+        .iter()
+        .map(|(target, _)| *target)
+        .filter(|target| !run.contains(target))
+        .collect();
+    assert!(rules.len() > 30 && forgotten.is_empty(), "{forgotten:?}");
+}
+
 #[test]
 fn make_alone_shows_the_help() {
     let make = |arguments: &[&str]| {

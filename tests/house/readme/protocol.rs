@@ -8,7 +8,7 @@ use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
-use pendularm::protocol::catalog::{Direction, Field, Playback, Rosapi, Service, Topic, types};
+use pendularm::protocol::catalog::{Direction, Field, Rosapi, Service, Topic, types};
 use pendularm::protocol::op;
 
 #[test]
@@ -105,20 +105,6 @@ fn the_papers_list_every_question_of_rosapi_with_its_fields_in_order() {
         assert_eq!(codes(&row[1]), names(service.fields()), "{question:?}");
         let values = names(service.response_fields());
         assert_eq!(codes(&row[2]), values, "{question:?}");
-    }
-}
-
-#[test]
-fn the_papers_list_every_service_of_the_player_with_its_fields_in_order() {
-    let rows = table(&text("docs/protocol.md"), "player");
-    assert_eq!(rows.len(), Playback::ALL.len());
-    for (row, one) in rows.iter().zip(Playback::ALL) {
-        let service = Service::Playback(one);
-        assert_eq!(codes(&row[0]), [one.short_name()]);
-        let names = |fields: &[Field]| -> Vec<&str> { fields.iter().map(|one| one.name).collect() };
-        assert_eq!(codes(&row[1]), names(service.fields()), "{one:?}");
-        let values = names(service.response_fields());
-        assert_eq!(codes(&row[2]), values, "{one:?}");
     }
 }
 

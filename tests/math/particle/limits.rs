@@ -14,12 +14,17 @@ fn refusal(text: &str, start: (f64, f64), dt: f64, steps: u64, method: Method) -
 
 #[test]
 fn a_timestep_must_be_positive() {
-    for dt in [0.0, -0.0, -0.1, -5e-324] {
+    for (dt, shown) in [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (-0.1, "-0.1"),
+        (-5e-324, "-5e-324"),
+    ] {
         let error = refusal("t", (0.0, 0.0), dt, 10, Method::Euler);
         assert_eq!(error, ParticleError::Timestep { dt });
         assert_eq!(
             error.to_string(),
-            format!("dt must be greater than 0, got {dt}")
+            format!("dt must be greater than 0, got {shown}")
         );
     }
 }

@@ -104,6 +104,19 @@ fn a_message_is_an_object() {
 }
 
 #[test]
+fn the_values_of_a_response_without_fault_are_an_object() {
+    for bad in ["5", "null", "\"x\"", "[]"] {
+        let message = status(&format!(
+            r#"{{"op":"service_response","service":"/s","id":1,"result":true,"values":{bad}}}"#
+        ));
+        assert!(
+            message.starts_with("service_response: values must be an object, got "),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn the_result_of_a_response_is_true_or_false() {
     for bad in ["1", "null", "\"true\""] {
         let frame = format!(

@@ -25,6 +25,7 @@ fn op(frame: &str) -> Op {
 fn status(frame: &str) -> String {
     match read(frame).op {
         Err(error @ OpError::Status(_)) => error.to_string(),
+        Ok(Op::BadAnswer { problem, .. }) => problem.to_string(),
         other => panic!("{frame}: {other:?}"),
     }
 }

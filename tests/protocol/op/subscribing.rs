@@ -15,7 +15,7 @@ fn subscribe(more: &str) -> Subscribe {
 }
 
 #[test]
-fn a_subscription_has_no_throttle_and_holds_one_message_unless_it_says_otherwise() {
+fn a_subscription_has_no_throttle_and_no_queue_length_unless_it_says_otherwise() {
     let plain = subscribe("");
     assert_eq!(
         (
@@ -23,7 +23,7 @@ fn a_subscription_has_no_throttle_and_holds_one_message_unless_it_says_otherwise
             plain.queue_length,
             plain.type_name.as_deref()
         ),
-        (Duration::ZERO, 1, None)
+        (Duration::ZERO, 0, None)
     );
     for none in ["0", "0.0", "-0"] {
         let unthrottled = subscribe(&format!(r#","throttle_rate":{none}"#));
@@ -38,10 +38,10 @@ fn a_subscription_has_no_throttle_and_holds_one_message_unless_it_says_otherwise
 }
 
 #[test]
-fn a_queue_length_of_zero_counts_as_one_and_floats_may_be_integers() {
+fn a_queue_length_of_zero_is_not_given_and_floats_may_be_integers() {
     for (text, length) in [
-        ("0", 1),
-        ("-0", 1),
+        ("0", 0),
+        ("-0", 0),
         ("1", 1),
         ("2.0", 2),
         ("1e1", 10),

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** time is told, never waited for.
 
+mod age;
 mod costs;
 mod properties;
 mod queue;

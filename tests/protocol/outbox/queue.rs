@@ -1,8 +1,8 @@
 //! The queue: in which order frames leave, and which messages are dropped when it is full.
 
 use bytes::Bytes;
-use pendularm::protocol::limits::MAX_FRAME;
-use pendularm::protocol::outbox::{FRAME_BYTES, MAX_TOPIC_BYTES, PLACE_BYTES};
+use pendularm::protocol::limits::{MAX_FRAME, MODEST_MESSAGE, SHORT};
+use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
 
 use super::{Bench, MIB};
 
@@ -27,11 +27,11 @@ fn feedback_is_past_all_throttles_and_drops_nothing_if_it_cannot_fit() {
     bench.throttle("/a", 1000, 1);
     bench.push("/a", "1");
     bench.push("/a", "held back");
-    bench.outbox.push_feedback("2".into());
-    bench.outbox.push_feedback("3".into());
+    bench.outbox.push_feedback("2".into(), bench.now);
+    bench.outbox.push_feedback("3".into(), bench.now);
     bench
         .outbox
-        .push_feedback(vec![b'x'; MAX_TOPIC_BYTES + 1].into());
+        .push_feedback(vec![b'x'; MAX_MESSAGE + 1].into(), bench.now);
     assert_eq!(bench.outbox.dropped(), 1);
     assert_eq!(bench.take_all(), ["1", "2", "3"]);
     bench.advance(1000);
@@ -49,21 +49,35 @@ fn a_batch_is_limited_in_frames_and_bytes_but_never_empty() {
     assert_eq!(bench.take(0, 0), ["eee"]);
 }
 
+/// As many of the longest short ones as fit with what each counts, and two more.
 #[test]
 fn the_oldest_topic_messages_go_first_when_the_queue_is_full() {
     let mut bench = Bench::new();
-    let message = |tag: u8| Bytes::from(vec![tag; MIB]);
-    for tag in 1..=6 {
-        bench.push("/a", message(tag));
+    let fit = MAX_TOPIC_BYTES / (SHORT + MESSAGE_BYTES);
+    for tag in 1..=fit + 2 {
+        bench.push("/a", vec![tag as u8; SHORT]);
         bench.respond("answer", &[]);
     }
     assert_eq!(bench.outbox.dropped(), 2);
-    let left: Vec<u8> = bench
-        .take(usize::MAX, usize::MAX)
-        .iter()
-        .map(|frame| frame[0])
-        .collect();
-    assert_eq!(left, [b'a', b'a', 3, b'a', 4, b'a', 5, b'a', 6, b'a']);
+    let mut left = bench.take(usize::MAX, usize::MAX);
+    left.retain(|frame| frame.len() == SHORT);
+    let left: Vec<usize> = left.iter().map(|frame| frame[0].into()).collect();
+    assert!(left.into_iter().eq(3..=fit + 2));
+}
+
+/// Of those with room elsewhere one waits.
+#[test]
+fn the_newest_long_message_waits_and_one_that_no_client_may_send_is_dropped_alone() {
+    let mut bench = Bench::new();
+    for tag in 1..=4 {
+        bench.push("/a", vec![tag; MAX_MESSAGE]);
+    }
+    bench.push("/a", vec![5; MAX_MESSAGE + 1]);
+    bench.push("/a", "1");
+    assert_eq!(bench.outbox.topic_bytes(), 1 + MODEST_MESSAGE);
+    assert_eq!(bench.outbox.dropped(), 4);
+    let left = bench.take(usize::MAX, usize::MAX);
+    assert_eq!((left.len(), left[0][0]), (2, 4));
 }
 
 #[test]
@@ -76,24 +90,6 @@ fn responses_are_never_dropped() {
     bench.push("/a", vec![b'm'; 4 * MIB]);
     assert_eq!(bench.outbox.dropped(), 0);
     assert_eq!(bench.take(usize::MAX, usize::MAX).len(), 101);
-}
-
-#[test]
-fn a_message_of_the_greatest_length_fits_and_a_longer_one_is_dropped_alone() {
-    let mut bench = Bench::new();
-    bench.push("/a", vec![0; MAX_TOPIC_BYTES - 1]);
-    bench.push("/a", "1");
-    assert_eq!(bench.outbox.topic_bytes(), MAX_TOPIC_BYTES);
-    bench.push("/a", vec![0; MAX_TOPIC_BYTES + 1]);
-    assert_eq!(
-        (bench.outbox.dropped(), bench.outbox.topic_bytes()),
-        (1, MAX_TOPIC_BYTES)
-    );
-    bench.push("/a", vec![0; MAX_TOPIC_BYTES]);
-    assert_eq!(
-        (bench.outbox.dropped(), bench.outbox.topic_bytes()),
-        (3, MAX_TOPIC_BYTES)
-    );
 }
 
 #[test]
@@ -115,27 +111,4 @@ fn an_outbox_is_empty_when_neither_a_message_nor_a_response_can_be_taken() {
     assert!(!bench.outbox.is_empty());
     bench.take_all();
     assert!(bench.outbox.is_empty());
-}
-
-#[test]
-fn the_oldest_messages_go_until_those_that_are_left_fit_with_their_places() {
-    let mut bench = Bench::new();
-    bench.throttle("/held", 1000, 10);
-    for topic in ["/t", "/held", "/held", "/t", "/t"] {
-        bench.push(topic, vec![b'x'; 1000]);
-    }
-    bench.respond("response", &[]);
-    // As it is charged: the message whole, and its place.
-    let each = 1000 + FRAME_BYTES + PLACE_BYTES;
-    let mut kept = |bytes| {
-        bench.outbox.keep_topics(bytes);
-        let outbox = &bench.outbox;
-        assert_eq!(outbox.topic_bytes(), 1000 * outbox.topic_count());
-        (outbox.topic_count(), outbox.dropped())
-    };
-    assert_eq!(kept(5 * each), (5, 0));
-    assert_eq!(kept(5 * each - 1), (4, 1));
-    assert_eq!(kept(2 * each), (2, 3));
-    assert_eq!(kept(0), (0, 5));
-    assert_eq!(bench.take_all(), ["response"], "which never goes");
 }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
+use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES};
 
-use super::{Bench, MIB};
+use super::Bench;
 
 #[test]
 fn a_throttled_topic_keeps_its_distance_and_the_newest_message() {
@@ -154,19 +155,24 @@ fn a_response_discards_the_held_back_state_from_before_it() {
 fn held_back_messages_count_for_the_limit_and_go_when_they_are_the_oldest() {
     let mut bench = Bench::new();
     bench.throttle("/a", 1000, 100);
-    let message = |tag: u8| Bytes::from(vec![tag; MIB]);
+    // Seven of them fit.
+    const LENGTH: usize = MAX_TOPIC_BYTES / 7 - MESSAGE_BYTES;
+    let message = |tag: u8| Bytes::from(vec![tag; LENGTH]);
     bench.push("/a", message(0));
     assert_eq!(bench.take(1, usize::MAX).len(), 1);
-    bench.push("/b", message(1));
-    bench.push("/a", message(2));
-    bench.push("/a", message(3));
-    bench.push("/b", message(4));
-    assert_eq!(bench.outbox.topic_bytes(), 4 * MIB);
-    bench.push("/b", message(5));
-    bench.push("/b", message(6));
+    for (topic, tag) in ["/b", "/a", "/a", "/b", "/b", "/b", "/b"]
+        .into_iter()
+        .zip(1..)
+    {
+        bench.push(topic, message(tag));
+    }
+    assert_eq!(bench.outbox.topic_bytes(), 7 * LENGTH);
+    bench.push("/b", message(8));
+    bench.push("/b", message(9));
     assert_eq!(bench.outbox.dropped(), 2);
     let tags = |batch: Vec<Bytes>| -> Vec<u8> { batch.iter().map(|frame| frame[0]).collect() };
-    assert_eq!(tags(bench.take(usize::MAX, usize::MAX)), [4, 5, 6]);
+    let queued = tags(bench.take(usize::MAX, usize::MAX));
+    assert_eq!(queued, [4, 5, 6, 7, 8, 9]);
     bench.advance(1000);
     assert_eq!(tags(bench.take(usize::MAX, usize::MAX)), [3]);
 }

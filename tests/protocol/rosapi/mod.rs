@@ -46,7 +46,6 @@ fn census() -> Census {
             service("/dance", Some("demo/action/Dance")),
             service("/untyped", None),
         ],
-        replayed: None,
     }
 }
 

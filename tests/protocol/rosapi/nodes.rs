@@ -20,7 +20,10 @@ fn every_node_is_listed_and_tells_what_it_does() {
         );
     }
     let arm = values(Rosapi::NodeDetails, json!({"node": "/arm_sim"}));
-    assert_eq!(arm["subscribing"], json!(["/joint_trajectory"]));
+    assert_eq!(
+        arm["subscribing"],
+        json!(["/effort_controller/commands", "/joint_trajectory"])
+    );
     let published = arm["publishing"].as_array().unwrap();
     assert!(published.contains(&json!("/clock")) && !published.contains(&json!("/rosout")));
     assert_eq!(

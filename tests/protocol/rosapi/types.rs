@@ -1,6 +1,6 @@
 //! Questions about types: their texts, their details, and all of them.
 
-use pendularm::protocol::catalog::{Action, Playback, Rosapi, Service, Topic, types};
+use pendularm::protocol::catalog::{Action, Rosapi, Service, Topic, types};
 use pendularm::protocol::ros::rosapi::AnswerError;
 use serde_json::json;
 
@@ -174,7 +174,6 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
     let topics = Topic::ALL.map(Topic::type_name);
     let services = Service::ALL.map(Service::type_name);
     let questions = Rosapi::ALL.map(|question| Service::Rosapi(question).type_name());
-    let player = Playback::ALL.map(|one| Service::Playback(one).type_name());
     let inside = [
         "std_msgs/msg/Header",
         "builtin_interfaces/msg/Time",
@@ -197,6 +196,8 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         "rcl_interfaces/msg/ParameterDescriptor",
         "rcl_interfaces/msg/ParameterValue",
         "rcl_interfaces/msg/SetParametersResult",
+        "std_msgs/msg/MultiArrayDimension",
+        "std_msgs/msg/MultiArrayLayout",
         "tf2_web_republisher/msg/TFSubscriptionFeedback",
         "tf2_web_republisher/msg/TFSubscriptionGoal",
         "action_msgs/msg/GoalInfo",
@@ -217,7 +218,6 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         .into_iter()
         .chain(services)
         .chain(questions)
-        .chain(player)
         .chain(inside)
         .chain(actions)
         .collect();

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use pendularm::actors::arm::sim::{STEPS_IN_A_ROW, joint_names};
+use pendularm::actors::arm::sim::{Obstacle, STEPS_IN_A_ROW, joint_names};
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
@@ -69,7 +69,21 @@ impl<const N: usize> Mirror<N> {
                 self.simulation
             ));
         }
+        self.note_obstacle();
         self.keep_time();
+    }
+
+    /// Whatever keeps the arm from its setpoint now, clients may be warned of from now on.
+    pub(super) fn note_obstacle(&self) {
+        let obstacle = if self.simulation.divergence().is_some() {
+            Obstacle::Diverged
+        } else if self.simulation.pid().is_enabled() {
+            return;
+        } else {
+            Obstacle::ControllerOff
+        };
+        let mut obstacles = self.court.obstacles.borrow_mut();
+        obstacles.insert(obstacle.to_string());
     }
 
     /// Running, the arm has taken as many steps as fit into the time since the anchor.
@@ -224,7 +238,12 @@ impl<const N: usize> Mirror<N> {
         let taken = alone.advance(steps.min(STEPS_IN_A_ROW));
         self.asked_steps += steps;
         self.is_done = taken == steps;
-        (steps <= STEPS_IN_A_ROW).then(|| json!({"steps": taken, "time": alone.time()}))
+        (steps <= STEPS_IN_A_ROW).then(|| {
+            let (state, effort) = (alone.state(), alone.effort().to_vec());
+            let (position, velocity) = (state.position.to_vec(), state.velocity.to_vec());
+            json!({"steps": taken, "time": alone.time(), "position": position,
+                "velocity": velocity, "effort": effort})
+        })
     }
 }
 

@@ -41,7 +41,7 @@ impl<const N: usize> Tap<N> {
     pub fn new(arm: Addr<ArmSim<N>>, gains: Gains<N>, court: Rc<Court>) -> Self {
         let mut routes = Nodes::default();
         ArmSim::attach(&arm, &mut routes);
-        Self {
+        let tap = Self {
             arm,
             routes,
             mirror: Mirror {
@@ -54,7 +54,10 @@ impl<const N: usize> Tap<N> {
                 jumps: 0,
                 court,
             },
-        }
+        };
+        // It begins with its controller off.
+        tap.mirror.note_obstacle();
+        tap
     }
 
     fn snapshot(&self) -> impl Future<Output = Option<Simulation<N>>> + use<N> {

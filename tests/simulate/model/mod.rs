@@ -19,9 +19,6 @@ use crate::court::Court;
 use crate::honest::{Honest, Phase};
 use crate::json::Json;
 
-/// The reason that a client hears that held the most when all together held too much.
-const HELD_MOST: &str = "memory: this connection held the most";
-
 /// A frame, as far as all of them are alike.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -172,7 +169,12 @@ impl Model {
         let msg: Value = serde_json::from_str(text).unwrap_or_default();
         let msg = msg["msg"].as_str().unwrap_or_default();
         match frame.level.as_deref() {
-            Some("error") if msg.starts_with(HELD_MOST) => honest.was_cut_off = true,
+            // A warning belongs to a call or a goal that has no answer yet.
+            Some("warning")
+                if court.obstacles.borrow().contains(msg)
+                    && frame
+                        .id
+                        .is_some_and(|id| honest.calls.contains_key(id.get())) => {}
             Some("info") => {
                 if !honest.has_news(msg) && !honest.is_excused {
                     return court.wrong(format!(

@@ -1,14 +1,12 @@
-//! Looks at what has come: it is held against the model, and nobody is cut off, waits for too long or holds too much.
+//! Looks at what has come: it is held against the model, and nobody is cut off or waits for too long.
 
 use std::time::Duration;
 
-use pendularm::actors::resources::budget::MODEST;
 use tokio::time::Instant;
 
 use super::Course;
 use crate::court::Verdict;
 use crate::honest::{Computed, Expect};
-use crate::world::SCARCE;
 
 /// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
 const LIGHT_TURNS: u64 = 30_000;
@@ -20,9 +18,6 @@ const COMPUTED_TURNS: u64 = 2_000;
 const SHORT_TURNS: u64 = 80;
 /// A light call's patience in virtual time.
 const LIGHT_TIME: Duration = Duration::from_secs(1);
-
-/// How much more than the limit clients hold at most until whoever gives way is gone.
-const BESIDE: usize = 1 << 21;
 
 impl Course {
     /// Lets virtual time pass, and looks now and then.
@@ -67,19 +62,13 @@ impl Course {
                 "{missed} messages are missing, and {dropped} counted as dropped"
             ));
         }
-        self.check_room();
     }
 
-    /// Nobody is cut off, unless there is little room.
+    /// Nobody is cut off.
     fn check_end(&mut self, at: usize) {
         let one = &self.honest[at];
-        if one.is_excused || one.has_finished || !(one.was_cut_off || one.client.has_ended()) {
+        if one.is_excused || one.has_finished || !one.client.has_ended() {
             return;
-        }
-        if self.plan.scarce && self.cut_off < self.world.gauges.memory().cut_off() {
-            self.cut_off += 1;
-            self.court.count("honest clients that held the most");
-            return self.abandon(at);
         }
         let (who, rest) = (one.who, one.client.rest());
         self.court
@@ -138,20 +127,6 @@ impl Course {
                 );
                 court.fail(Verdict::NoProgress, words);
             }
-        }
-    }
-
-    /// The limit is not exceeded.
-    fn check_room(&self) {
-        if !self.plan.scarce {
-            return;
-        }
-        // Who holds no more than what is modest never gives way.
-        let modest = MODEST * (self.honest.len() + self.hostile.len());
-        let (held, most) = (self.world.held(), SCARCE.max(modest) + BESIDE);
-        if held > most {
-            let words = format!("{held} bytes are held, where {most} may be");
-            self.court.wrong(words);
         }
     }
 }

@@ -67,8 +67,6 @@ struct Course {
     hostile: Vec<Hostile>,
     /// Honest clients so far.
     clients: u64,
-    /// Clients that were cut off because they held the most.
-    cut_off: u64,
 }
 
 impl Course {
@@ -89,7 +87,6 @@ impl Course {
             honest: Vec::new(),
             hostile: Vec::new(),
             clients: 0,
-            cut_off: 0,
         };
         for _ in 0..course.plan.honest {
             let one = course.enter();
@@ -138,9 +135,6 @@ impl Course {
             if self.court.failure().is_some() {
                 return;
             }
-        }
-        for _ in 0..self.world.gauges.memory().cut_off() {
-            self.court.count("clients that held the most");
         }
         self.come_to_rest().await;
         if self.court.failure().is_none() {

@@ -163,10 +163,10 @@ impl Course {
             self.world.glance(Duration::from_millis(100)).await;
         }
         if !self.world.is_empty() {
-            let (held, connections) = (self.world.held(), self.world.gauges.connections());
+            let (taken, connections) = (self.world.taken(), self.world.gauges.connections());
             let idle = self.world.pool.is_idle();
             self.court.wrong(format!(
-                "{EMPTY:?} after all have left {connections} are connected, {held} bytes are held, and the pool is idle: {idle}"
+                "{EMPTY:?} after all have left {connections} are connected, {taken} permits are taken, and the pool is idle: {idle}"
             ));
         }
     }

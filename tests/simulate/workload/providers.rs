@@ -98,7 +98,10 @@ impl Workload<'_> {
                 1 => Duration::from_millis(self.court.below(3000) as u64),
                 _ => Duration::ZERO,
             };
-            let (result, values) = (self.court.chance(0.9), self.payload(0));
+            let (result, values) = (
+                self.court.chance(0.9),
+                format!("{{\"v\":{}}}", self.payload(1)),
+            );
             let (id, service) = (one.id, one.service);
             let frame = format!(
                 "{{\"op\":\"service_response\",\"id\":{id},\"service\":\"{service}\",\"values\":{values},\"result\":{result}}}"

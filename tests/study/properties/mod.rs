@@ -3,6 +3,7 @@
 //! A case is made from its number alone, which a failure names: `FROM=number COUNT=1` makes it again.
 //! `make check-study` runs as many as `COUNT` says, in an optimised build; the tests here run hundreds.
 
+mod advice;
 mod gains;
 mod limits;
 mod motions;
@@ -99,6 +100,8 @@ impl Dice {
 struct Tally {
     tried: u64,
     open: u64,
+    /// Cases in which it did not hold.
+    outside: u64,
 }
 
 /// Runs cases, and prints how many said something.

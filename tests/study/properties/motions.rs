@@ -58,15 +58,16 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
     }
 }
 
-/// An error that a rollout answers is that to a motion of twice the digits, give or take its uncertainty; where none is
-/// answered the two are of one size.
-fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tally) {
+/// The true error is within the uncertainty of the one that a rollout answers, of regular motions and of chaotic ones.
+fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Tally) {
     let mut dice = Dice::of(case);
     let arm = dice.arm::<N>();
-    let (start, duration) = start(&mut dice, &arm);
+    let (start, mut duration) = start(&mut dice, &arm);
+    let wild = if dice.one_in(2) { 10.0 } else { 1.0 };
+    duration *= wild;
     let control =
         ControlLoop::free(arm).with_method(Method::ALL[dice.0.usize(0..Method::ALL.len())]);
-    let timestep = duration / f64::from(dice.0.u32(100..4000));
+    let timestep = duration / (wild * f64::from(dice.0.u32(100..4000)));
     let request = RolloutRequest {
         control: control.with_timestep(timestep),
         start,
@@ -76,11 +77,10 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
     };
     let mut rollout = Rollout::new(request).unwrap();
     while rollout.advance(u64::MAX) > 0 {}
-    let deviation = rollout.deviation().unwrap();
-    if rollout.divergence().is_some() || deviation.errors.len() < 5 {
+    let (Some(error), Some(uncertainty)) = rollout.known(rollout.deviation()) else {
         tally.open += 1;
         return;
-    }
+    };
     let mut before = 0.0;
     let times = &rollout.times()[1..];
     let intervals: Vec<f64> = times
@@ -93,20 +93,10 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
         truth.angle_error(index, position).unwrap()
     });
     let off = off.fold(0.0, f64::max);
-    let told = format!("case {case}: {off:e} {request:?} {deviation:?}");
-    match deviation.known() {
-        // The reference is off by no more than some times what two of them differ by.
-        Some(error) => {
-            assert!((error - off).abs() <= 0.5 * off + 1e-15, "{told}");
-            tally.tried += 1;
-        }
-        None => {
-            assert!(
-                off <= 50.0 * deviation.largest_uncertainty() + 1e-14,
-                "{told}"
-            );
-            tally.open += 1;
-        }
+    tally.tried += 1;
+    if (error - off).abs() > uncertainty {
+        println!("case {case}: {error:e} ± {uncertainty:e}: {off:e} {request:?}");
+        tally.outside += 1;
     }
 }
 
@@ -116,6 +106,8 @@ fn plans_for_random_arms_keep_their_error() {
 }
 
 #[test]
-fn errors_of_random_rollouts_are_the_true_ones() {
-    tells(property!(an_answered_error_is_the_true_one, 60, 20_000));
+fn uncertainties_of_random_rollouts_hold_the_true_error() {
+    let tally = property!(an_uncertainty_holds_the_true_error, 100, 1_000_000);
+    assert!(tally.outside <= tally.tried / 100, "{tally:?}");
+    tells(tally);
 }

@@ -171,3 +171,33 @@ fn a_type_that_is_advertised_later_is_the_topics() {
         Cbor::Bytes(_)
     ));
 }
+
+/// A trajectory whose times are spelled as in ROS 1, as `cbor`, as `cbor-raw` and as it was sent.
+#[test]
+fn the_times_of_a_trajectory_from_a_client_of_ros_1_arrive_in_every_form() {
+    let (runtime, _) = paused();
+    let sent = json!({"joint_names": ["joint1", "joint2"], "header": {"stamp": {"secs": 0, "nsecs": 0}},
+        "points": [{"positions": [0.1, 0.2], "time_from_start": {"secs": 2, "nsecs": 5}}]});
+    let forms = ["cbor", "cbor-raw", "none"].map(|compression| {
+        let mut socket = Socket::open(runtime.address);
+        subscribe(&mut socket, "/joint_trajectory", compression);
+        socket.settle();
+        socket
+    });
+    let mut talker = runtime.connect();
+    talker.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": sent}));
+    let [mut cbor, mut raw, mut plain] = forms;
+    let frame = binary(&mut cbor);
+    let Cbor::Array(points) = frame.get("msg").get("points") else {
+        panic!("{frame:?}");
+    };
+    let time = points[0].get("time_from_start");
+    assert_eq!(time.get("sec"), &Cbor::Integer(2));
+    assert_eq!(time.get("nanosec"), &Cbor::Integer(5));
+    let frame = binary(&mut raw);
+    let Cbor::Bytes(bytes) = frame.get("msg").get("bytes") else {
+        panic!("{frame:?}");
+    };
+    assert!(bytes.ends_with(&[2, 0, 0, 0, 5, 0, 0, 0]), "{bytes:?}");
+    assert_eq!(plain.receive()["msg"], sent);
+}

@@ -6,8 +6,10 @@ mod diagnostics;
 mod ending;
 mod hostile;
 mod lists;
+mod naive;
 mod parameters;
 mod topics;
+mod yaml;
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Output, Stdio};
@@ -93,6 +95,11 @@ impl Going {
 
     fn interrupt(&self) {
         signal(self.0.id(), "INT");
+    }
+
+    /// Ends it. SIGINT is ignored if whoever started the tests ignores it.
+    fn terminate(&self) {
+        signal(self.0.id(), "TERM");
     }
 
     /// Exit status, the rest of standard output, and standard error.

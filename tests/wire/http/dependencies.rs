@@ -28,6 +28,7 @@ fn without_the_feature_no_crate_of_the_web_door_is_built_in() {
         tree(&["--no-default-features", "--features", "runtime"]),
     );
     for name in [
+        "hyper",
         "tokio-tungstenite",
         "tungstenite",
         "httparse",

@@ -4,12 +4,27 @@ use crate::common::Runtime;
 use crate::web_client::{Answer, exchange, request};
 
 #[test]
-fn loopbacks_names_with_our_port_are_our_hosts() {
+fn loopbacks_names_are_our_hosts_at_every_port() {
     let runtime = Runtime::start();
     let port = runtime.address.port();
-    for host in ["localhost", "LOCALHOST", "127.0.0.1", "[::1]", "127.0.0.2"] {
-        let answer = request(runtime.address, "/", &format!("Host: {host}:{port}\r\n"));
-        assert_eq!(answer.status, 200, "{host}");
+    for host in [
+        "localhost",
+        "LOCALHOST",
+        "127.0.0.1",
+        "[::1]",
+        "[0:0::1]",
+        "127.0.0.2",
+    ] {
+        // A tunnel or a proxy has a port of its own, and a browser leaves out that of its scheme.
+        for port in [
+            format!(":{port}"),
+            String::new(),
+            ":80".to_owned(),
+            ":8443".to_owned(),
+        ] {
+            let answer = request(runtime.address, "/", &format!("Host: {host}{port}\r\n"));
+            assert_eq!(answer.status, 200, "{host}{port}");
+        }
     }
 }
 
@@ -21,8 +36,9 @@ fn any_other_host_is_a_403_that_names_the_option() {
         format!("evil.example:{port}"),
         format!("localhost.evil.example:{port}"),
         format!("127.0.0.1.evil.example:{port}"),
-        "localhost".to_owned(),
-        "localhost:1".to_owned(),
+        "evil.example".to_owned(),
+        "evil.example:80".to_owned(),
+        "localhost:65536".to_owned(),
         format!("user@localhost:{port}"),
         format!("localhost:{port}:{port}"),
         format!("0.0.0.0:{port}"),
@@ -127,14 +143,30 @@ fn a_request_without_a_host_or_with_two_is_a_400() {
 
 #[test]
 fn an_allowed_host_is_ours_too() {
-    let runtime = Runtime::with(&["--allow-host", "arm.example,proxy.example:443"]);
+    let allowed = "robot.local,Arm.Example.,proxy.example:443,odd.example:8443,[fd00::5]";
+    let runtime = Runtime::with(&["--allow-host", allowed]);
     let port = runtime.address.port();
     for (host, status) in [
         (format!("arm.example:{port}"), 200),
         (format!("Arm.Example:{port}"), 200),
-        ("arm.example:1".to_owned(), 403),
+        ("arm.example.".to_owned(), 200),
+        ("arm.example..".to_owned(), 403),
+        ("robot.local".to_owned(), 200),
+        ("robot.local.".to_owned(), 200),
+        ("ROBOT.local:443".to_owned(), 200),
+        ("robot.local:80".to_owned(), 200),
+        ("robot.local:8443".to_owned(), 200),
+        ("xrobot.local".to_owned(), 403),
+        ("robot.local.evil.example".to_owned(), 403),
         ("proxy.example:443".to_owned(), 200),
+        ("proxy.example".to_owned(), 200),
         (format!("proxy.example:{port}"), 403),
+        ("odd.example:8443".to_owned(), 200),
+        ("odd.example".to_owned(), 403),
+        ("[fd00::5]".to_owned(), 200),
+        ("[FD00:0::5]:80".to_owned(), 200),
+        ("[fd00::6]".to_owned(), 403),
+        ("localhost".to_owned(), 200),
         (format!("sub.arm.example:{port}"), 403),
     ] {
         let answer = request(runtime.address, "/", &format!("Host: {host}\r\n"));

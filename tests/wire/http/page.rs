@@ -1,11 +1,13 @@
-//! The page and its files: their types, their packing, their policy, how long they may be kept, and where they are.
+//! The page and its files: their types, their policy, one connection for all of them, and where they are.
 
-use std::io::{BufRead, BufReader, Read};
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::common::Runtime;
-use crate::web_client::{get, request};
+use crate::common::{PATIENCE, Runtime};
+use crate::web_client::{Answer, get, rest};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -24,66 +26,46 @@ fn the_page_and_its_files_are_served_with_their_types() {
     );
     let with_query = get(runtime.address, "/?dt=0.001&method=rk4");
     assert_eq!(with_query.body, page.body);
-    for asset in ASSETS {
-        let kind = match Path::new(asset.file).extension().unwrap().to_str() {
-            Some("html") => "text/html",
+    for (name, bytes) in ASSETS.iter().filter(|(name, _)| *name != "index.html") {
+        let kind = match Path::new(name).extension().unwrap().to_str() {
             Some("css") => "text/css",
             Some("js") => "text/javascript",
             Some("svg") => "image/svg+xml",
             other => panic!("{other:?} is a kind that this test does not know"),
         };
-        let file = get(runtime.address, asset.path);
-        assert_eq!(file.status, 200, "{}", asset.path);
+        let file = get(runtime.address, &format!("/{name}"));
+        assert_eq!(file.status, 200, "{name}");
         assert!(file.header("content-type").unwrap().starts_with(kind));
-        if asset.path != "/" {
-            assert_eq!(file.body, asset.bytes, "{}", asset.path);
+        assert_eq!(file.header("cache-control"), Some("no-store"), "{name}");
+        assert_eq!(file.body, *bytes, "{name}");
+    }
+    assert_eq!(get(runtime.address, "/index.html").status, 404);
+}
+
+/// As a browser does.
+#[test]
+fn all_files_of_the_page_come_over_one_connection() {
+    let runtime = Runtime::start();
+    let mut stream = TcpStream::connect(runtime.address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut came = Vec::new();
+    for (name, bytes) in ASSETS {
+        let path = name.trim_end_matches("index.html");
+        let request = format!("GET /{path} HTTP/1.1\r\nHost: {}\r\n\r\n", runtime.address);
+        stream.write_all(request.as_bytes()).unwrap();
+        came.clear();
+        while !came.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            came.push(byte[0]);
         }
+        let mut body = vec![0; bytes.len()];
+        stream.read_exact(&mut body).unwrap();
+        came.extend(body);
+        assert_eq!(Answer::parse(&came).body, *bytes, "{name}");
     }
-}
-
-#[test]
-fn a_file_goes_out_packed_to_a_browser_and_is_the_same() {
-    let runtime = Runtime::start();
-    let (mut plain, mut packed) = (0, 0);
-    for asset in ASSETS.iter().filter(|asset| asset.path != "/") {
-        let headers = format!(
-            "Host: {}\r\nAccept-Encoding: gzip, deflate\r\n",
-            runtime.address
-        );
-        let answer = request(runtime.address, asset.path, &headers);
-        assert_eq!(answer.header("content-encoding"), Some("deflate"));
-        let unpacked = miniz_oxide::inflate::decompress_to_vec_zlib(&answer.body).unwrap();
-        assert_eq!(unpacked, asset.bytes, "{}", asset.path);
-        plain += asset.bytes.len();
-        packed += answer.body.len();
-    }
-    assert!(3 * packed < plain + packed, "{packed} of {plain} bytes");
-}
-
-#[test]
-fn a_name_that_stands_for_its_content_may_be_kept_and_no_other() {
-    let runtime = Runtime::start();
-    let page = get(runtime.address, "/");
-    assert_eq!(page.header("cache-control"), Some("no-store"));
-    let html = page.text();
-    let named: Vec<&str> = html
-        .split('"')
-        .filter(|one| one.starts_with("/v/"))
-        .collect();
-    for path in &named {
-        let kept = get(runtime.address, path);
-        assert_eq!(kept.status, 200, "{path}");
-        let cache = kept.header("cache-control").unwrap();
-        assert!(cache.contains("immutable"), "{path}: {cache}");
-    }
-    let script = named.iter().find(|one| one.ends_with("/page.js")).unwrap();
-    assert_eq!(get(runtime.address, "/page.js").status, 404);
-    let kept = get(runtime.address, &script.replace("page.js", "main.js"));
-    let plain = get(runtime.address, "/main.js");
-    assert_eq!(plain.header("cache-control"), Some("no-store"));
-    assert_eq!(plain.body, kept.body);
-    let other = get(runtime.address, "/v/0123456789abcdef/main.js");
-    assert_eq!(other.status, 404);
+    stream.shutdown(Shutdown::Write).unwrap();
+    assert!(rest(&mut stream).is_empty());
 }
 
 #[test]
@@ -112,7 +94,6 @@ fn the_page_may_run_its_own_files_speak_to_its_own_port_and_nothing_else() {
     );
     assert_eq!(page.header("x-content-type-options"), Some("nosniff"));
     assert_eq!(page.header("referrer-policy"), Some("no-referrer"));
-    assert_eq!(page.header("connection"), Some("close"));
     let elsewhere = ["http://", "https://", "//"];
     for quote in ["src=\"", "href=\""] {
         for start in elsewhere {
@@ -169,4 +150,16 @@ fn the_log_names_the_pages_address_at_the_start() {
         found && more.is_empty(),
         "{page} in the log, nothing else on stdout"
     );
+}
+
+#[test]
+fn every_file_of_the_folder_is_served() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
+    let files: BTreeSet<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let served: BTreeSet<String> = ASSETS.iter().map(|(name, _)| (*name).into()).collect();
+    assert_eq!(files, served);
+    assert_eq!(files.len(), ASSETS.len());
 }

@@ -13,13 +13,16 @@ fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
     fs::write(folder.join("index.html"), "<h1>report</h1>").unwrap();
     fs::create_dir(folder.join("data")).unwrap();
     fs::write(folder.join("data/error.csv"), "h,e\n").unwrap();
+    fs::write(folder.join("data/index.html"), "<h1>data</h1>").unwrap();
     fs::write(folder.join("figure.svg"), "<svg/>").unwrap();
     let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
     for (path, kind, body) in [
         ("/report/", "text/html", "<h1>report</h1>"),
         ("/report/index.html", "text/html", "<h1>report</h1>"),
         ("/report/data/error.csv?x=1", "text/csv", "h,e\n"),
+        ("/report/data/", "text/html", "<h1>data</h1>"),
         ("/report/figure.svg", "image/svg+xml", "<svg/>"),
+        ("/report/%66igure.svg", "image/svg+xml", "<svg/>"),
     ] {
         let file = get(runtime.address, path);
         assert_eq!((file.status, file.text()), (200, body), "{path}");
@@ -54,6 +57,12 @@ fn no_path_leads_out_of_the_reports_folder() {
     fs::write(outside.join("secret.txt"), "secret").unwrap();
     fs::write(inside.join(".hidden.txt"), "secret").unwrap();
     fs::write(inside.join("program.exe"), "secret").unwrap();
+    for name in ["program.SVG", "a program.svg", "program.js", "program"] {
+        fs::write(inside.join(name), "secret").unwrap();
+    }
+    let deep = inside.join("1/2/3/4/5/6/7/8");
+    fs::create_dir_all(&deep).unwrap();
+    fs::write(deep.join("9.svg"), "secret").unwrap();
     fs::create_dir(inside.join("folder.txt")).unwrap();
     #[cfg(unix)]
     {
@@ -72,6 +81,11 @@ fn no_path_leads_out_of_the_reports_folder() {
         "up/secret.txt",
         ".hidden.txt",
         "program.exe",
+        "program.SVG",
+        "a%20program.svg",
+        "program.js",
+        "program",
+        "1/2/3/4/5/6/7/8/9.svg",
         "folder.txt",
         "missing.txt",
         "%00.txt",

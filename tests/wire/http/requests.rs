@@ -5,34 +5,61 @@ use std::net::{Shutdown, TcpStream};
 
 use crate::common::{PATIENCE, Runtime, SET_GRAVITY};
 use crate::web_client::{Answer, exchange, get, request, rest};
-use pendularm::web::head::MAX_HEAD;
+use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
 
-/// Bytes behind a request are no request, however its length is told: the first answer is the last.
+/// A request behind another is one of its own only where nobody can read it as the body of the first.
 #[test]
 fn no_second_request_is_smuggled_behind_the_first() {
     let runtime = Runtime::start();
     let address = runtime.address;
     let second = format!("GET /nothing HTTP/1.1\r\nHost: {address}\r\n\r\n");
-    for lengths in [
-        "",
-        "Connection: keep-alive\r\n",
-        "Content-Length: 0\r\n",
-        "Content-Length: 5\r\nContent-Length: 0\r\n",
-        "Transfer-Encoding: chunked\r\n",
-        "Transfer-Encoding: chunked\r\nContent-Length: 4\r\n",
-        "Transfer-Encoding: xchunked\r\nContent-Length: -1\r\n",
+    for (lengths, statuses) in [
+        ("", &[200, 404][..]),
+        ("Connection: keep-alive\r\n", &[200, 404]),
+        ("Content-Length: 0\r\n", &[200, 404]),
+        ("Connection: close\r\n", &[200]),
+        ("Content-Length: 5\r\nContent-Length: 0\r\n", &[400]),
+        ("Content-Length: 5\r\n", &[400]),
+        ("Transfer-Encoding: chunked\r\n", &[400]),
+        (
+            "Transfer-Encoding: chunked\r\nContent-Length: 4\r\n",
+            &[400],
+        ),
+        (
+            "Transfer-Encoding: xchunked\r\nContent-Length: -1\r\n",
+            &[400],
+        ),
     ] {
-        for body in ["", "0\r\n\r\n"] {
+        let bodies = if statuses == [400] {
+            &["", "0\r\n\r\n"][..]
+        } else {
+            &[""]
+        };
+        for body in bodies {
             let request =
                 format!("GET / HTTP/1.1\r\nHost: {address}\r\n{lengths}\r\n{body}{second}");
-            let bytes = exchange(address, request.as_bytes());
-            let answers = String::from_utf8_lossy(&bytes).matches("HTTP/1.1 ").count();
-            assert_eq!(
-                (answers, Answer::parse(&bytes).status),
-                (1, 200),
-                "{lengths}"
-            );
+            let answers = Answer::parse_all(&exchange(address, request.as_bytes()));
+            let came: Vec<u16> = answers.iter().map(|one| one.status).collect();
+            assert_eq!(came, statuses, "{lengths}");
         }
+    }
+}
+
+/// The opening is a GET, so another method can come behind it only.
+#[test]
+fn another_method_behind_a_request_is_a_405_and_the_last() {
+    let runtime = Runtime::start();
+    let address = runtime.address;
+    let host = format!("Host: {address}\r\n");
+    for method in ["POST", "PUT", "OPTIONS", "X"] {
+        let request = format!(
+            "GET / HTTP/1.1\r\n{host}\r\n{method} / HTTP/1.1\r\n{host}\r\nGET / HTTP/1.1\r\n{host}\r\n"
+        );
+        let answers = Answer::parse_all(&exchange(address, request.as_bytes()));
+        let came: Vec<u16> = answers.iter().map(|one| one.status).collect();
+        assert_eq!(came, [200, 405], "{method}");
+        assert_eq!(answers[1].header("allow"), Some("GET, HEAD"));
+        assert_eq!(answers[1].header("connection"), Some("close"));
     }
 }
 
@@ -74,6 +101,11 @@ fn a_huge_head_is_refused_and_what_follows_is_swallowed() {
         let answer = Answer::parse(&exchange(runtime.address, head.as_bytes()));
         assert_eq!(answer.status, status);
     }
+    for (others, status) in [(MAX_HEADERS - 1, 200), (MAX_HEADERS, 431)] {
+        let head = format!("{start}{}\r\n", "X: y\r\n".repeat(others));
+        let answer = Answer::parse(&exchange(runtime.address, head.as_bytes()));
+        assert_eq!(answer.status, status, "{others}");
+    }
 }
 
 #[test]
@@ -85,6 +117,7 @@ fn a_request_that_comes_byte_by_byte_is_answered() {
     for byte in format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", runtime.address).as_bytes() {
         stream.write_all(&[*byte]).unwrap();
     }
+    stream.shutdown(Shutdown::Write).unwrap();
     assert_eq!(Answer::parse(&rest(&mut stream)).status, 200);
 }
 
@@ -110,11 +143,10 @@ fn json_behind_a_request_is_not_executed_however_it_is_hidden() {
     ] {
         // Two line ends: a head that has not ended does so here.
         let bytes = format!("{head}{SET_GRAVITY}\r\n\r\n{SET_GRAVITY}");
-        let answer = exchange(runtime.address, bytes.as_bytes());
-        let answers = String::from_utf8_lossy(&answer)
-            .matches("HTTP/1.1 ")
-            .count();
-        assert_eq!(answers, 1, "one request, one answer: {head:?}");
+        let answers = Answer::parse_all(&exchange(runtime.address, bytes.as_bytes()));
+        let (first, others) = answers.split_first().unwrap();
+        assert!(others.iter().all(|one| one.status == 400), "{head:?}");
+        assert!([200, 400].contains(&first.status), "{head:?}");
     }
     runtime.assert_nothing_was_executed();
 }
@@ -122,7 +154,7 @@ fn json_behind_a_request_is_not_executed_however_it_is_hidden() {
 #[test]
 fn a_posted_command_is_not_executed_and_told_so_in_one_line() {
     let runtime = Runtime::start();
-    for method in ["POST", "PUT", "HEAD", "OPTIONS", "DELETE", "PATCH"] {
+    for method in ["POST", "PUT", "OPTIONS", "DELETE", "PATCH"] {
         let request = format!(
             "{method} / HTTP/1.1\r\nHost: {}\r\nContent-Type: text/plain\r\nContent-Length: {}\r\n\r\n{SET_GRAVITY}",
             runtime.address,
@@ -174,4 +206,24 @@ fn a_client_that_leaves_within_its_head_costs_nothing() {
         assert!(rest(&mut stream).is_empty());
     }
     assert_eq!(get(runtime.address, "/").status, 200);
+}
+
+/// Health checks ask so.
+#[test]
+fn head_has_the_head_of_the_answer_to_get_and_no_body() {
+    let runtime = Runtime::start();
+    let address = runtime.address;
+    for path in ["/", "/main.js", "/report/", "/nothing", "/report"] {
+        let ask = |method: &str| {
+            let request = format!("{method} {path} HTTP/1.1\r\nHost: {address}\r\n\r\n");
+            String::from_utf8_lossy(&exchange(address, request.as_bytes())).into_owned()
+        };
+        let (got, head) = (ask("GET"), ask("HEAD"));
+        assert!(head.ends_with("\r\n\r\n"), "{path}: {head}");
+        assert_eq!(
+            Some(head.trim_end()),
+            got.split("\r\n\r\n").next(),
+            "{path}"
+        );
+    }
 }

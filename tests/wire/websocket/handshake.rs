@@ -123,7 +123,7 @@ fn a_handshake_that_is_not_as_it_has_to_be_is_refused() {
             "Connection: Upgrade",
             "Connection: close",
             400,
-            "Connection: Upgrade",
+            "Connection: upgrade",
         ),
         (
             "Upgrade: websocket",

@@ -293,8 +293,6 @@ fn note(world: &World, statuses: &Value) {
     diagnosis.messages += 1;
     diagnosis.connections = number("gateway", "connections").unwrap_or_default() as u64;
     diagnosis.dropped = number("gateway", "messages_dropped").unwrap_or_default() as u64;
-    diagnosis.held = number("gateway", "bytes_held").unwrap_or_default();
-    diagnosis.cut_off = number("gateway", "clients_cut_off").unwrap_or_default() as u64;
     let step = number("arm_sim", "max_step_time").unwrap_or_default();
     diagnosis.longest_step = diagnosis.longest_step.max(step);
     let state = value("arm_sim", "state").unwrap_or_default();

@@ -9,8 +9,8 @@ use crate::wire::Client;
 
 /// Appends one call, picked at random, whose answer shows that it was this call that was answered.
 pub fn push_question(client: &mut Client, rng: &mut fastrand::Rng) {
-    // Refusals spell numbers from ten millions on with an exponent.
-    let n = 1000 + client.world.number() % 9_000_000;
+    // Refusals of targets spell numbers from a hundred thousand on with an exponent.
+    let n = 1000 + client.world.number() % 99_000;
     let (service, args, check): (String, Value, Check) = match rng.u8(..10) {
         0 => (
             "/arm_sim/set_params".into(),

@@ -30,10 +30,6 @@ pub fn print(outcome: &Outcome) -> bool {
         "  {:>10}  topic messages dropped by full outboxes",
         diagnosis.dropped
     );
-    println!(
-        "  {:>10}  clients disconnected because they held the most",
-        diagnosis.cut_off
-    );
     println!("  {:>10}  lines of log", outcome.log.count);
     println!("\ncheck");
     let mut held = memory(outcome);

@@ -30,8 +30,6 @@ pub struct Fault {
     pub sent: Vec<String>,
     /// The last that came, shortened, oldest first.
     pub came: Vec<String>,
-    /// The client had to give way, as the program says of those who hold the most: its life ends, and nothing is wrong.
-    pub gave_way: bool,
 }
 
 impl Fault {
@@ -42,7 +40,6 @@ impl Fault {
             what: what.into(),
             sent: Vec::new(),
             came: Vec::new(),
-            gave_way: false,
         }
     }
 }
@@ -74,10 +71,6 @@ pub struct Diagnosis {
     pub connections: u64,
     /// Topic messages dropped since the start.
     pub dropped: u64,
-    /// Bytes that clients make the program hold, as it counts them.
-    pub held: f64,
-    /// Clients disconnected since the start because they held the most.
-    pub cut_off: u64,
     /// The lowest real-time factor of a message in which the arm was running.
     pub lowest_factor: Option<f64>,
     /// The longest time per step of a batch \[s\].
@@ -133,10 +126,6 @@ impl World {
 
     /// Keeps a fault, and says it at once: a soak may be long.
     pub fn report(&self, fault: Fault) {
-        if fault.gave_way {
-            self.count("clients that held the most and gave way", 1);
-            return;
-        }
         let mut faults = self.faults.borrow_mut();
         if faults.len() >= MAX_FAULTS {
             self.further_faults.set(self.further_faults.get() + 1);

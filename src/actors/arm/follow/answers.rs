@@ -13,6 +13,7 @@ use crate::protocol::messages::{Header, Stamp};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ResultCode {
     Successful = 0,
+    InvalidGoal = -1,
     PathToleranceViolated = -4,
     GoalToleranceViolated = -5,
 }

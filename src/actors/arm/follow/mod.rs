@@ -2,7 +2,7 @@
 //!
 //! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and sees how the arm
 //! follows; the rules are `math::trajectory`'s. A goal ends where its setpoint is not the arm's any more: another
-//! trajectory, another goal or a reset has taken its place.
+//! trajectory, another goal or a reset has taken its place. It ends, too, where the arm cannot follow ([`Obstacle`]).
 //!
 //! **Invariant:** at most one goal is active, and each that was accepted has exactly one result.
 
@@ -14,11 +14,13 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use self::answers::{ResultCode, feedback, result};
+#[cfg(doc)]
+use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller, NOT_ACTIVE};
 use crate::math::arm::State;
-use crate::math::goal::Cadence;
+use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
 use crate::protocol::op::GoalStatus;
@@ -97,7 +99,7 @@ pub struct FollowPath<const N: usize> {
     pub on_the_way: Tolerance<N>,
     /// How far off they may be at the end.
     pub at_the_end: Tolerance<N>,
-    /// How long after the end they may take for that \[s\].
+    /// How long after the end they may take for that \[s\]; infinite for no limit.
     pub patience: f64,
     /// The client that sent it.
     pub client: ActionClient,
@@ -198,13 +200,16 @@ impl<const N: usize> PathFollower<N> {
             position: motion.state.position,
             velocity: Some(motion.state.velocity),
         };
+        if let Some(obstacle) = motion.obstacle {
+            return goal.client.refuse(&obstacle.to_string());
+        }
         let path = match JointPath::new(start, goal.points) {
             Ok(path) => path,
             Err(why) => return goal.client.refuse(&format!("trajectory.{why}")),
         };
         if let Some(before) = self.active.take() {
             let why = "another goal has taken its place";
-            before.end(GoalStatus::Aborted, ResultCode::Successful, why);
+            before.end(GoalStatus::Aborted, ResultCode::InvalidGoal, why);
         }
         self.active = Some(ActivePath {
             course: Course {
@@ -212,6 +217,7 @@ impl<const N: usize> PathFollower<N> {
                 on_the_way: goal.on_the_way,
                 at_the_end: goal.at_the_end,
                 patience: goal.patience,
+                dwell: Dwell::default(),
             },
             client: goal.client,
             began: motion.time,
@@ -243,6 +249,9 @@ impl<const N: usize> PathFollower<N> {
         };
         if goal.is_before_reset(motion) {
             return self.abort(RESET);
+        }
+        if let Some(obstacle) = motion.obstacle {
+            return self.abort(&obstacle.to_string());
         }
         let time = motion.time - goal.began;
         let desired = goal.course.path.at(time);
@@ -314,7 +323,7 @@ impl<const N: usize> PathFollower<N> {
     /// Ends the goal, whose setpoint is gone or will not be moved any more.
     fn abort(&mut self, why: &str) {
         if let Some(goal) = self.active.take() {
-            goal.end(GoalStatus::Aborted, ResultCode::Successful, why);
+            goal.end(GoalStatus::Aborted, ResultCode::InvalidGoal, why);
         }
     }
 

@@ -15,6 +15,10 @@ use crate::protocol::op::follow::{FollowGoal, JointTolerance};
 
 /// How far off each joint may be at the end where the goal does not say \[rad\].
 const GOAL_TOLERANCE: f64 = 0.05;
+/// How fast each joint may still be there where the goal does not say \[rad/s\]: the default of `ros2_control`.
+const STOPPED_VELOCITY: f64 = 0.01;
+/// Both.
+const AT_THE_END: [Option<f64>; 2] = [Some(GOAL_TOLERANCE), Some(STOPPED_VELOCITY)];
 /// How long after the end it may take for that where the goal does not say \[s\].
 const GOAL_TIME: f64 = 5.0;
 
@@ -51,7 +55,7 @@ fn requests<const N: usize>(
 }
 
 /// The goal for an arm of `N` links; the reader has checked how many values there are.
-fn path<const N: usize>(goal: &FollowGoal, mut client: ActionClient, done: Done) -> FollowPath<N> {
+fn path<const N: usize>(goal: &FollowGoal, client: ActionClient, done: Done) -> FollowPath<N> {
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let points = goal.points.iter().map(|point| Waypoint {
         time: point.time,
@@ -59,14 +63,13 @@ fn path<const N: usize>(goal: &FollowGoal, mut client: ActionClient, done: Done)
         velocity: point.velocity.as_deref().map(array),
     });
     let points: Vec<Waypoint<N>> = points.collect();
-    let bytes = client.share.bytes() + size_of_val(points.as_slice());
-    client.share.resize(bytes);
     FollowPath {
         points,
-        on_the_way: tolerance(None, &goal.path_tolerance),
-        at_the_end: tolerance(Some(GOAL_TOLERANCE), &goal.goal_tolerance),
+        on_the_way: tolerance([None; 2], &goal.path_tolerance),
+        at_the_end: tolerance(AT_THE_END, &goal.goal_tolerance),
         patience: match goal.goal_time_tolerance {
             0.0 => GOAL_TIME,
+            none if none < 0.0 => f64::INFINITY,
             patience => patience,
         },
         client,
@@ -74,19 +77,25 @@ fn path<const N: usize>(goal: &FollowGoal, mut client: ActionClient, done: Done)
     }
 }
 
-/// `default` for positions where nothing is said, or 0.
-fn tolerance<const N: usize>(default: Option<f64>, given: &[JointTolerance]) -> Tolerance<N> {
-    let mut tolerance = Tolerance::of_positions(default);
+/// The defaults of position and velocity where nothing is said, or 0.
+fn tolerance<const N: usize>(
+    [position, velocity]: [Option<f64>; 2],
+    given: &[JointTolerance],
+) -> Tolerance<N> {
+    let mut tolerance = Tolerance {
+        position: [position; N],
+        velocity: [velocity; N],
+    };
     let of = |value: f64, default: Option<f64>| match value {
         0.0 => default,
         value => Some(value).filter(|value| *value > 0.0),
     };
     for one in given {
-        if let Some(position) = tolerance.position.get_mut(one.joint) {
-            *position = of(one.position, default);
+        if let Some(limit) = tolerance.position.get_mut(one.joint) {
+            *limit = of(one.position, position);
         }
-        if let Some(velocity) = tolerance.velocity.get_mut(one.joint) {
-            *velocity = of(one.velocity, None);
+        if let Some(limit) = tolerance.velocity.get_mut(one.joint) {
+            *limit = of(one.velocity, velocity);
         }
     }
     tolerance

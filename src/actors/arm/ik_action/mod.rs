@@ -205,6 +205,9 @@ impl<const N: usize> IkAction<N> {
         };
         Box::pin(begun.into_actor(self).map(move |tracking, node, _| {
             let is_accepted = tracking.is_ok();
+            if let Ok(Some(obstacle)) = tracking.as_ref().map(|tracking| tracking.obstacle) {
+                reply.warn(&obstacle.to_string());
+            }
             reply.answer(tracking.map(|tracking| node.accept(number, goal, tracking)));
             if is_accepted {
                 node.set_in_motion();

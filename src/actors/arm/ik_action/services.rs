@@ -48,7 +48,7 @@ pub(super) fn requests<const N: usize>(
     })
 }
 
-/// A client that has sent a goal by the action: it hears of a refusal only, since feedback shows that it was accepted.
+/// A client that has sent a goal by the action: feedback shows that it was accepted.
 struct GoalSender(Arc<ActionClient>);
 
 impl Asker<Result<String, GoalRejected>> for GoalSender {
@@ -62,6 +62,10 @@ impl Asker<Result<String, GoalRejected>> for GoalSender {
             Ok(Err(why)) => self.0.refuse(&why.to_string()),
             Err(why) => self.0.refuse(&why.to_string()),
         }
+    }
+
+    fn warn(&self, why: &str) {
+        self.0.warn(why);
     }
 }
 

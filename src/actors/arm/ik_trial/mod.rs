@@ -163,10 +163,17 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
                 let decided = self.trial.start(self.clock.1, changes, target);
                 if decided.is_ok() {
                     self.cancel_deadline(ctx);
+                    warn(&reply, &pose);
                 }
                 (decided, Some(Pending::Start(reply)))
             }
-            Intent::Skip(reply) => (self.trial.skip(target), Some(Pending::Other(reply))),
+            Intent::Skip(reply) => {
+                let decided = self.trial.skip(target);
+                if decided.is_ok() {
+                    warn(&reply, &pose);
+                }
+                (decided, Some(Pending::Other(reply)))
+            }
             Intent::Stop(reply) => (self.trial.stop(), Some(Pending::Other(reply))),
             Intent::CheckDeadline => (Ok(Vec::new()), None),
             Intent::ShowStatus => {
@@ -230,6 +237,13 @@ impl Intent {
             Self::Skip(mut reply) | Self::Stop(mut reply) => reply.refuse(why),
             Self::CheckDeadline | Self::ShowStatus => {}
         }
+    }
+}
+
+/// Tells the caller why the trial's goals do not move the arm, if they do not.
+fn warn<T, const N: usize>(reply: &Reply<T>, pose: &Pose<N>) {
+    if let Some(obstacle) = pose.obstacle {
+        reply.warn(&obstacle.to_string());
     }
 }
 

@@ -10,6 +10,7 @@ use std::ops::ControlFlow;
 
 use actix::prelude::*;
 
+use super::messages::Obstacle;
 use super::messages::{
     AddBarrier, ArmPose, Barrier, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking,
 };
@@ -48,6 +49,7 @@ impl<const N: usize> Handler<TrackGoal<N>> for ArmSim<N> {
         Tracking {
             positions: nearest_turn(&message.solution, &self.simulation.state().position),
             before,
+            obstacle: Obstacle::of(&self.simulation),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The arm judges its own timestep: how large it may be at the present setpoint, and by how much each step is off.
+//! The arm judges its own clocks: how large timestep and control period may be at the present setpoint, and by how much
+//! each step is off.
 //!
 //! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It
 //! is looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the
@@ -14,6 +15,8 @@ use tokio::time::Instant;
 use super::messages::{ArmSettings, Consult, HeldLimit, Present};
 use super::node::ArmSim;
 use super::state::limit::{resemble, share_limit};
+use crate::math::shown::{Shown, shown_against};
+use crate::math::simulation::ControlPeriod;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::ErrorEstimateMessage;
 use crate::study::control_loop::ControlLoop;
@@ -23,6 +26,16 @@ use crate::study::motion::Motion;
 /// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may
 /// come by the thousand a second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
+
+/// A limit that is exceeded.
+enum Exceeded {
+    /// The control period is beyond the controller's limit.
+    Period,
+    /// The timestep is beyond the limit of this motion.
+    Motion(Motion),
+    /// The timestep is beyond the method's limit.
+    Timestep,
+}
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
@@ -49,18 +62,29 @@ impl<const N: usize> Handler<Consult<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// At a tick: has the limit predicted anew if the loop has changed, and tells at once if the warning comes or goes.
-    pub(super) fn watch_limit(&mut self, ctx: &mut Context<Self>) {
+    /// At a tick: has the limit predicted anew if the loop has changed, and tells at once if a warning comes or goes.
+    pub(super) fn watch_warnings(&mut self, ctx: &mut Context<Self>) {
         self.ask_limit(ctx);
-        let limit = self.timestep_limit();
-        if !self.wants_limit() || limit.is_nan() {
+        if !self.wants_limit() {
             return;
         }
-        let exceeded = self.simulation.timestep() > limit.min(self.motion().timestep);
-        if exceeded != self.limit.warned {
-            self.limit.warned = exceeded;
+        let is_known = !self.timestep_limit().is_nan();
+        let exceeded = if is_known {
+            self.exceeded().is_some()
+        } else {
+            self.limit.warned.0
+        };
+        let warned = (exceeded, self.is_held_up());
+        if warned != self.limit.warned {
+            self.limit.warned = warned;
             self.publish_diagnostics();
         }
+    }
+
+    /// Whether a goal or a setpoint waits for the controller to be switched on.
+    pub(super) fn is_held_up(&self) -> bool {
+        let is_meant_to_move = self.goals.tracked.is_some() || self.goals.setpoint_waits;
+        is_meant_to_move && !self.simulation.pid().is_enabled()
     }
 
     /// Asks for the limit of the loop in force, unless it is known, on its way, or wanted by nobody.
@@ -81,8 +105,8 @@ impl<const N: usize> ArmSim<N> {
         self.limit.waiting = true;
         ctx.spawn(answer.map(move |answer, arm, _| {
             arm.limit.waiting = false;
-            if let Ok(Some(limit)) = answer {
-                arm.limit.known = Some((present, limit));
+            if let Ok(Some(limits)) = answer {
+                arm.limit.known = Some((present, limits));
             }
         }));
     }
@@ -91,13 +115,33 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
     }
 
-    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint
-    /// will do until the next is there; one for another arm, other gains or another method says nothing.
-    pub(super) fn timestep_limit(&self) -> f64 {
+    /// The latest predictions \[s\], of the timestep and of the control period: infinite where nothing limits, NaN
+    /// while there are none. Those for an earlier setpoint will do until the next are there; those for another arm,
+    /// other gains, another method or another period say nothing.
+    fn limits(&self) -> (f64, f64) {
+        let infinite = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
         match &self.limit.known {
-            Some((of, limit)) if resemble(of, &ControlLoop::in_force(&self.simulation)) => *limit,
-            _ => f64::NAN,
+            Some((of, limits)) if resemble(of, &ControlLoop::in_force(&self.simulation)) => {
+                (infinite(limits.timestep), infinite(limits.period))
+            }
+            _ => (f64::NAN, f64::NAN),
         }
+    }
+
+    /// The largest timestep that is predicted to be stable \[s\], at the present control period.
+    pub(super) fn timestep_limit(&self) -> f64 {
+        self.limits().0
+    }
+
+    /// The largest control period that is predicted to be stable \[s\].
+    pub(super) fn period_limit(&self) -> f64 {
+        self.limits().1
+    }
+
+    /// The time between two runs of the law, in whole steps \[s\].
+    pub(super) fn effective_period(&self) -> f64 {
+        let period = self.simulation.control_period();
+        period.effective(self.simulation.timestep())
     }
 
     /// The motion that is ahead of the arm, and the timestep that it bears.
@@ -106,36 +150,63 @@ impl<const N: usize> ArmSim<N> {
         Motion::ahead(&control, self.simulation.state())
     }
 
-    /// The warning about the present timestep, if the smaller of the two limits calls for one.
-    pub(super) fn limit_warning(&self) -> Option<String> {
-        let (timestep, limit) = (self.simulation.timestep(), self.timestep_limit());
+    /// The limit that is exceeded. Where both clocks are too slow it is the period's, which no timestep mends.
+    fn exceeded(&self) -> Option<Exceeded> {
+        let simulation = &self.simulation;
+        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
+        let effective = self.effective_period();
+        let is_sampled = simulation.pid().is_enabled() && effective > timestep;
         let motion = self.motion();
-        if motion.timestep < timestep && (limit.is_nan() || motion.timestep < limit) {
-            let method = self.simulation.method();
-            let Motion {
-                speed,
-                timestep: bears,
-            } = motion;
-            return Some(format!(
-                "the timestep {timestep:?} s exceeds {bears:.2e} s, up to which {method} is predicted to carry a \
-                 motion of {speed:.1} rad/s"
-            ));
+        if is_sampled && effective > period_limit {
+            Some(Exceeded::Period)
+        } else if motion.timestep < timestep && (limit.is_nan() || motion.timestep < limit) {
+            Some(Exceeded::Motion(motion))
+        } else {
+            (timestep > limit).then_some(Exceeded::Timestep)
         }
-        let method = self.simulation.method();
-        let place = if self.simulation.pid().is_enabled() {
+    }
+
+    /// The warning about the present timestep or control period, if a limit calls for one.
+    pub(super) fn limit_warning(&self) -> Option<String> {
+        let simulation = &self.simulation;
+        let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
+        let method = simulation.method();
+        let place = if simulation.pid().is_enabled() {
             "at the present setpoint"
         } else {
             "with the controller off"
         };
-        let says = if limit == 0.0 {
-            format!("{method} is predicted to be unstable at every timestep {place}")
-        } else {
-            format!(
-                "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable \
-                 {place}"
-            )
+        let effective = self.effective_period();
+        let over = |value: f64, limit: f64| {
+            let (value, limit) = (shown_against(value, limit), shown_against(limit, value));
+            format!("{value} s exceeds {limit} s")
         };
-        (timestep > limit).then_some(says)
+        Some(match self.exceeded()? {
+            Exceeded::Period => format!(
+                "the control period {}, up to which the controller is predicted to be stable {place}",
+                over(effective, period_limit)
+            ),
+            Exceeded::Motion(motion) => format!(
+                "the timestep {}, up to which {method} is predicted to carry a motion of {} rad/s",
+                over(timestep, motion.timestep),
+                Shown(motion.speed)
+            ),
+            Exceeded::Timestep if limit == 0.0 => {
+                format!("{method} is predicted to be unstable at every timestep {place}")
+            }
+            Exceeded::Timestep => {
+                let is_default = simulation.control_period() == ControlPeriod::default();
+                let period = if is_default {
+                    String::new()
+                } else {
+                    format!(" with a control period of {} s", Shown(effective))
+                };
+                format!(
+                    "the timestep {}, up to which {method} is predicted to be stable {place}{period}",
+                    over(timestep, limit)
+                )
+            }
+        })
     }
 
     /// The message of `/arm_sim/error_estimate`: of the step that is about to be taken, paused or not.

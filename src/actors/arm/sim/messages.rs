@@ -9,6 +9,8 @@ use glam::DVec2;
 use crate::math::arm::State;
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::simulation::Simulation;
+use crate::protocol::catalog::Service;
+use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
@@ -41,10 +43,10 @@ pub struct Present<const N: usize> {
     pub state: State<N>,
 }
 
-/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to
-/// `study`; none if the runtime ends meanwhile.
+/// The largest stable control period and timestep \[s\] of a loop with held control. From the arm to `study`; none if
+/// the runtime ends meanwhile.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<f64>")]
+#[rtype(result = "Option<ClockLimits>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 
 /// The node to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
@@ -53,6 +55,30 @@ pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
+
+/// Why no setpoint moves the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Obstacle {
+    /// Its simulation has diverged.
+    #[error("the arm has diverged and stands still until {} is called", Service::Reset.name())]
+    Diverged,
+    /// Its controller is off.
+    #[error(
+        "the controller is off, so the arm does not follow its setpoint; {} with data true switches it on",
+        Service::Enable.name()
+    )]
+    ControllerOff,
+}
+
+impl Obstacle {
+    pub(super) fn of<const N: usize>(simulation: &Simulation<N>) -> Option<Self> {
+        if simulation.divergence().is_some() {
+            Some(Self::Diverged)
+        } else {
+            (!simulation.pid().is_enabled()).then_some(Self::ControllerOff)
+        }
+    }
+}
 
 /// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it, and from the republisher
 /// of frames, whenever some are due.
@@ -74,6 +100,8 @@ pub struct Pose<const N: usize> {
     /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
     /// at a reset that forgets a past of thirty years.
     pub simulated: f64,
+    /// Why it does not follow its setpoint; none if it does.
+    pub obstacle: Option<Obstacle>,
 }
 
 /// A goal begins, and the one before it ends, both in this instant. From `ik_action`, which then publishes the
@@ -113,6 +141,8 @@ pub struct Tracking<const N: usize> {
     pub positions: [f64; N],
     /// How the goal before it ended, now or earlier, if there was one.
     pub before: Option<GoalJudged<N>>,
+    /// Why the arm will not follow that setpoint yet; none if it will.
+    pub obstacle: Option<Obstacle>,
 }
 
 /// The goal's setpoint is held from the next step on, and the goal judged, unless it has ended. From `ik_action`.

@@ -21,17 +21,21 @@ mod tell;
 pub use self::limit::LEAST_PAUSE;
 pub use self::messages::{
     AddBarrier, ArmPose, ArmSettings, Barrier, CommandGoal, Consult, EndGoal, GoalJudged,
-    HeldLimit, Pose, Present, SimulationTime, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    HeldLimit, Obstacle, Pose, Present, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    Tracking,
 };
 pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::node::{ArmSim, BREATHER, PUBLISH_RATE, WAKE_UP_BUDGET, joint_names};
+pub use self::services::command::CommandEffort;
 pub use self::services::disturb::{Disturb, Push};
 pub use self::services::field_by_field::{Echo, FieldByField};
 pub use self::services::gains::SetGains;
 pub use self::services::integrator::{Integrator, SetIntegrator};
 pub use self::services::params::SetParams;
+pub use self::services::period::{PeriodInForce, SetPeriod};
 pub use self::services::reset::Reset;
 pub use self::services::setpoint::SetSetpoint;
+pub use self::services::state::SetState;
 pub use self::services::step::{MAX_STEPS, STEPS_IN_A_ROW, Step};
 pub use self::services::switches::{Enable, Pause};
 pub use self::state::journal::{ArmEvent, ArmListener, ArmNews, Tell};

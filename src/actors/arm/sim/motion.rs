@@ -4,6 +4,7 @@
 
 use actix::prelude::*;
 
+use super::messages::Obstacle;
 use super::node::ArmSim;
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
@@ -27,6 +28,8 @@ pub struct JointMotion<const N: usize> {
     pub resets: u64,
     /// Whether it is paused, and no step has been taken since.
     pub stands_still: bool,
+    /// Why it does not follow its setpoint; none if it does.
+    pub obstacle: Option<Obstacle>,
 }
 
 /// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
@@ -51,6 +54,7 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
             time: self.simulation.time(),
             resets: self.goals.past.resets,
             stands_still: self.paused && self.simulation.time() <= self.paused_at,
+            obstacle: Obstacle::of(&self.simulation),
         }
     }
 }

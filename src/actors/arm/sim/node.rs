@@ -8,7 +8,7 @@
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -28,7 +28,7 @@ use crate::actors::resources::work_clock;
 use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;
-use crate::math::simulation::Simulation;
+use crate::math::simulation::{ControlPeriod, Simulation};
 
 /// Publishing ticks a second, and so the rate of `/joint_states` and `/clock` \[Hz\].
 pub const PUBLISH_RATE: u32 = 60;
@@ -70,9 +70,11 @@ pub struct ArmSim<const N: usize> {
     pub(super) turn: Turn,
     /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
     /// turn is on its way.
-    pub(super) steps: VecDeque<Steps>,
+    pub(super) steps: VecDeque<Steps<N>>,
     /// They are being taken.
     pub(super) is_stepping: bool,
+    /// Ends with the client whose effort is commanded.
+    pub(super) commander: Option<Weak<()>>,
     /// The listener to everything that the steps depend on, if there is one.
     pub(super) journal: Option<Journal<N>>,
 }
@@ -102,8 +104,18 @@ impl<const N: usize> ArmSim<N> {
             turn: Turn::new(),
             steps: VecDeque::new(),
             is_stepping: false,
+            commander: None,
             journal: None,
         }
+    }
+
+    /// The same with another time between two runs of the control law \[s\], not negative.
+    #[must_use]
+    pub fn with_period(mut self, period: f64) -> Self {
+        let delay = false;
+        self.simulation
+            .set_control_period(ControlPeriod { period, delay });
+        self
     }
 }
 
@@ -161,7 +173,7 @@ impl<const N: usize> ArmSim<N> {
         let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
         ctx.run_later(wait, |arm, ctx| {
             arm.advance_to_now(ctx);
-            arm.watch_limit(ctx);
+            arm.watch_warnings(ctx);
             arm.publish_state();
             arm.tell_state();
             arm.schedule_tick(ctx);
@@ -190,6 +202,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
+        self.end_orphaned_command();
         if self.paused || self.simulation.divergence().is_some() {
             return;
         }

@@ -5,11 +5,13 @@
 
 use serde::Serialize;
 
+use super::messages::Obstacle;
 use super::node::{ArmSim, PUBLISH_RATE};
 use super::state::telemetry::{WakeUp, Window, energy};
 use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
+use crate::math::shown::Shown;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{
@@ -109,7 +111,7 @@ impl<const N: usize> ArmSim<N> {
                 let message = format!(
                     "diverged: step {} from t = {} s was not finite and was not taken; {} clears this",
                     divergence.step,
-                    divergence.time,
+                    Shown(divergence.time),
                     Service::Reset.name()
                 );
                 (2, "diverged", message)
@@ -130,6 +132,8 @@ impl<const N: usize> ArmSim<N> {
             ("energy", energy),
             ("energy_drift", energy - self.telemetry.energy_reference),
             ("max_step_time", self.telemetry.window.longest.step_time()),
+            ("control_period", self.effective_period()),
+            ("control_period_limit", self.period_limit()),
             ("timestep_limit", self.timestep_limit()),
             ("timestep_limit_motion", self.motion().timestep),
         ];
@@ -155,7 +159,11 @@ impl<const N: usize> ArmSim<N> {
             let behind = CATCH_UP.as_millis() / 2;
             format!("the arm is more than {behind} ms behind wall time")
         });
-        self.limit_warning().into_iter().chain(late).collect()
+        let held_up = self
+            .is_held_up()
+            .then(|| Obstacle::ControllerOff.to_string());
+        let warnings = [self.limit_warning(), held_up, late];
+        warnings.into_iter().flatten().collect()
     }
 
     fn gateway_status(&self) -> DiagnosticStatus<'static> {
@@ -163,8 +171,6 @@ impl<const N: usize> ArmSim<N> {
         let values = vec![
             entry("connections", gauges.connections().to_string()),
             entry("messages_dropped", gauges.messages_dropped().to_string()),
-            entry("clients_cut_off", gauges.memory().cut_off().to_string()),
-            entry("bytes_held", gauges.memory().held().to_string()),
         ];
         let message = "running".to_owned();
         DiagnosticStatus {

@@ -5,7 +5,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::taken;
+use super::reading::{taken, with_period};
 use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::Work;
 use crate::actors::node::Ask;
@@ -13,6 +13,7 @@ use crate::actors::wire::{Address, Answered, Callable};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
+use crate::math::simulation::ControlPeriod;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -81,6 +82,8 @@ pub struct PlanRun<const N: usize> {
     pub gains: Option<SetGains<N>>,
     /// The setpoint \[rad\], at rest.
     pub setpoint: Option<[f64; N]>,
+    /// The time between two runs of the control law \[s\]; none, or 0, to have it planned.
+    pub control_period: Option<f64>,
 }
 
 impl<const N: usize> Ask for PlanRun<N> {
@@ -94,8 +97,8 @@ pub struct PlannedRun {
     pub best: Candidate,
     /// All runs that were tried and good enough.
     pub planned: Planned,
-    /// Whether a controller holds the arm: its period is then the timestep.
-    pub controlled: bool,
+    /// The control period \[s\], where a controller holds the arm: the timestep, unless another was asked for.
+    pub control_period: Option<f64>,
 }
 
 /// Why there is no plan.
@@ -167,6 +170,7 @@ impl<const N: usize> Callable for PlanRun<N> {
             params: fields.object("params", SetParams::of),
             gains: fields.object("gains", SetGains::of),
             setpoint: fields.array("setpoint", Bound::Finite),
+            control_period: fields.number("control_period", Bound::NonNegative),
         };
         taken(ask, fields)
     }
@@ -197,13 +201,13 @@ impl From<PlannedRun> for PlanValues {
         let PlannedRun {
             best,
             planned,
-            controlled,
+            control_period,
         } = run;
         let all = || planned.candidates.iter().rev();
         Self {
             integrator: best.method.name(),
             timestep: best.timestep,
-            control_period: controlled.then_some(best.timestep),
+            control_period,
             evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
             error: best.error,
             error_uncertainty: planned.uncertainty,
@@ -280,6 +284,7 @@ fn begin_search<const N: usize>(
         arm,
         method: ask.method.unwrap_or(present.method),
         timestep: ask.timestep.unwrap_or(present.timestep),
+        period: ControlPeriod::default(),
         ..*present
     };
     let requirements = GainsRequirements {
@@ -294,8 +299,9 @@ fn begin_search<const N: usize>(
 /// A plan on its way.
 pub(super) enum PlanWork<const N: usize> {
     Asked(Box<(PlanRun<N>, Present<N>)>),
-    /// A planning, and whether the arm is controlled.
-    Planning(Box<Planning<N>>, bool),
+    /// A planning.
+    /// Under control, with its period, which is 0 where it is planned too.
+    Planning(Box<Planning<N>>, Option<f64>),
 }
 
 impl<const N: usize> PlanWork<N> {
@@ -312,21 +318,22 @@ impl<const N: usize> Work<Result<PlannedRun, NotPlanned>> for PlanWork<N> {
     fn advance(&mut self) -> Option<Result<PlannedRun, NotPlanned>> {
         match self {
             Self::Asked(asked) => match begin_plan(&asked.0, &asked.1) {
-                Ok((planning, controlled)) => {
-                    *self = Self::Planning(Box::new(planning), controlled);
+                Ok((planning, period)) => {
+                    *self = Self::Planning(Box::new(planning), period);
                     None
                 }
                 Err(why) => Some(Err(why)),
             },
-            Self::Planning(planning, controlled) => {
-                let controlled = *controlled;
+            Self::Planning(planning, period) => {
+                let period = *period;
                 let planned = planning.advance()?;
                 Some(planned.map_err(NotPlanned::from).and_then(|planned| {
                     let best = *planned.best().ok_or(NotPlanned::Nothing)?;
                     Ok(PlannedRun {
                         best,
                         planned,
-                        controlled,
+                        control_period: period
+                            .map(|period| if period > 0.0 { period } else { best.timestep }),
                     })
                 }))
             }
@@ -337,9 +344,10 @@ impl<const N: usize> Work<Result<PlannedRun, NotPlanned>> for PlanWork<N> {
 fn begin_plan<const N: usize>(
     ask: &PlanRun<N>,
     present: &Present<N>,
-) -> Result<(Planning<N>, bool), NotPlanned> {
+) -> Result<(Planning<N>, Option<f64>), NotPlanned> {
     let task = task(ask, present)?;
-    Ok((Planning::new(task)?, !task.control.is_free()))
+    let period = (!task.control.is_free()).then_some(task.control.period.period);
+    Ok((Planning::new(task)?, period))
 }
 
 /// The run that is to be planned, with the present settings and state where the question leaves something out.
@@ -360,6 +368,7 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
         arm,
         gains: gains.map_or(missing, |gains| gains.applied_to(&missing)),
         setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
+        period: with_period(ControlPeriod::default(), ask.control_period),
         ..*control
     };
     let usual = if control.is_free() {

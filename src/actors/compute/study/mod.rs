@@ -27,8 +27,8 @@ use crate::actors::arm::sim::{ArmSettings, HeldLimit, Present};
 use crate::actors::node::{Call, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
+use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
-use crate::study::stability::limit_held;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -113,7 +113,7 @@ impl<const N: usize> Handler<Call<PlanRun<N>>> for Study<N> {
 }
 
 impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
-    type Result = ResponseFuture<Option<f64>>;
+    type Result = ResponseFuture<Option<ClockLimits>>;
 
     fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
         let (answer, answered) = oneshot::channel();
@@ -130,15 +130,15 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
 struct Limiting<const N: usize> {
     control: ControlLoop<N>,
     /// The way to the answer; if it is dropped unused, there is none.
-    answer: Option<oneshot::Sender<f64>>,
+    answer: Option<oneshot::Sender<ClockLimits>>,
 }
 
 impl<const N: usize> Computation for Limiting<N> {
     fn advance(&mut self, _: Instant) -> Progress {
-        let limit = limit_held(&self.control).unwrap_or(f64::INFINITY);
+        let limits = clock_limits(&self.control);
         if let Some(answer) = self.answer.take() {
             // The arm may have ended meanwhile.
-            let _ = answer.send(limit);
+            let _ = answer.send(limits);
         }
         Progress::Finished
     }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::reading::taken;
+use super::reading::{taken, with_period};
 use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::{NUMBER_BYTES, Work};
 use crate::actors::node::Ask;
@@ -24,7 +24,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
-use crate::study::rollout::{Deviation, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
+use crate::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -39,6 +39,8 @@ pub struct RunOffline<const N: usize> {
     pub duration: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub timestep: Option<f64>,
+    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+    pub control_period: Option<f64>,
     /// The method that takes the steps.
     pub method: Option<Method>,
     /// Parameters of the arm that are to be others.
@@ -89,6 +91,7 @@ impl<const N: usize> Callable for RunOffline<N> {
             qdot0: fields.array("qdot0", Bound::Finite),
             duration: fields.number("duration", Bound::Positive),
             timestep: fields.number("timestep", Bound::Positive),
+            control_period: fields.number("control_period", Bound::NonNegative),
             method: fields.choice("integrator", &Method::ALL, Method::name),
             params: fields.object("params", SetParams::of),
             gains: fields.object("gains", SetGains::of),
@@ -181,24 +184,23 @@ impl<const N: usize> RolloutWriter<N> {
     }
 
     fn finish(&mut self) -> Bytes {
-        // An error that is known for some of the samples only can't be compared with another method's, and counts as
-        // unknown.
-        let followed = self
-            .run
-            .deviation()
-            .filter(|deviation| deviation.errors.len() == self.run.times().len());
-        let error = followed.and_then(Deviation::known).unwrap_or(f64::NAN);
-        let uncertainty = followed.map_or(f64::NAN, Deviation::largest_uncertainty);
+        let method = self.run.known(self.run.deviation());
+        let sampling = self.run.known(self.run.from_ideal());
         let writer = &mut self.writer;
         writer.raw(&format!(
             "],\"evaluations\":{},\"wall_time\":",
             self.run.evaluations()
         ));
         writer.number(self.took.as_secs_f64());
-        writer.raw(",\"error\":");
-        writer.number(error);
-        writer.raw(",\"error_uncertainty\":");
-        writer.number(uncertainty);
+        for (name, value) in [
+            ("error", method.0),
+            ("error_uncertainty", method.1),
+            ("sampling_error", sampling.0),
+            ("sampling_error_uncertainty", sampling.1),
+        ] {
+            writer.raw(&format!(",\"{name}\":"));
+            writer.number(value.unwrap_or(f64::NAN));
+        }
         writer.raw("}");
         std::mem::take(writer).finish(true, "")
     }
@@ -329,6 +331,7 @@ fn request<const N: usize>(
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),
             timestep: ask.timestep.unwrap_or(control.timestep),
+            period: with_period(control.period, ask.control_period),
         },
         start: State {
             position: ask.q0.unwrap_or([0.0; N]),

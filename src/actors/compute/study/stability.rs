@@ -9,7 +9,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::taken;
+use super::reading::{taken, with_period};
 use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::Work;
 use crate::actors::node::Ask;
@@ -20,9 +20,10 @@ use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
-use crate::study::motion::Motion;
-use crate::study::stability::{ADVISED_PART, LimitSearch, Limits};
+use crate::study::motion::{FREE_SECONDS, Motion};
+use crate::study::stability::{LimitSearch, Limits};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -37,6 +38,8 @@ pub struct PredictStability<const N: usize> {
     pub params: Option<SetParams<N>>,
     /// The setpoint \[rad\], at rest.
     pub setpoint: Option<[f64; N]>,
+    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+    pub control_period: Option<f64>,
 }
 
 impl<const N: usize> Ask for PredictStability<N> {
@@ -47,8 +50,12 @@ impl<const N: usize> Ask for PredictStability<N> {
 pub struct Predicted<const N: usize> {
     /// The largest stable timesteps.
     pub limits: Limits<N>,
+    /// The limits of control period and timestep.
+    pub clocks: ClockLimits,
     /// The motion that is ahead of the arm as it is now, and what timestep it bears.
     pub motion: Motion,
+    /// Whether the arm is left to itself.
+    pub is_free: bool,
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
@@ -61,6 +68,7 @@ impl<const N: usize> Callable for PredictStability<N> {
             gains: fields.object("gains", SetGains::of),
             params: fields.object("params", SetParams::of),
             setpoint: fields.array("setpoint", Bound::Finite),
+            control_period: fields.number("control_period", Bound::NonNegative),
         };
         taken(ask, fields)
     }
@@ -69,10 +77,7 @@ impl<const N: usize> Callable for PredictStability<N> {
 impl<const N: usize> Answered for PredictStability<N> {
     fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
         match answer {
-            Ok(predicted) => {
-                let Predicted { limits, motion } = *predicted;
-                to.response(&StabilityValues::new(limits, motion), "")
-            }
+            Ok(predicted) => to.response(&StabilityValues::new(&predicted), ""),
             Err(why) => to.failure(&format!("params {why}")),
         }
     }
@@ -80,6 +85,8 @@ impl<const N: usize> Answered for PredictStability<N> {
 
 #[derive(Serialize)]
 struct StabilityValues {
+    control_period_limit: Option<f64>,
+    timestep_limit: Option<f64>,
     timestep_limit_held: Option<f64>,
     timestep_limit_continuous: Option<f64>,
     equilibrium: Vec<f64>,
@@ -87,12 +94,14 @@ struct StabilityValues {
     minimum_over_poses_held: Option<f64>,
     minimum_over_poses_continuous: Option<f64>,
     minimum_over_poses_bound: Option<f64>,
+    bound_is_proven: bool,
     certified: bool,
     worst_pose: Option<Vec<f64>>,
     critical: Option<CriticalValues>,
     timestep_limit_motion: Option<f64>,
     motion_speed: f64,
     advised_timestep: Option<f64>,
+    advised_duration: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -103,13 +112,17 @@ struct CriticalValues {
 }
 
 impl StabilityValues {
-    fn new<const N: usize>(limits: Limits<N>, motion: Motion) -> Self {
+    fn new<const N: usize>(predicted: &Predicted<N>) -> Self {
+        let Predicted {
+            limits,
+            clocks,
+            motion,
+            ..
+        } = predicted;
         let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
-        let advised = [
-            limits.advised,
-            bears.map(|timestep| ADVISED_PART * timestep),
-        ];
         Self {
+            control_period_limit: clocks.period,
+            timestep_limit: clocks.timestep,
             timestep_limit_held: limits.held,
             timestep_limit_continuous: limits.continuous,
             equilibrium: limits.equilibrium.to_vec(),
@@ -117,6 +130,7 @@ impl StabilityValues {
             minimum_over_poses_held: limits.minimum_held,
             minimum_over_poses_continuous: limits.minimum_continuous,
             minimum_over_poses_bound: limits.bound,
+            bound_is_proven: limits.bound_is_proven,
             certified: limits.certified,
             worst_pose: limits.worst_pose.map(|pose| pose.to_vec()),
             critical: limits.critical.map(|critical| CriticalValues {
@@ -126,7 +140,8 @@ impl StabilityValues {
             }),
             timestep_limit_motion: bears,
             motion_speed: motion.speed,
-            advised_timestep: advised.into_iter().flatten().reduce(f64::min),
+            advised_timestep: limits.advised_for(motion),
+            advised_duration: predicted.is_free.then_some(FREE_SECONDS),
         }
     }
 }
@@ -136,7 +151,7 @@ impl StabilityValues {
 /// A prediction on its way.
 pub(super) enum StabilityWork<const N: usize> {
     Asked(Box<(PredictStability<N>, Present<N>)>),
-    Searching(Box<LimitSearch<N>>, Motion),
+    Searching(Box<LimitSearch<N>>, ClockLimits, Motion, bool),
 }
 
 impl<const N: usize> StabilityWork<N> {
@@ -158,16 +173,21 @@ impl<const N: usize> Work<Result<Box<Predicted<N>>, ArmError>> for StabilityWork
                     Ok(control) => {
                         let search = LimitSearch::new(&control);
                         let motion = Motion::ahead(&control, &present.state);
-                        *self = Self::Searching(Box::new(search), motion);
+                        let (clocks, is_free) = (clock_limits(&control), control.is_free());
+                        *self = Self::Searching(Box::new(search), clocks, motion, is_free);
                         None
                     }
                     Err(why) => Some(Err(why)),
                 }
             }
-            Self::Searching(search, motion) => {
+            Self::Searching(search, clocks, motion, is_free) => {
                 let limits = search.advance()?;
-                let motion = *motion;
-                Some(Ok(Box::new(Predicted { limits, motion })))
+                Some(Ok(Box::new(Predicted {
+                    limits,
+                    clocks: *clocks,
+                    motion: *motion,
+                    is_free: *is_free,
+                })))
             }
         }
     }
@@ -190,5 +210,6 @@ fn control_loop<const N: usize>(
         setpoint: setpoint.unwrap_or(present.setpoint),
         method: ask.method.unwrap_or(present.method),
         timestep: present.timestep,
+        period: with_period(present.period, ask.control_period),
     })
 }

@@ -1,41 +1,90 @@
-//! A few threads that do the heavy requests in turns, so that no client waits for another's million steps.
+//! A few threads that do the heavy requests in slices, so that no client waits for a million steps of another one.
 //!
-//! A computation is advanced for one slice and waits for its next turn. The turn goes to the client that has had least
-//! of the workers' processor time (`workers/turns.rs`); time that a busy machine takes from a worker is charged to
-//! nobody. A connection has at most one computation here at a time (the rest wait in the connection), so each
-//! connection gets the same share, and one that asks for little does not wait for those that ask for much. The memory
-//! of a computation is counted when room is taken for its answer
-//! ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
+//! A computation is advanced for one slice, and then stands at the end of the queue: round robin. A connection has at
+//! most one computation here at a time (the others wait in the connection), so each connection has the same share.
 //!
-//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection: nobody is refused because
-//! of what others ask. Computations whose callers have gone make room.
+//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection. Computations whose
+//! callers have gone make room.
 //!
-//! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
+//! **Invariant:** a computation is advanced, refused and dropped outside the lock. One that panics takes neither its
+//! worker nor another computation with it.
 
 mod computation;
-mod queue;
-mod turns;
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
+use std::time::{Duration, Instant};
 
 pub use self::computation::{Computation, Progress, SLICE};
-use self::queue::{Job, PoolState};
-pub use self::turns::{Owner, RUNTIME};
-use crate::actors::gateway::limits::MAX_CONNECTIONS;
-use crate::actors::resources::budget::free_elsewhere;
+use crate::actors::ConnectionId;
+use crate::actors::panics::contain;
 use crate::actors::resources::priority::give_way;
+use crate::actors::resources::work_clock;
+use crate::options::MAX_CLIENTS;
 
 /// Computations that may be here at once, waiting or running: one of each connection.
-pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
+pub const MAX_ADMITTED: usize = MAX_CLIENTS;
 /// The refusal when there are too many computations.
 pub const BUSY: &str =
     "busy: as many computations of all clients wait as may wait; try again later";
+/// Pause between two tries of computations that cannot begin.
+const TRY_AGAIN: Duration = Duration::from_millis(10);
+/// Computations that try at a time.
+const TRIES: usize = 32;
+
+/// The client for which a computation is done; none for the runtime's own.
+pub type Owner = Option<ConnectionId>;
+/// The owner of the runtime's own computations.
+pub const RUNTIME: Owner = None;
+
+type Job = Box<dyn Computation>;
 
 /// A handle on the pool; clones share it.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct WorkerPool {
-    shared: Arc<PoolState>,
+    shared: Arc<(Mutex<Queue>, Condvar)>,
+}
+
+/// The computations that are here.
+#[derive(Default)]
+struct Queue {
+    /// Computations that wait for their next slice.
+    ready: VecDeque<Job>,
+    running: usize,
+    /// Computations that cannot begin yet.
+    waiting: VecDeque<Job>,
+    /// When the computations that cannot begin last tried.
+    tried: Option<Instant>,
+    closed: Option<&'static str>,
+}
+
+impl Queue {
+    /// Lets at most `most` of the computations that could not begin try again.
+    fn retry(&mut self, most: usize) {
+        self.tried = Some(Instant::now());
+        let most = most.min(self.waiting.len());
+        self.ready.extend(self.waiting.drain(..most));
+    }
+
+    fn admitted(&self) -> usize {
+        self.ready.len() + self.running + self.waiting.len()
+    }
+
+    /// Takes out the computations whose callers have gone.
+    fn take_abandoned(&mut self) -> Vec<Job> {
+        self.retry(usize::MAX);
+        let ready = std::mem::take(&mut self.ready).into_iter();
+        let (gone, left): (Vec<Job>, _) = ready.partition(|job| job.is_abandoned());
+        self.ready = left.into();
+        gone
+    }
+
+    fn next(&mut self) -> Option<Job> {
+        let job = self.ready.pop_front()?;
+        self.running += 1;
+        Some(job)
+    }
 }
 
 impl WorkerPool {
@@ -46,13 +95,14 @@ impl WorkerPool {
     pub fn start(threads: usize) -> std::io::Result<Self> {
         let pool = Self::without_threads();
         for number in 0..threads.max(1) {
-            let shared = Arc::clone(&pool.shared);
-            thread::Builder::new()
-                .name(format!("worker-{number}"))
-                .spawn(move || {
-                    give_way();
-                    shared.work();
-                })?;
+            let pool = pool.clone();
+            let name = format!("worker-{number}");
+            thread::Builder::new().name(name).spawn(move || {
+                give_way();
+                while let Some(job) = pool.take() {
+                    pool.advance(job);
+                }
+            })?;
         }
         Ok(pool)
     }
@@ -60,26 +110,21 @@ impl WorkerPool {
     /// A pool without workers, whose owner calls [`WorkerPool::turn`]. It is for a simulation that has one thread only.
     #[must_use]
     pub fn without_threads() -> Self {
-        let shared = Arc::default();
-        Self { shared }
+        Self::default()
     }
 
-    /// Does one slice of the computation whose turn it is, in the calling thread; false if there is none. Those that
-    /// could not begin try again when no other has its turn.
+    /// Does the next slice in the calling thread; false if there is none. Computations that could not begin try again
+    /// when no other has its turn.
     #[must_use]
     pub fn turn(&self) -> bool {
         let next = {
-            let mut queue = self.shared.lock();
-            if queue.turns.waiting() == 0 {
-                queue.retry();
+            let mut queue = self.lock();
+            if queue.ready.is_empty() {
+                queue.retry(usize::MAX);
             }
-            queue.turns.next()
+            queue.next()
         };
-        let Some((place, job)) = next else {
-            return false;
-        };
-        self.shared.advance(place, job);
-        true
+        next.map(|job| self.advance(job)).is_some()
     }
 
     /// One worker fewer than the machine has cores, so that the arm and the gateway keep one.
@@ -91,17 +136,17 @@ impl WorkerPool {
     /// Takes in a computation for a client; refuses it if the pool is closed, or has as many as it may have. There is
     /// always room for the runtime's own.
     pub fn submit(&self, of: impl Into<Owner>, mut computation: Job) {
-        let of = of.into();
+        let is_own = of.into() == RUNTIME;
+        // Dropped behind the lock: each answers its caller.
+        let mut abandoned = Vec::new();
         let why = {
-            let mut queue = self.shared.lock();
+            let mut queue = self.lock();
             if queue.admitted() >= MAX_ADMITTED {
-                // The abandoned computations may have many megabytes.
-                free_elsewhere(queue.take_abandoned());
+                abandoned.extend(queue.take_abandoned());
             }
-            let has_room = of == RUNTIME || queue.admitted() < MAX_ADMITTED;
-            if queue.closed.is_none() && has_room {
-                queue.turns.enter(of, computation);
-                self.shared.changed.notify_one();
+            if queue.closed.is_none() && (is_own || queue.admitted() < MAX_ADMITTED) {
+                queue.ready.push_back(computation);
+                self.shared.1.notify_one();
                 return;
             }
             queue.closed.unwrap_or(BUSY)
@@ -109,15 +154,16 @@ impl WorkerPool {
         computation.refuse(why);
     }
 
-    /// Refuses what waits and what runs (at the end of its slice) for the reason `why`, then ends the workers.
+    /// Refuses the waiting computations, and the running ones at the end of their slice, for the reason `why`. Then the
+    /// workers end.
     pub fn close(&self, why: &'static str) {
         let waiting = {
-            let mut queue = self.shared.lock();
+            let mut queue = self.lock();
             queue.closed = Some(why);
-            queue.retry();
-            queue.turns.take_waiting()
+            queue.retry(usize::MAX);
+            std::mem::take(&mut queue.ready)
         };
-        self.shared.changed.notify_all();
+        self.shared.1.notify_all();
         for mut job in waiting {
             job.refuse(why);
         }
@@ -126,8 +172,70 @@ impl WorkerPool {
     /// True when nothing waits and nothing runs.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        let queue = self.shared.lock();
-        queue.admitted() == 0
+        self.lock().admitted() == 0
+    }
+
+    /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.shared.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits for the next slice of a worker. `None` when the pool is closed.
+    fn take(&self) -> Option<Job> {
+        let mut queue = self.lock();
+        loop {
+            let is_due = queue.tried.is_none_or(|tried| tried.elapsed() >= TRY_AGAIN);
+            if is_due && !queue.waiting.is_empty() {
+                queue.retry(TRIES);
+                self.shared.1.notify_all();
+            }
+            if let Some(job) = queue.next() {
+                return Some(job);
+            }
+            if queue.closed.is_some() {
+                return None;
+            }
+            queue = if queue.waiting.is_empty() {
+                let woken = self.shared.1.wait(queue);
+                woken.unwrap_or_else(PoisonError::into_inner)
+            } else {
+                let woken = self.shared.1.wait_timeout(queue, TRY_AGAIN);
+                woken.unwrap_or_else(PoisonError::into_inner).0
+            };
+        }
+    }
+
+    /// Gives a computation its slice, and puts it back into the queue unless it has ended.
+    fn advance(&self, mut job: Job) {
+        let progress = contain(|| job.advance(work_clock::now() + SLICE));
+        let progress = progress.unwrap_or_else(|panic| {
+            tracing::error!(%panic, "a computation ended; its caller has an answer");
+            Progress::Finished
+        });
+        let why = {
+            let mut queue = self.lock();
+            match (progress, queue.closed) {
+                (Progress::Finished, _) => None,
+                (_, Some(why)) => Some(why),
+                (Progress::Unfinished, None) => {
+                    queue.running -= 1;
+                    return queue.ready.push_back(job);
+                }
+                (Progress::Waiting, None) => {
+                    queue.running -= 1;
+                    return queue.waiting.push_back(job);
+                }
+            }
+        };
+        // The end of a computation may free many megabytes.
+        let end = contain(move || why.map(|why| job.refuse(why)).unwrap_or_default());
+        if let Err(panic) = end {
+            tracing::error!(%panic, "the end of a computation failed");
+        }
+        let mut queue = self.lock();
+        queue.running -= 1;
+        queue.retry(usize::MAX);
+        self.shared.1.notify_all();
     }
 }
 

@@ -3,11 +3,9 @@
 //! **Invariant:** what is asserted is the order that the pool decides on, never how fast a thread was.
 
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
 
 use super::*;
 use crate::actors::ConnectionId;
-use crate::actors::resources::work_clock;
 
 struct Counting {
     name: &'static str,
@@ -56,18 +54,14 @@ fn computations_take_turns() {
     let pool = WorkerPool::start(1).unwrap();
     {
         // Both wait before the worker takes the first: the lock is held meanwhile.
-        let mut queue = pool.shared.lock();
-        for (client, name) in [(1, "a"), (2, "b")] {
-            let job = computation(name, TURNS, &log);
-            queue.turns.enter(ConnectionId(client), job);
+        let mut queue = pool.lock();
+        for name in ["a", "b"] {
+            queue.ready.push_back(computation(name, TURNS, &log));
         }
     }
-    pool.shared.changed.notify_all();
+    pool.shared.1.notify_all();
     let order: Vec<String> = seen.iter().take(2 * TURNS).collect();
-    let a = order.iter().position(|turn| turn == "b").unwrap();
-    let last_a = order.iter().rposition(|turn| turn == "a").unwrap();
-    assert!(a < last_a, "b has a turn before the last of a: {order:?}");
-    assert_eq!(order.iter().filter(|turn| *turn == "a").count(), TURNS);
+    assert_eq!(order, ["a", "b"].repeat(TURNS));
     while !pool.is_idle() {
         thread::yield_now();
     }
@@ -119,50 +113,6 @@ fn what_waits_for_room_tries_again_while_others_compute_without_end() {
     while !pool.is_idle() {
         thread::yield_now();
     }
-}
-
-/// Has turns of five milliseconds, in which it computes or waits for another thread that does.
-struct TimedTurn {
-    waits: bool,
-    log: mpsc::Sender<bool>,
-}
-
-fn compute() {
-    let before = work_clock::spent();
-    while work_clock::spent() - before < Duration::from_millis(5) {
-        std::hint::spin_loop();
-    }
-}
-
-impl Computation for TimedTurn {
-    fn advance(&mut self, _deadline: Instant) -> Progress {
-        if self.waits {
-            thread::spawn(compute).join().unwrap();
-        } else {
-            compute();
-        }
-        self.log.send(self.waits).unwrap();
-        Progress::Unfinished
-    }
-
-    fn refuse(&mut self, _why: &'static str) {}
-}
-
-/// A computation that waits in its turns has more of them: it is charged only for the processor time that it had.
-#[test]
-fn what_a_worker_was_kept_from_is_charged_to_nobody() {
-    const TURNS: usize = 40;
-    let (log, seen) = mpsc::channel();
-    let pool = WorkerPool::without_threads();
-    for (client, waits) in [(1, true), (2, false)] {
-        let log = log.clone();
-        pool.submit(ConnectionId(client), Box::new(TimedTurn { waits, log }));
-    }
-    for _ in 0..TURNS {
-        assert!(pool.turn());
-    }
-    let waiting = seen.try_iter().filter(|waits| *waits).count();
-    assert!((TURNS * 3 / 4..TURNS).contains(&waiting), "{waiting}");
 }
 
 #[test]

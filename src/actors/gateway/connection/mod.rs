@@ -13,16 +13,15 @@ pub mod admission;
 mod computations;
 mod conversation;
 mod outgoing;
-mod own_waker;
 mod session;
 mod shared;
 mod transport;
 mod unfinished;
+mod unread;
 #[cfg(feature = "web")]
 mod websocket;
 
 use std::future::poll_fn;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -31,9 +30,9 @@ use actix::prelude::*;
 use tokio::io::{AsyncRead, AsyncWrite};
 
 use self::admission::Admission;
-use self::own_waker::OwnWaker;
 use self::session::ClientSession;
 use self::shared::Shared;
+pub use self::unread::UnreadSource;
 pub use super::ends::Ends;
 use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
 use super::registry::Registry;
@@ -67,11 +66,25 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         registry: Addr<Registry>,
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
+        let ends = ends.into();
+        let unread = unread::between(ends);
+        Self::start_reading(unread, admission, ends, stream, registry, gauges)
+    }
+
+    /// The same for a client of which `unread` tells how much it has not read.
+    pub fn start_reading(
+        unread: UnreadSource,
+        admission: Arc<Admission>,
+        ends: Ends,
+        stream: S,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Addr<Self> {
         Self {
             stream: Some(stream),
-            shared: Rc::new(Shared::new(registry, gauges)),
+            shared: Rc::new(Shared::new(registry, gauges, unread)),
             admission,
-            ends: ends.into(),
+            ends,
         }
         .start()
     }
@@ -92,8 +105,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             wants_text: Arc::clone(&self.shared.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
             backlog: self.shared.outgoing.backlog(),
-            account: Arc::clone(&self.shared.account),
-            displaced: Arc::clone(&self.shared.displaced),
         };
         self.begin(outlets, ctx);
     }
@@ -110,13 +121,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connection<S> {
     type Result = ();
 
-    fn handle(&mut self, mut message: Deliver, ctx: &mut Context<Self>) {
-        let underway = message.underway.take();
-        self.contain(ctx, |connection| {
-            let outgoing = &connection.shared.outgoing;
-            outgoing.hold(underway);
-            outgoing.accept(message);
-        });
+    fn handle(&mut self, message: Deliver, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| connection.shared.outgoing.accept(message));
     }
 }
 
@@ -170,9 +176,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             ends: self.ends,
         };
         let outgoing = Rc::clone(&self.shared.outgoing);
-        let mut session = OwnWaker::new(contained(session.run(stream, outlets)));
+        let mut session = Box::pin(contained(session.run(stream, outlets)));
         let served = poll_fn(move |cx| {
-            let polled = Pin::new(&mut session).poll(cx);
+            let polled = session.as_mut().poll(cx);
             outgoing.write(cx);
             polled
         });

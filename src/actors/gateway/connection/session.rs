@@ -8,25 +8,30 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
+use bytes::BytesMut;
+#[cfg(feature = "web")]
+use hyper::StatusCode;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::admission::Admission;
-use super::admission::authentication::{AuthError, authenticate};
+use super::admission::authentication::{AuthError, authenticate, opens_as_command};
+use super::admission::slots::HeldSlot;
 use super::shared::Shared;
 use super::transport::{CHUNK, Plain, discard};
-use super::unfinished::First;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;
-use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LINGER};
-use crate::actors::gateway::messages::{Connect, Disconnect, Finish, Outlets, Refused};
+use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME};
+use crate::actors::gateway::messages::{
+    Connect, CountRefusal, Disconnect, Finish, Outlets, Refused,
+};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
 use crate::protocol::wire::frame::{FrameReader, Opening, opening};
 #[cfg(feature = "web")]
-use crate::web::{response::HttpResponse, response::HttpStatus, serve};
+use crate::web::response::refusal;
 
 /// One client, from its first bytes to its last.
 pub(super) struct ClientSession {
@@ -51,27 +56,49 @@ enum DetectedProtocol {
 
 /// How a client is served.
 enum HowServed {
-    /// Frames are exchanged with it; this holds what has been read of it so far.
-    Json(FrameReader),
-    /// Its request is answered.
+    /// Frames are exchanged with it.
+    Json,
+    /// The same with a command of this program.
+    Command,
+    /// Its opening decides, once it has a place.
+    Undecided,
+    /// Its requests are answered. The head of the first has to be complete by this time.
     #[cfg(feature = "web")]
-    Web(serve::Served),
+    Http(Instant),
     /// It is refused: not at once, if it has tried a token that is not ours.
-    Refused {
-        message: RefusalMessage,
-        is_wrong_token: bool,
-    },
+    Refused { why: String, is_wrong_token: bool },
     /// There is nobody left to serve.
     Gone,
 }
 
-/// Says to a client why it is not served.
-enum RefusalMessage {
-    /// A sentence, in a status.
-    Status(String),
-    /// Over HTTP.
-    #[cfg(feature = "web")]
-    Http(HttpResponse),
+/// A client that has no place yet.
+#[cfg(feature = "web")]
+pub(super) struct Newcomer<'a> {
+    pub(super) outlets: Outlets,
+    /// The slot that it takes until its first request is admitted.
+    pub(super) slot: HeldSlot<'a>,
+    /// Why it is turned away when it loses that slot. `None`: it has to show the token.
+    pub(super) refused: Option<Refused>,
+}
+
+/// Says when the opening of a client is examined, and so what it has to show.
+#[derive(Clone, Copy)]
+enum Examination<'a> {
+    /// It has a place.
+    Served,
+    /// It has to show the token in time.
+    Token(&'a Token, Instant),
+    /// It has to show in time that it may use a kept place.
+    Kept(Instant),
+}
+
+impl Examination<'_> {
+    const fn due(self) -> Option<Instant> {
+        match self {
+            Self::Served => None,
+            Self::Token(_, due) | Self::Kept(due) => Some(due),
+        }
+    }
 }
 
 impl ClientSession {
@@ -80,51 +107,142 @@ impl ClientSession {
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let mut first = First::with_room(CHUNK, &self.shared.account);
-        let admitted = match &self.admission.token {
-            None => None,
+        let mut first = BytesMut::with_capacity(CHUNK);
+        let mut how = match &self.admission.token {
+            None => HowServed::Undecided,
             // Nothing is asked of the registry for a client that has not shown the token.
-            Some(token) => match self.admit(token, &mut stream, &mut first).await {
-                Some(verdict) => Some(verdict),
-                None => return,
-            },
+            Some(token) => {
+                let slot = self.admission.newcomers.unauthenticated.take();
+                match self.admit(token, &slot, &mut stream, &mut first).await {
+                    #[cfg(feature = "web")]
+                    Some(HowServed::Http(due)) => {
+                        let newcomer = Newcomer {
+                            outlets,
+                            slot,
+                            refused: None,
+                        };
+                        return self.serve_http(stream, first, due, Some(newcomer)).await;
+                    }
+                    Some(how) => how,
+                    None => return,
+                }
+            }
         };
-        let id = match self.connect(outlets).await {
-            Ok(id) => id,
-            Err(why) => return self.refuse(&mut stream, &why.to_string()).await,
-        };
-        let verdict = match admitted {
-            Some(verdict) => verdict,
-            None => self.examine(&mut stream, &mut first, None).await,
-        };
-        self.serve(stream, id, first, verdict).await;
+        let is_command = matches!(how, HowServed::Command);
+        let mut place = self.connect(&outlets, is_command).await;
+        if matches!(place, Err(Refused::Full { .. })) {
+            let slot = self.admission.newcomers.waiting.take();
+            let due = Instant::now() + OPENING_TIME;
+            if matches!(how, HowServed::Undecided) {
+                how = tokio::select! {
+                    biased;
+                    how = self.examine(&mut stream, &mut first, Examination::Kept(due)) => how,
+                    () = slot.evicted() => HowServed::Undecided,
+                };
+            }
+            place = match how {
+                #[cfg(feature = "web")]
+                HowServed::Http(due) => {
+                    let newcomer = Newcomer {
+                        outlets,
+                        slot,
+                        refused: place.err(),
+                    };
+                    return self.serve_http(stream, first, due, Some(newcomer)).await;
+                }
+                HowServed::Command => self.wait_for_place(&outlets, &slot, due).await,
+                _ => self.connect(&outlets, false).await,
+            };
+        }
+        drop(outlets);
+        match place {
+            Ok(id) => {
+                if matches!(how, HowServed::Undecided) {
+                    how = self
+                        .examine(&mut stream, &mut first, Examination::Served)
+                        .await;
+                }
+                self.serve(stream, id, first, how).await;
+            }
+            Err(why) => self.turn_away(&mut stream, how, why).await,
+        }
+    }
+
+    /// Takes a place, a kept one too. Where those are taken, it has until `due` for one to become free.
+    pub(super) async fn wait_for_place(
+        &self,
+        outlets: &Outlets,
+        slot: &HeldSlot<'_>,
+        due: Instant,
+    ) -> Result<ConnectionId, Refused> {
+        loop {
+            let place = self.connect(outlets, true).await;
+            let is_full = matches!(place, Err(Refused::Full { .. }));
+            if !is_full || Instant::now() >= due {
+                return place;
+            }
+            tokio::select! {
+                () = slot.evicted() => return place,
+                () = sleep(LOOK_AGAIN) => {}
+            }
+        }
+    }
+
+    /// Counts a client that is turned away, if no place was free.
+    pub(super) fn count_refusal(&self, why: Refused) {
+        if matches!(why, Refused::Full { .. }) {
+            self.shared.registry.do_send(CountRefusal);
+        }
+    }
+
+    /// Tells a client that has no place why.
+    async fn turn_away<S>(&self, stream: &mut S, how: HowServed, refused: Refused)
+    where
+        S: AsyncRead + AsyncWrite + Unpin,
+    {
+        self.count_refusal(refused);
+        match how {
+            HowServed::Refused { why, .. } => self.refuse(stream, &why).await,
+            HowServed::Json | HowServed::Command | HowServed::Undecided => {
+                self.refuse(stream, &refused.to_string()).await;
+            }
+            HowServed::Gone => {}
+            // It is told over HTTP.
+            #[cfg(feature = "web")]
+            HowServed::Http(_) => {}
+        }
     }
 
     /// Has the client show the token, and gives what is to be done about it then. Who does not show it in time, or
     /// has waited longest of too many, is closed.
-    async fn admit<S>(&self, token: &Token, stream: &mut S, first: &mut First) -> Option<HowServed>
+    async fn admit<S>(
+        &self,
+        token: &Token,
+        slot: &HeldSlot<'_>,
+        stream: &mut S,
+        first: &mut BytesMut,
+    ) -> Option<HowServed>
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        let slot = self.admission.newcomers.unauthenticated.take();
         let due = Instant::now() + HEAD_TIME;
         // A client that has sent the token gets in, also where its slot is lost in the same moment.
         let verdict = tokio::select! {
             biased;
-            verdict = self.examine(stream, first, Some((token, due))) => verdict,
+            verdict = self.examine(stream, first, Examination::Token(token, due)) => verdict,
             () = slot.evicted() => {
-                refuse_evicted(stream, &first.bytes).await;
+                refuse_evicted(stream, first).await;
                 return None;
             }
         };
         match verdict {
             HowServed::Gone => None,
             HowServed::Refused {
-                message,
+                why,
                 is_wrong_token,
             } => {
                 tokio::select! {
-                    () = self.refuse_unauthenticated(stream, message, is_wrong_token) => {}
+                    () = self.refuse_unauthenticated(stream, &why, is_wrong_token) => {}
                     () = slot.evicted() => {}
                 }
                 None
@@ -133,89 +251,80 @@ impl ClientSession {
         }
     }
 
-    /// Tells a client that has not shown the token why it is not admitted. The more wrong tokens came from its address,
-    /// the later it is told.
-    async fn refuse_unauthenticated<S>(
-        &self,
-        stream: &mut S,
-        message: RefusalMessage,
-        is_wrong_token: bool,
-    ) where
+    /// Tells a client that has not shown the token why it is not admitted.
+    async fn refuse_unauthenticated<S>(&self, stream: &mut S, why: &str, is_wrong_token: bool)
+    where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        if is_wrong_token {
-            let Some(wait) = self
-                .admission
-                .newcomers
-                .failed_attempts
-                .wait(self.ends.peer.ip())
-            else {
-                return sleep(HEAD_TIME).await;
-            };
-            sleep(wait).await;
-        }
-        match message {
-            RefusalMessage::Status(why) => self.refuse(stream, &why).await,
-            #[cfg(feature = "web")]
-            RefusalMessage::Http(response) => serve::answer(stream, &response).await,
+        if !is_wrong_token || self.delay_wrong_token().await {
+            self.refuse(stream, why).await;
         }
     }
 
+    /// Waits after a wrong token: the more of them came from its address, the longer. Returns whether it is told.
+    pub(super) async fn delay_wrong_token(&self) -> bool {
+        let attempts = &self.admission.newcomers.failed_attempts;
+        let from = self.ends.peer.ip();
+        if let Some(wrong) = attempts.due_warning(from) {
+            tracing::warn!(%from, wrong, "wrong tokens were shown");
+        }
+        let wait = attempts.wait(from);
+        sleep(wait.unwrap_or(HEAD_TIME)).await;
+        wait.is_some()
+    }
+
     /// Makes the client known.
-    async fn connect(&self, outlets: Outlets) -> Result<ConnectionId, Refused> {
-        let answer = self.shared.registry.send(Connect(outlets)).await;
+    async fn connect(
+        &self,
+        outlets: &Outlets,
+        may_use_kept: bool,
+    ) -> Result<ConnectionId, Refused> {
+        let connect = Connect {
+            outlets: outlets.clone(),
+            from: self.ends.peer.ip().to_canonical(),
+            may_use_kept,
+        };
+        let answer = self.shared.registry.send(connect).await;
         let id = answer.unwrap_or(Err(Refused::Closed))?;
         self.shared.id.set(Some(id));
         Ok(id)
     }
 
-    /// Reads until it is clear what is to be done about the client; `auth` is the token that it has to show, and
-    /// until when.
+    /// Reads until it is clear what is to be done about the client.
     async fn examine<S>(
         &self,
         stream: &mut S,
-        first: &mut First,
-        auth: Option<(&Token, Instant)>,
+        first: &mut BytesMut,
+        examination: Examination<'_>,
     ) -> HowServed
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        let due = auth.map(|(_, due)| due);
-        match self.detect_protocol(stream, first, due).await {
-            DetectedProtocol::Json => match auth {
-                None => HowServed::Json(FrameReader::new()),
-                Some((token, due)) => match authenticate(token, stream, first, due).await {
-                    Ok(frames) => HowServed::Json(frames),
-                    Err(why) => HowServed::Refused {
-                        message: RefusalMessage::Status(why.to_string()),
-                        is_wrong_token: why == AuthError::Wrong,
-                    },
+        match self.detect_protocol(stream, first, examination).await {
+            DetectedProtocol::Json => match examination {
+                Examination::Served => HowServed::Json,
+                Examination::Kept(due) => match opens_as_command(stream, first, due).await {
+                    true => HowServed::Command,
+                    false => HowServed::Undecided,
                 },
+                Examination::Token(token, due) => {
+                    match authenticate(token, stream, first, due).await {
+                        Ok(true) => HowServed::Command,
+                        Ok(false) => HowServed::Json,
+                        Err(why) => HowServed::Refused {
+                            why: why.to_string(),
+                            is_wrong_token: why == AuthError::Wrong,
+                        },
+                    }
+                }
             },
             #[cfg(feature = "web")]
             DetectedProtocol::Http => {
-                let due = due.unwrap_or_else(|| Instant::now() + HEAD_TIME);
-                let (site, newcomers) = (&self.admission.site, &self.admission.newcomers);
-                // The client takes a slot until its request head is complete.
-                let evicted = async { newcomers.heads.take().evicted().await };
-                let received = tokio::select! {
-                    biased;
-                    received = serve::receive(stream, &mut first.bytes, site, self.ends.local, due) => received,
-                    () = evicted, if auth.is_none() => {
-                        Some(Err(HttpResponse::text(HttpStatus::RequestTimeout, CROWDED).into()))
-                    }
-                };
-                match received {
-                    Some(Ok(outcome)) => HowServed::Web(outcome),
-                    Some(Err(refused)) => HowServed::Refused {
-                        message: RefusalMessage::Http(refused.response),
-                        is_wrong_token: refused.is_wrong_token,
-                    },
-                    None => HowServed::Gone,
-                }
+                let due = examination.due();
+                HowServed::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME))
             }
             DetectedProtocol::Foreign(why) => HowServed::Refused {
-                message: RefusalMessage::Status(why),
+                why,
                 is_wrong_token: false,
             },
             DetectedProtocol::Finished => {
@@ -226,35 +335,32 @@ impl ClientSession {
     }
 
     /// Does what is to be done about a client that the registry knows.
-    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: First, verdict: HowServed)
+    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: BytesMut, verdict: HowServed)
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         match verdict {
-            HowServed::Json(frames) => self.serve_json(stream, id, frames, first).await,
+            HowServed::Json | HowServed::Command | HowServed::Undecided => {
+                self.serve_json(stream, id, first).await;
+            }
             #[cfg(feature = "web")]
-            HowServed::Web(outcome) => self.serve_web(stream, id, outcome, first).await,
-            HowServed::Refused { message, .. } => match message {
-                RefusalMessage::Status(why) => {
-                    let _ = self.shared.registry.send(Disconnect(id)).await;
-                    self.refuse(&mut stream, &why).await;
-                }
-                #[cfg(feature = "web")]
-                RefusalMessage::Http(response) => serve::answer(&mut stream, &response).await,
-            },
+            HowServed::Http(due) => self.serve_http(stream, first, due, None).await,
+            HowServed::Refused { why, .. } => {
+                let _ = self.shared.registry.send(Disconnect(id)).await;
+                self.refuse(&mut stream, &why).await;
+            }
             HowServed::Gone => {}
         }
     }
 
     /// Speaks JSON over the plain stream.
-    async fn serve_json<S>(&self, stream: S, id: ConnectionId, frames: FrameReader, first: First)
+    async fn serve_json<S>(&self, stream: S, id: ConnectionId, first: BytesMut)
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         let (input, output) = tokio::io::split(stream);
-        let reader = self.reader(id, frames, first.unfinished);
-        self.talk(reader, Plain(input), Plain(output), first.bytes)
-            .await;
+        let reader = self.reader(id, FrameReader::new());
+        self.talk(reader, Plain(input), Plain(output), first).await;
     }
 
     /// Reads until the first bytes tell what the client speaks. A client that ends before that counts as one that
@@ -263,46 +369,55 @@ impl ClientSession {
     async fn detect_protocol<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
-        first: &mut First,
-        due: Option<Instant>,
+        first: &mut BytesMut,
+        examination: Examination<'_>,
     ) -> DetectedProtocol {
-        let mut deadline = due;
+        let mut deadline = examination.due();
         loop {
-            let read = tokio::select! {
-                biased;
-                () = self.shared.finished() => return DetectedProtocol::Finished,
-                // A few bytes decide, and there is room for them.
-                read = stream.read_buf(&mut first.bytes) => read,
-                () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
-                    return DetectedProtocol::Foreign(match due {
-                        Some(_) => AuthError::TooLate.to_string(),
-                        None => "what this connection began with did not go on".to_owned(),
-                    });
-                }
-            };
-            if read.unwrap_or(0) == 0 {
-                return DetectedProtocol::Json;
-            }
-            match opening(&first.bytes) {
+            match opening(first) {
                 Opening::Undecided => {
-                    let may_be_foreign = !first.bytes.trim_ascii_start().starts_with(b"{");
+                    let may_be_foreign = !first.trim_ascii_start().starts_with(b"{");
                     let time = if may_be_foreign {
                         HEAD_TIME
                     } else {
                         FRAME_TIME
                     };
-                    if !first.bytes.trim_ascii().is_empty() {
+                    if !first.trim_ascii().is_empty() {
                         deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
                 Opening::Json => return DetectedProtocol::Json,
                 #[cfg(feature = "web")]
-                Opening::Foreign(Foreign::Http) if first.bytes.starts_with(b"GET ") => {
+                Opening::Foreign(Foreign::Http)
+                    if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
+                {
                     return DetectedProtocol::Http;
                 }
                 Opening::Foreign(foreign) => {
                     return DetectedProtocol::Foreign(foreign.explanation().to_owned());
                 }
+            }
+            let read = tokio::select! {
+                biased;
+                () = self.shared.finished() => return DetectedProtocol::Finished,
+                // A few bytes decide, and there is room for them.
+                read = stream.read_buf(first) => read,
+                () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
+                    return match examination {
+                        Examination::Token(..) => {
+                            DetectedProtocol::Foreign(AuthError::TooLate.to_string())
+                        }
+                        Examination::Served => {
+                            let why = "what this connection began with did not go on";
+                            DetectedProtocol::Foreign(why.to_owned())
+                        }
+                        // It is refused like any other client without a place.
+                        Examination::Kept(_) => DetectedProtocol::Json,
+                    };
+                }
+            };
+            if read.unwrap_or(0) == 0 {
+                return DetectedProtocol::Json;
             }
         }
     }
@@ -320,21 +435,12 @@ impl ClientSession {
     }
 }
 
-/// The response to a browser that has waited longest of too many to complete its request.
-#[cfg(feature = "web")]
-const CROWDED: &str = "the head of the request was not complete when too many others came";
-
 /// Closes a client that has waited longest of too many to show its token, and tells it why if it takes that at once.
 async fn refuse_evicted<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
     let why = AuthError::Crowded.to_string();
     let message = match opening(first) {
         #[cfg(feature = "web")]
-        Opening::Foreign(Foreign::Http) => {
-            let response = HttpResponse::text(HttpStatus::Unavailable, &why);
-            [response.head().as_bytes(), response.body()]
-                .concat()
-                .into()
-        }
+        Opening::Foreign(Foreign::Http) => refusal(StatusCode::SERVICE_UNAVAILABLE, &why).into(),
         _ => messages::status(Level::Error, &why, None),
     };
     let tell = async {

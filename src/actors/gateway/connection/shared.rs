@@ -14,28 +14,27 @@ use tokio::sync::Notify;
 
 use super::computations::Computations;
 use super::outgoing::Outgoing;
+use super::unread::UnreadSource;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_RESPONSES_WAITING;
 use crate::actors::gateway::messages::Request;
 use crate::actors::gateway::registry::Registry;
-use crate::actors::resources::budget::{Account, Share};
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::Memory;
 
 /// The state that the actor, its writer and the reading task share; one thread, so plain cells do.
 pub(super) struct Shared {
     /// Who the client is, once the registry knows it.
     pub(super) id: Cell<Option<ConnectionId>>,
     pub(super) registry: Addr<Registry>,
-    /// Counts the memory that the client makes the program hold.
-    pub(super) account: Arc<Account>,
+    /// Where long frames find their room.
+    pub(super) memory: Memory,
     pub(super) outgoing: Rc<Outgoing>,
     computations: RefCell<Computations>,
     /// Set while the client is told why a call failed in `values` too.
     pub(super) wants_text: Arc<AtomicBool>,
     /// Something was written or computed: the reader may go on.
     pub(super) room: Notify,
-    /// Notified when the client loses its place to one that comes.
-    pub(super) displaced: Arc<Notify>,
     /// Nothing more is read; what is queued is still sent.
     finishing: Cell<bool>,
     /// How the connection ends.
@@ -49,27 +48,19 @@ pub(super) enum Ending {
     Orderly,
     /// The client speaks something else, or is one too many: a status says so, and its input is swallowed.
     Refused,
-    /// The client held the most when all clients together held too much.
-    CutOff,
 }
-
-/// Why it is cut off.
-pub(super) const HELD_MOST: &str =
-    "memory: this connection held the most when all clients together held too much";
 
 impl Shared {
     /// Nothing waits, nothing is begun.
-    pub(super) fn new(registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
-        let account = gauges.memory().open();
+    pub(super) fn new(registry: Addr<Registry>, gauges: Arc<Gauges>, unread: UnreadSource) -> Self {
         Self {
             id: Cell::new(None),
             registry,
-            outgoing: Outgoing::new(gauges, Arc::clone(&account)),
-            account,
+            memory: gauges.memory().clone(),
+            outgoing: Outgoing::new(gauges, unread),
             computations: RefCell::default(),
             wants_text: Arc::default(),
             room: Notify::new(),
-            displaced: Arc::default(),
             finishing: Cell::new(false),
             ending: Cell::new(Ending::Orderly),
         }
@@ -94,7 +85,7 @@ impl Shared {
 
     /// Another computation may start: its response would not come on top of too many.
     fn may_compute(&self) -> bool {
-        self.outgoing.response_cost() <= MAX_RESPONSES_WAITING
+        self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
     }
 
     /// So many bytes are on their way to the client: there may be room again.
@@ -108,8 +99,8 @@ impl Shared {
     }
 
     /// Queues a heavy call behind the connection's others.
-    pub(super) fn enqueue_computation(&self, request: Request, share: Share) {
-        self.computations.borrow_mut().push(request, share);
+    pub(super) fn enqueue_computation(&self, request: Request, length: usize) {
+        self.computations.borrow_mut().push(request, length);
         self.start_computation();
     }
 
@@ -153,9 +144,9 @@ impl Shared {
         self.finishing.get()
     }
 
-    /// Whether nothing more is read, computed or encoded.
+    /// Whether nothing more is read or computed.
     pub(super) fn is_done(&self) -> bool {
-        self.is_finishing() && !self.is_computing() && !self.outgoing.is_encoding()
+        self.is_finishing() && !self.is_computing()
     }
 
     /// Waits until nothing more is read.

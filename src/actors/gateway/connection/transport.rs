@@ -12,9 +12,10 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::timeout;
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
+use crate::actors::resources::memory::Permit;
 
 /// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
-pub(super) const CHUNK: usize = 64 * 1024;
+pub(super) const CHUNK: usize = 32 * 1024;
 
 /// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
 /// a socket with unread input resets it.
@@ -26,6 +27,11 @@ pub(super) trait Inbound {
     /// Appends what is there; 0 at the end of the stream, after which the client may still be reading. Where it
     /// fails, the client is gone.
     fn read(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>>;
+
+    /// The room that a long message has taken while it came, if this reads messages.
+    fn take_permit(&mut self) -> Option<Permit> {
+        None
+    }
 
     /// Reads as [`Inbound::read`] does, from a client that was refused: nothing that comes is looked at.
     fn swallow(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>> {

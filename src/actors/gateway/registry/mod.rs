@@ -5,21 +5,22 @@
 
 mod nodes;
 mod ops;
+mod places;
 mod refusal;
 mod state;
 mod tables;
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
+use tokio::time::Instant;
 
 pub use self::nodes::{Attach, Nodes};
-use self::ops::fan_out::Pace;
 use self::refusal::Refusal;
 use self::state::Client;
 pub use self::state::Registry;
 use super::messages::{
-    Connect, Disconnect, Ended, Finish, FinishAll, Handled, PublishInTurn, RefuseCalls, Refused,
-    Request, Retire, SetTap, TakeCensus, Tapped,
+    Connect, CountRefusal, Disconnect, Finish, FinishAll, Handled, RefuseCalls, Refused, Request,
+    Retire, SetTap, TakeCensus, Tapped,
 };
 use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
@@ -37,7 +38,6 @@ impl Handler<Attach> for Registry {
     type Result = ();
 
     fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
-        self.tally.set_replayed(nodes.replayed.clone());
         self.nodes = nodes;
     }
 }
@@ -45,31 +45,40 @@ impl Handler<Attach> for Registry {
 impl Handler<Connect> for Registry {
     type Result = Result<ConnectionId, Refused>;
 
-    fn handle(&mut self, Connect(outlets): Connect, ctx: &mut Context<Self>) -> Self::Result {
+    fn handle(&mut self, connect: Connect, _: &mut Context<Self>) -> Self::Result {
         if self.closed.is_some() {
             return Err(Refused::Closed);
         }
-        if self.clients.len() >= self.max_connections {
-            self.displace();
-            self.schedule_cleanup(ctx);
-        }
-        if self.clients.len() >= self.max_connections {
-            return Err(Refused::Full(self.max_connections));
+        let taken = self.clients.len();
+        if !self.places.has_room(taken, connect.may_use_kept) {
+            return Err(self.places.refusal());
         }
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
-        self.clients.insert(id, Client::new(outlets));
+        let client = Client::new(connect.outlets, connect.from);
+        self.clients.insert(id, client);
         self.gauges.set_connections(self.clients.len() as u64);
         Ok(id)
     }
 }
 
-impl Handler<Ended> for Registry {
+impl Handler<CountRefusal> for Registry {
     type Result = ();
 
-    fn handle(&mut self, Ended(id): Ended, _: &mut Context<Self>) {
-        if self.clients.contains_key(&id) {
-            self.ended.insert(id);
+    fn handle(&mut self, _: CountRefusal, _: &mut Context<Self>) {
+        let Some(refused) = self.places.count_refusal(Instant::now()) else {
+            return;
+        };
+        if let Some((most_from, held)) = self.most_places() {
+            let (places, taken) = (self.places.clients(), self.clients.len());
+            tracing::warn!(
+                places,
+                taken,
+                refused,
+                %most_from,
+                held,
+                "no place is free, so clients are refused; --clients sets the number of places"
+            );
         }
     }
 }
@@ -103,31 +112,22 @@ impl Handler<Disconnect> for Registry {
 impl Handler<Request> for Registry {
     type Result = Handled;
 
-    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, mut request: Request, ctx: &mut Context<Self>) -> Handled {
         if !self.clients.contains_key(&request.from) {
             return Handled::at_once();
         }
-        self.perform(request, ctx)
+        self.permit = request.permit.take();
+        let handled = self.perform(request, ctx);
+        self.permit = None;
+        handled
     }
 }
 
 impl Handler<Publish> for Registry {
     type Result = ();
 
-    fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
-        self.publish_own(publish, None);
-    }
-}
-
-impl Handler<PublishInTurn> for Registry {
-    type Result = Handled;
-
-    fn handle(&mut self, PublishInTurn(messages): PublishInTurn, _: &mut Context<Self>) -> Handled {
-        let mut pace = Pace::default();
-        for message in messages {
-            self.publish_own(message, Some(&mut pace));
-        }
-        pace.and(Handled::at_once())
+    fn handle(&mut self, publish: Publish, ctx: &mut Context<Self>) {
+        self.publish_own(publish, ctx);
     }
 }
 
@@ -147,11 +147,8 @@ impl Handler<Respond> for Registry {
                     service,
                     frame: &frame,
                 });
-                // A `Caller` has counted it.
-                client.pass(frame, respond.service);
-            } else {
-                client.send(frame);
             }
+            client.respond(frame, respond.service);
         }
     }
 }

@@ -2,20 +2,19 @@
 //!
 //! **Invariant:** every sentence begins with the field it is about, or names the service.
 
-use crate::actors::gateway::limits::{
-    MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
-    MAX_WAITING_GOALS,
-};
+use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
+use crate::protocol::op::Problem;
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
     #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
     RuntimeTopic(String),
-    #[error("topic: a connection advertises at most {MAX_ADVERTISED} topics")]
-    TooManyAdvertised,
-    #[error("topic: a connection holds at most {MAX_SUBSCRIPTIONS} subscriptions")]
-    TooManySubscriptions,
+    #[error(
+        "this connection keeps too much: its subscriptions, advertisements and services, and its calls and goals that \
+         wait for other clients, may take {MAX_KEPT} bytes, each {ENTRY_BYTES} and three times its names"
+    )]
+    TooMuchKept,
     #[error(
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]
@@ -24,12 +23,18 @@ pub(crate) enum Refusal {
     LongSubscriptionId(usize),
     #[error("service: {0} is provided by the runtime itself")]
     RuntimeService(String),
-    #[error("service: a connection provides at most {MAX_PROVIDED} services and actions")]
-    TooManyProvided,
     #[error("service: this connection does not provide {0}")]
     NotProvider(String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
+    #[error("{0}")]
+    Unreadable(Problem),
+    #[error("the answer of {0} was discarded: {1}")]
+    BadAnswer(String, Box<Self>),
+    #[error("service: the call with this id is of {0}")]
+    OtherService(String),
+    #[error("action: the goal with this id is of {0}")]
+    OtherAction(String),
     #[error("args must be an object or an array")]
     BadArguments,
     #[error("no provider for service {0}")]
@@ -44,8 +49,6 @@ pub(crate) enum Refusal {
         "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
     )]
     CallerBusy(String),
-    #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
-    TooManyWaiting,
     #[error("action: {0} is served by the runtime itself")]
     RuntimeAction(String),
     #[error("action: this connection does not serve {0}")]
@@ -54,8 +57,6 @@ pub(crate) enum Refusal {
     StaleGoal(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]
     NoGoal(String),
-    #[error("at most {MAX_WAITING_GOALS} goals of a connection are carried out by other clients")]
-    TooManyGoals,
     #[error("action: no action is called {0}")]
     NoAction(String),
     #[error("action_type must be {0}")]

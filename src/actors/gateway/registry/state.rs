@@ -3,7 +3,8 @@
 //! **Invariant:** what a client has registered stands here as long as the client does, and then until the cleanup takes
 //! it.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,19 +14,21 @@ use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::nodes::Nodes;
+use super::places::Places;
 use super::refusal::Refusal;
 use super::tables::action_servers::ActionServers;
 use super::tables::census::{Tally, Use};
+use super::tables::kept::{Kept, KeptEntry};
 use super::tables::leftovers::{Leftovers, Registration};
 use super::tables::services::{Forwarded, Services};
 use super::tables::tap::TapPoint;
 use super::tables::topics::{Subscription, Topics};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
 use crate::actors::gateway::messages::{Outlets, Response};
 use crate::actors::node::Interest;
-use crate::actors::resources::budget::Share;
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::{Permit, cover};
+use crate::options::DEFAULT_CLIENTS;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self as frames, ErrorForm, Level};
 use crate::protocol::names;
@@ -50,32 +53,38 @@ pub struct Registry {
     /// Counts what clients use and provide, for those who ask what there is.
     pub(super) tally: Tally,
     pub(super) gauges: Arc<Gauges>,
-    /// Clients that have stopped sending: the oldest gives way where all places are taken.
-    pub(super) ended: BTreeSet<ConnectionId>,
-    /// Clients at once.
-    pub(super) max_connections: usize,
+    pub(super) places: Places,
     pub(super) connections_made: u64,
     /// Copies what passes to the recorder, while it records.
     pub(super) tap: TapPoint,
     /// Why no call is taken any more, once the runtime is ending.
     pub(super) closed: Option<&'static str>,
+    /// The room that the frame takes whose op is being performed, if it is a long one.
+    pub(super) permit: Option<Permit>,
 }
 
 /// One client, as the registry knows it.
 pub(crate) struct Client {
     pub(super) outlets: Outlets,
-    /// Topics, each with what it takes.
-    pub(super) advertised: HashMap<Box<str>, Share>,
+    /// Its address.
+    pub(super) from: IpAddr,
+    /// What all that follows takes, and calls and goals that wait for other clients.
+    pub(super) kept: Kept,
+    pub(super) advertised: HashMap<Box<str>, KeptEntry>,
     /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
     /// dropped until it advertises again.
     pub(super) withdrawn: HashSet<Topic>,
     /// Its subscriptions, in order of the topics' names: their owners hear of the client's going in that order.
     pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
-    pub(super) provided: HashMap<Box<str>, Share>,
+    pub(super) provided: HashMap<Box<str>, KeptEntry>,
     /// Actions that it serves.
-    pub(super) served_actions: HashMap<Box<str>, Share>,
+    pub(super) served_actions: HashMap<Box<str>, KeptEntry>,
     /// Statuses that it wants.
     pub(super) verbosity: Verbosity,
+    /// Ends with the client.
+    pub(super) present: Arc<()>,
+    /// Ends with the client, and when it unsubscribes from the feedback of goals that it has published.
+    pub(super) listening: Arc<()>,
     /// A guard that is dropped once no call of this client waits, if it has stopped sending.
     pub(super) answered: Option<oneshot::Sender<()>>,
 }
@@ -96,34 +105,36 @@ impl Registry {
             fragmented: Arc::default(),
             tally: Tally::default(),
             gauges,
-            ended: BTreeSet::new(),
-            max_connections: MAX_CONNECTIONS,
+            places: Places::of(DEFAULT_CLIENTS),
             connections_made: 0,
             tap: TapPoint::default(),
             closed: None,
+            permit: None,
         }
     }
 
     /// A registry without nodes, for at most so many clients at once.
     #[must_use]
-    pub fn serving_at_most(self, max_connections: usize) -> Self {
-        Self {
-            max_connections,
-            ..self
-        }
+    pub fn serving_at_most(self, clients: usize) -> Self {
+        let places = Places::of(clients);
+        Self { places, ..self }
     }
 }
 
 impl Client {
-    pub(super) fn new(outlets: Outlets) -> Self {
+    pub(super) fn new(outlets: Outlets, from: IpAddr) -> Self {
         Self {
             outlets,
+            from,
+            kept: Kept::default(),
             advertised: HashMap::new(),
             withdrawn: HashSet::new(),
             subscriptions: BTreeMap::new(),
             provided: HashMap::new(),
             served_actions: HashMap::new(),
             verbosity: Verbosity::ALL,
+            present: Arc::default(),
+            listening: Arc::default(),
             answered: None,
         }
     }
@@ -135,11 +146,6 @@ impl Client {
 
     /// Sends a response, of one of the runtime's own services if there is one given.
     pub(super) fn respond(&self, frame: Bytes, service: Option<Service>) {
-        self.pass(self.outlets.account.count(frame), service);
-    }
-
-    /// Sends a response that has been counted already.
-    pub(super) fn pass(&self, frame: Bytes, service: Option<Service>) {
         self.outlets.respond.do_send(Response { frame, service });
     }
 
@@ -155,11 +161,6 @@ impl Client {
     pub(super) fn subscription(&self, topic: &str, id: Option<&str>) -> Option<&Subscription> {
         let mut of_topic = self.subscriptions.get(topic)?.iter();
         of_topic.find(|one| one.id.as_deref() == id)
-    }
-
-    /// Takes the share of a registration whose names have so many bytes.
-    pub(super) fn register(&self, bytes: usize) -> Share {
-        self.outlets.account.take(REGISTRATION_BYTES + 3 * bytes)
     }
 
     /// Bytes of responses that it has not taken yet.
@@ -179,10 +180,10 @@ impl Registry {
         let provided = std::mem::take(&mut client.provided).into_iter();
         let served_actions = std::mem::take(&mut client.served_actions).into_iter();
         let registrations = advertised
-            .map(|(topic, share)| Registration::Advertised(topic, share))
+            .map(|(topic, entry)| Registration::Advertised(topic, entry))
             .chain(subscriptions.map(|(topic, all)| Registration::Subscribed(topic, all)))
-            .chain(provided.map(|(service, share)| Registration::Provided(service, share)))
-            .chain(served_actions.map(|(action, share)| Registration::ServedAction(action, share)));
+            .chain(provided.map(|(service, entry)| Registration::Provided(service, entry)))
+            .chain(served_actions.map(|(action, entry)| Registration::ServedAction(action, entry)));
         self.leftovers
             .add_registrations(id, Box::new(registrations));
         let goals = self.action_servers.take_numbers(id);
@@ -193,12 +194,12 @@ impl Registry {
     /// Withdraws one thing that a client had registered.
     pub(super) fn withdraw_one(&mut self, id: ConnectionId, registration: Registration) {
         match registration {
-            Registration::Advertised(topic, _share) => self.tally.remove(&topic, Use::Advertised),
-            Registration::Subscribed(topic, _shares) => self.drop_subscriber(&topic, id),
-            Registration::Provided(service, _share) => {
+            Registration::Advertised(topic, _entry) => self.tally.remove(&topic, Use::Advertised),
+            Registration::Subscribed(topic, _entries) => self.drop_subscriber(&topic, id),
+            Registration::Provided(service, _entry) => {
                 self.withdraw_service(&service, id);
             }
-            Registration::ServedAction(action, _share) => {
+            Registration::ServedAction(action, _entry) => {
                 self.withdraw_action(&action, id);
             }
         }
@@ -209,23 +210,19 @@ impl Registry {
         self.withdraw(id);
         self.services.forget_caller(id);
         self.action_servers.forget_sender(id);
-        self.ended.remove(&id);
         if let Some(client) = self.clients.remove(&id) {
             client.outlets.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
         }
     }
 
-    /// Has the oldest client that has stopped sending give way, if there is one.
-    pub(super) fn displace(&mut self) {
-        let Some(oldest) = self.ended.first().copied() else {
-            return;
-        };
-        tracing::debug!(connection = oldest.0, "has lost its place");
-        if let Some(client) = self.clients.get(&oldest) {
-            client.outlets.displaced.notify_one();
+    /// Returns the address that has most places, and how many.
+    pub(super) fn most_places(&self) -> Option<(IpAddr, usize)> {
+        let mut held: BTreeMap<IpAddr, usize> = BTreeMap::new();
+        for client in self.clients.values() {
+            *held.entry(client.from).or_default() += 1;
         }
-        self.forget(oldest);
+        held.into_iter().max_by_key(|(_, held)| *held)
     }
 
     /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
@@ -233,6 +230,12 @@ impl Registry {
         let name = names::absolute(topic);
         self.topics.remove(topic, connection);
         self.tally.remove(&name, Use::Subscribed);
+        if let Some(client) = self.clients.get_mut(&connection)
+            && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
+            && !names::spellings(&name).any(|one| client.subscriptions.contains_key(one))
+        {
+            client.listening = Arc::default();
+        }
         if !self.topics.has_subscribers(&name) {
             self.topics.forget_sizes(&name);
         }
@@ -248,6 +251,11 @@ impl Registry {
             self.tally.withdraw(service);
         }
         provided
+    }
+
+    /// The frame, with the room that the long frame takes which it has come of.
+    pub(super) fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
     }
 
     /// Whether messages on the topic of that absolute name are to be made.

@@ -8,7 +8,11 @@
 
 mod services;
 
+use std::sync::Arc;
+use std::time::Duration;
+
 use actix::prelude::*;
+use tokio::time::sleep;
 
 pub(super) use self::services::read_change;
 pub use self::services::{
@@ -16,7 +20,7 @@ pub use self::services::{
     ParamChange, ParameterValue, SetParam, Unknown,
 };
 use crate::actors::arm::sim::{
-    ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
+    ArmSim, SetGains, SetIntegrator, SetParams, SetPeriod, SimulationTime, joint_names,
 };
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
@@ -25,8 +29,11 @@ use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{self, Node, Service};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
+use crate::protocol::ros::rosapi::Census;
 use crate::protocol::ros::urdf;
 
+/// Pause between two tries to find room for a long list.
+const ROOM_RETRY: Duration = Duration::from_millis(10);
 /// Topics, services and actions of clients beyond which an answer may list more than can be written in a turn.
 const MANY: usize = 64;
 
@@ -47,6 +54,8 @@ pub struct ArmParameters<const N: usize> {
     pub gains: Recipient<Call<SetGains<N>>>,
     /// Method and timestep.
     pub integrator: Recipient<Call<SetIntegrator>>,
+    /// The control period.
+    pub period: Recipient<Call<SetPeriod>>,
     /// Time.
     pub time: Recipient<SimulationTime>,
 }
@@ -59,6 +68,7 @@ impl<const N: usize> ArmParameters<N> {
             params: arm.clone().recipient(),
             gains: arm.clone().recipient(),
             integrator: arm.clone().recipient(),
+            period: arm.clone().recipient(),
             time: arm.clone().recipient(),
         }
     }
@@ -107,13 +117,9 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
         } = call;
         let registry = self.registry.clone();
         let answered = async move {
-            let answer = move |census| {
-                let mut pieces = reply.answer_in_pieces(Listing { look, census });
-                while !pieces.advance() {}
-            };
             let short = TakeCensus { at_most: MANY };
             if let Ok(Some(census)) = registry.send(short).await {
-                return answer(census);
+                return list(&mut reply, look, census);
             }
             // However many wait, a census is kept alive by those alone who are at work.
             let Some(place) = PlaceAside::take(Errand::Listing).await else {
@@ -124,10 +130,19 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
             };
             let census = registry.send(whole).await.ok().flatten();
             let census = census.unwrap_or_default();
-            place.perform(move || answer(census)).await;
+            while reply.reserve(census.most_bytes()).is_err() {
+                sleep(ROOM_RETRY).await;
+            }
+            place.perform(move || list(&mut reply, look, census)).await;
         };
         ctx.spawn(answered.into_actor(self));
     }
+}
+
+/// Answers with what was asked about a census.
+fn list(reply: &mut Reply<Listing>, look: Look, census: Arc<Census>) {
+    let mut pieces = reply.answer_in_pieces(Listing { look, census });
+    while !pieces.advance() {}
 }
 
 impl<const N: usize> Handler<Call<GetTime>> for RosapiNode<N> {
@@ -253,6 +268,10 @@ pub(super) async fn value<const N: usize>(
                 _ => Number(integrator.timestep),
             }
         }
+        Parameter::ControlPeriod => {
+            let sampling = ask(&arm.period, SetPeriod::default()).await?.values;
+            Number(sampling.period.period)
+        }
     })
 }
 
@@ -265,5 +284,6 @@ pub(super) async fn change_parameter<const N: usize>(
         ParamChange::Params(params) => ask(&arm.params, params).await?.rejected,
         ParamChange::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
         ParamChange::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
+        ParamChange::Period(period) => ask(&arm.period, period).await?.rejected,
     })
 }

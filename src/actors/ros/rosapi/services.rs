@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams};
+use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams, SetPeriod};
 use crate::actors::node::Ask;
 use crate::actors::wire::{Address, Answered, Callable, Streamed};
 use crate::protocol::catalog::{self, Service};
@@ -104,6 +104,8 @@ pub enum ParamChange<const N: usize> {
     Gains(SetGains<N>),
     /// Method or timestep.
     Integrator(SetIntegrator),
+    /// The control period.
+    Period(SetPeriod),
 }
 
 /// Why a parameter was not set.
@@ -220,7 +222,8 @@ impl Streamed for Look {
 // ---- time -----------------------------------------------------------------------------------------------------------
 
 impl Callable for GetTime {
-    fn read(_: Service, _: &Arguments) -> Result<Self, Rejections> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        Fields::read(arguments, service)?;
         Ok(Self)
     }
 }
@@ -325,6 +328,11 @@ pub(in crate::actors::ros) fn read_change<const N: usize>(
     Ok(match service {
         Service::SetParams => ParamChange::Params(SetParams::request(fields)),
         Service::SetGains => ParamChange::Gains(SetGains::request(fields)),
+        Service::SetPeriod => {
+            let mut change = SetPeriod::request(fields);
+            change.rejected.rename(field, parameter.name());
+            ParamChange::Period(change)
+        }
         _ => {
             let mut change = SetIntegrator::request(fields);
             change.rejected.rename(field, parameter.name());

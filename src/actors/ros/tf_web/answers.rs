@@ -1,4 +1,4 @@
-//! The frames that somebody has wished for by a topic, under the name of that wish.
+//! The feedback of a published wish, under the name of that wish.
 //!
 //! **Invariant:** the fields are those of the catalogue.
 

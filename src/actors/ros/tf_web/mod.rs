@@ -4,13 +4,17 @@
 //! sends a goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names
 //! as feedback, seen from the frame that it names, at its rate.
 //!
-//! **Invariant:** nothing is asked of the arm while nobody wants frames; at most [`MAX_WISHES`] wishes are kept, and a
-//! client with few loses none to one with many.
+//! A wish belongs to its connection and ends with it. A published one also ends when that connection unsubscribes from
+//! the feedback.
+//!
+//! **Invariant:** the arm is not asked while there is no wish and no subscriber. A connection has at most
+//! [`MAX_WISHES`] wishes.
 
 mod answers;
 mod wire;
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
+use std::sync::Weak;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -27,23 +31,20 @@ use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
-/// Wishes for frames that are kept; the oldest of the client with most gives way, for a viewer may go without a word.
-pub const MAX_WISHES: usize = 64;
+/// Wishes for frames of one connection; the oldest one ends when another comes.
+pub const MAX_WISHES: usize = 4;
 /// Frames that one wish may name.
 pub const MAX_FRAMES: usize = 32;
 /// Time between two looks at the arm, and so the shortest between two messages.
 const PERIOD: Duration = Duration::from_micros(16_667);
 /// Time between two messages of the topic.
 const TOPIC_PERIOD: Duration = Duration::from_millis(33);
-/// Messages of all wishes in one look, of which 60 come in a second: each message takes up to 30 us of the gateway's
-/// thread.
-const AT_ONCE: usize = 16;
-/// Messages of published wishes among them: each goes to all who subscribe.
-const TOPIC_AT_ONCE: usize = 5;
+/// Messages of all wishes in one look, of which 60 come in a second: a message takes up to 30 us of the gateway's
+/// thread, and a published wish's goes to all who subscribe.
+const AT_ONCE: usize = 5;
 
-/// The end of a wish that gives way.
-const GIVEN_WAY: &str =
-    "the oldest of this client's goals gives way: there are too many, and this client has most";
+/// The end of a wish when its connection has too many.
+const TOO_MANY: &str = "the oldest of this client's goals ends: it has too many";
 /// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
 const NOT_KEPT: &str = "id must be that of a goal of this connection";
 
@@ -75,8 +76,15 @@ pub struct WishFrames {
 pub enum Wisher {
     /// A client that has sent a goal of the action.
     Client(Box<ActionClient>),
-    /// Somebody who has published a goal of this id.
-    Topic(String),
+    /// A client that has published a goal.
+    Topic {
+        /// The goal's id.
+        id: String,
+        /// The client.
+        connection: ConnectionId,
+        /// Ends when the client no longer listens.
+        listening: Weak<()>,
+    },
 }
 
 /// The end of a wish. From clients, in the same ways.
@@ -99,8 +107,6 @@ pub struct TfRepublisher<const N: usize> {
     wishes: VecDeque<(WishFrames, Instant)>,
     /// When the topic is due next, while somebody subscribes to it.
     topic: Option<Instant>,
-    /// Whether anybody would hear of published goals.
-    feedback_is_wanted: bool,
     timer: Option<SpawnHandle>,
 }
 
@@ -113,7 +119,6 @@ impl<const N: usize> TfRepublisher<N> {
             publish,
             wishes: VecDeque::new(),
             topic: None,
-            feedback_is_wanted: false,
             timer: None,
         }
     }
@@ -139,14 +144,13 @@ impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, wish: WishFrames, ctx: &mut Context<Self>) {
-        // It would be there after the last who could hear of it had gone.
-        if matches!(wish.by, Wisher::Topic(_)) && !self.feedback_is_wanted {
-            return;
-        }
-        if self.wishes.len() >= MAX_WISHES
-            && let Some((oldest, _)) = self.oldest_of_most().and_then(|at| self.wishes.remove(at))
+        self.forget_gone();
+        let of_client = |(one, _): &(WishFrames, Instant)| one.client() == wish.client();
+        let oldest = self.wishes.iter().position(of_client);
+        if self.wishes.iter().filter(|one| of_client(one)).count() >= MAX_WISHES
+            && let Some((oldest, _)) = oldest.and_then(|at| self.wishes.remove(at))
         {
-            oldest.end(GoalStatus::Aborted, GIVEN_WAY);
+            oldest.end(GoalStatus::Aborted, TOO_MANY);
         }
         self.wishes.push_back((wish, Instant::now()));
         self.keep_timer(ctx);
@@ -161,7 +165,7 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
             ForgetFrames::Of(who) => {
                 let is_meant = |wish: &WishFrames| match &wish.by {
                     Wisher::Client(client) => client.is(&who.goal),
-                    Wisher::Topic(_) => false,
+                    Wisher::Topic { .. } => false,
                 };
                 let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
                 match at.and_then(|at| self.wishes.remove(at)) {
@@ -169,7 +173,10 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
                     None => who.refuse(NOT_KEPT),
                 }
             }
-            ForgetFrames::Published(id) => self.forget_published(id.as_deref()),
+            ForgetFrames::Published(id) => self.wishes.retain(|(wish, _)| match &wish.by {
+                Wisher::Client(_) => true,
+                Wisher::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
+            }),
         }
         self.keep_timer(ctx);
     }
@@ -179,14 +186,8 @@ impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
-        match (interest.topic, interest.wanted) {
-            (Topic::TfWeb, wanted) => self.topic = wanted.then(Instant::now),
-            (_, wanted) => {
-                self.feedback_is_wanted = wanted;
-                if !wanted {
-                    self.forget_published(None);
-                }
-            }
+        if interest.topic == Topic::TfWeb {
+            self.topic = interest.wanted.then(Instant::now);
         }
         self.keep_timer(ctx);
     }
@@ -213,36 +214,24 @@ impl WishFrames {
         }
     }
 
-    /// The client; none of who has published, which nobody knows.
-    fn client(&self) -> Option<ConnectionId> {
+    fn client(&self) -> ConnectionId {
         match &self.by {
-            Wisher::Client(client) => Some(client.connection),
-            Wisher::Topic(_) => None,
+            Wisher::Client(client) => client.connection,
+            Wisher::Topic { connection, .. } => *connection,
         }
     }
 
     fn is_gone(&self) -> bool {
-        matches!(&self.by, Wisher::Client(client) if client.is_gone())
+        match &self.by {
+            Wisher::Client(client) => client.is_gone(),
+            Wisher::Topic { listening, .. } => listening.strong_count() == 0,
+        }
     }
 }
 
 impl<const N: usize> TfRepublisher<N> {
-    /// The place of the oldest wish of the client that has most of them; all that are published count as one's.
-    fn oldest_of_most(&self) -> Option<usize> {
-        let mut clients = self.wishes.iter().map(|(wish, _)| wish.client());
-        let mut counts: HashMap<_, usize> = HashMap::new();
-        for client in clients.clone() {
-            *counts.entry(client).or_default() += 1;
-        }
-        let most = counts.values().max().copied();
-        clients.position(|client| counts.get(&client).copied() == most)
-    }
-
-    fn forget_published(&mut self, id: Option<&str>) {
-        self.wishes.retain(|(wish, _)| match &wish.by {
-            Wisher::Client(_) => true,
-            Wisher::Topic(own) => id.is_some_and(|id| id != own),
-        });
+    fn forget_gone(&mut self) {
+        self.wishes.retain(|(wish, _)| !wish.is_gone());
     }
 
     /// A timer while anybody wants frames, and none otherwise.
@@ -260,7 +249,7 @@ impl<const N: usize> TfRepublisher<N> {
 
     /// Asks the arm where it is, and tells those who are due.
     fn look(&mut self, ctx: &mut Context<Self>) {
-        self.wishes.retain(|(wish, _)| !wish.is_gone());
+        self.forget_gone();
         self.keep_timer(ctx);
         let asked = self.arm.send(ArmPose).into_actor(self);
         ctx.wait(asked.map(|pose, node, _| {
@@ -289,18 +278,13 @@ impl<const N: usize> TfRepublisher<N> {
             .collect();
         // The longest due come first.
         due.sort_by_key(|(_, due)| *due);
-        let mut published = 0;
-        let within_limits = due.into_iter().filter(|(wish, _)| {
-            let is_published = matches!(wish.by, Wisher::Topic(_));
-            published += usize::from(is_published);
-            !is_published || published <= TOPIC_AT_ONCE
-        });
-        for (wish, due) in within_limits.take(AT_ONCE) {
-            *due = next(*due, wish.period, now);
+        for (order, (wish, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
+            // A nanosecond keeps the order: wishes that are due at all times take turns.
+            *due = next(*due, wish.period, now + Duration::from_nanos(order));
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
                 Wisher::Client(client) => client.feed_back(message),
-                Wisher::Topic(id) => {
+                Wisher::Topic { id, .. } => {
                     let message = answers::feedback(stamp, id.clone(), message);
                     publish(&self.publish, Topic::TfWebFeedback, message);
                 }
@@ -309,7 +293,7 @@ impl<const N: usize> TfRepublisher<N> {
     }
 }
 
-/// When that is due again which was due at `due` and comes `now`: lateness is made up for, but not more than a period.
+/// The next due time of a message that was due at `due` and comes `now`. A delay of up to a period is made up for.
 fn next(due: Instant, period: Duration, now: Instant) -> Instant {
     (due + period).max(now)
 }

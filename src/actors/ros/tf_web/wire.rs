@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** a wish names frames that the arm has; others are refused by name.
 
+use std::sync::Weak;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -81,32 +82,23 @@ fn requests<const N: usize>(
         ActionRequest::Goal {
             arguments, client, ..
         } => match read_wish(&arguments, N) {
-            Ok(read) => wish.do_send(read.by(Wisher::Client(Box::new(client)))),
+            Ok((sources, target, period)) => wish.do_send(WishFrames {
+                sources,
+                target,
+                period,
+                by: Wisher::Client(Box::new(client)),
+            }),
             Err(rejections) => client.refuse(&rejections.status()),
         },
         ActionRequest::Cancel { from, .. } => forget.do_send(ForgetFrames::Of(from)),
     })
 }
 
-/// A wish, without who wishes it.
-struct ReadWish {
-    sources: Vec<String>,
-    target: String,
-    period: Duration,
-}
-
-impl ReadWish {
-    fn by(self, by: Wisher) -> WishFrames {
-        WishFrames {
-            sources: self.sources,
-            target: self.target,
-            period: self.period,
-            by,
-        }
-    }
-}
-
-fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections> {
+/// The source frames, the target frame and the period of a wish.
+fn read_wish(
+    arguments: &Arguments,
+    links: usize,
+) -> Result<(Vec<String>, String, Duration), Rejections> {
     let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
     let sources = fields.texts("source_frames", MAX_FRAMES);
     let target = fields
@@ -119,15 +111,9 @@ fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections
     }
     match (sources, target, fields.accepted()) {
         (Some(sources), Some(target), true) => {
-            let rate = rate
-                .filter(|rate| *rate > 0.0)
-                .unwrap_or(RATE)
-                .max(LEAST_RATE);
-            Ok(ReadWish {
-                sources,
-                target,
-                period: Duration::from_secs_f64(1.0 / rate),
-            })
+            let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
+            let period = Duration::from_secs_f64(rate.max(LEAST_RATE).recip());
+            Ok((sources, target, period))
         }
         _ => Err(fields.finish()),
     }
@@ -137,15 +123,15 @@ fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections
 
 /// Goals that are published; an error status for what is none.
 fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_goal(message.heard.msg.raw(), N) {
+    Box::new(move |message| match read_goal(&message, N) {
         Ok(goal) => wish.do_send(goal),
         Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
     })
 }
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
-fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
-    let [id, goal] = members(msg, &["goal_id", "goal"])?;
+fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejections> {
+    let [id, goal] = members(message.heard.msg.raw(), &["goal_id", "goal"])?;
     let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
     let id = id.and_then(|[id]| json::text(id?));
     let id = id.ok_or_else(|| refused("goal_id.id", &"must be a string"))?;
@@ -155,8 +141,18 @@ fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
     }
     let id = id.into_owned();
     let goal = goal.ok_or_else(|| refused("goal", &"is required"))?;
-    let read = read_wish(&Arguments::Object(goal.into()), links)?;
-    Ok(read.by(Wisher::Topic(id)))
+    let (sources, target, period) = read_wish(&Arguments::Object(goal.into()), links)?;
+    let by = Wisher::Topic {
+        id,
+        connection: message.connection,
+        listening: Weak::clone(&message.listening),
+    };
+    Ok(WishFrames {
+        sources,
+        target,
+        period,
+        by,
+    })
 }
 
 /// Ends of such goals; an error status for what is none.

@@ -39,8 +39,8 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
         let mut seats = Vec::with_capacity(PAIRS * Wide::<S, K>::LANES);
         for lanes in &mut pairs {
             for lane in 0..Wide::<S, K>::LANES {
-                let seat = waiting.next();
-                if let Some(seat) = &seat {
+                let mut seat = waiting.next();
+                if let Some(seat) = &mut seat {
                     lanes.seat(lane, seat);
                 }
                 seats.push(seat);
@@ -109,14 +109,19 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
                         seat.end(false);
                         lanes.rest(lane);
                         *place = None;
-                    } else if push_ends {
-                        lanes.end_push(lane);
+                    } else {
+                        if push_ends {
+                            lanes.end_push(lane);
+                        }
+                        if seat.ends_period() {
+                            lanes.begin_period(lane, seat);
+                        }
                     }
                 }
                 if place.is_none()
-                    && let Some(next) = self.waiting.next()
+                    && let Some(mut next) = self.waiting.next()
                 {
-                    lanes.seat(lane, &next);
+                    lanes.seat(lane, &mut next);
                     *place = Some(next);
                 }
             }

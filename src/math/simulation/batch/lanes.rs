@@ -99,6 +99,8 @@ pub(super) struct Lanes<T, const N: usize> {
     gains: Gains<N, T>,
     setpoint: Setpoint<N, T>,
     timestep: T,
+    /// The effort where no law runs: held, commanded or driven.
+    given: [T; N],
     /// The disturbance; -0 where there is none, which changes no number when it is added.
     push: [T; N],
 }
@@ -128,19 +130,22 @@ impl<T: Number, const N: usize> Lanes<T, N> {
                 velocity: [zero; N],
             },
             timestep: zero,
+            given: [zero; N],
             push: [zero; N],
         }
     }
 
     /// Puts an arm into a lane.
-    pub(super) fn seat(&mut self, lane: usize, seat: &Seat<'_, N>) {
+    pub(super) fn seat(&mut self, lane: usize, seat: &mut Seat<'_, N>) {
+        let state = seat.arm.state;
+        let integral = seat.begin_period(&state, || [0.0; N]);
         let arm = &*seat.arm;
         let (gains, setpoint) = (arm.pid.gains(), arm.pid.setpoint());
         let moving = Moving {
             state: arm.state,
             carry: arm.carry,
             effort: arm.effort,
-            integral: *arm.pid.integral(),
+            integral,
         };
         let push = match arm.disturbance {
             Some(disturbance) if seat.is_pushed() => disturbance.effort,
@@ -155,6 +160,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
                 gains: *gains,
                 setpoint: *setpoint,
                 timestep: arm.timestep,
+                given: seat.given(),
                 push,
             },
         );
@@ -164,6 +170,18 @@ impl<T: Number, const N: usize> Lanes<T, N> {
     pub(super) fn end_push(&mut self, lane: usize) {
         for push in &mut self.push {
             push.set_lane(lane, -0.0);
+        }
+    }
+
+    /// Begins a control period in a lane.
+    pub(super) fn begin_period(&mut self, lane: usize, seat: &mut Seat<'_, N>) {
+        let integral = seat.begin_period(&self.moving.state(lane), || {
+            joints_in(lane, &self.moving.integral)
+        });
+        let given = seat.given();
+        for i in 0..N {
+            self.moving.integral[i].set_lane(lane, integral[i]);
+            self.given[i].set_lane(lane, given[i]);
         }
     }
 
@@ -188,6 +206,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
             set(&mut self.gains.kd[i], arm.gains.kd[i]);
             set(&mut self.setpoint.position[i], arm.setpoint.position[i]);
             set(&mut self.setpoint.velocity[i], arm.setpoint.velocity[i]);
+            set(&mut self.given[i], arm.given[i]);
             set(&mut self.push[i], arm.push[i]);
         }
         set(&mut self.gravity, arm.gravity);
@@ -214,7 +233,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
             law(&self.gains, &self.setpoint, integral, state, self.timestep)
         } else {
             Control {
-                effort: [zero; N],
+                effort: self.given,
                 integral: *integral,
             }
         };

@@ -7,14 +7,14 @@ use std::ops::ControlFlow;
 use crate::math::arm::State;
 use crate::math::count::partition_point;
 use crate::math::integrator::Method;
-use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::leaves_out_first_angle;
+use crate::math::simulation::{Held, Simulation};
 
 /// How a step is taken, the same in all lanes of a register.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StepKind {
     pub(super) method: Method,
-    /// Whether the controller is on.
+    /// Whether the control law runs in every step.
     pub(super) controlled: bool,
     /// Whether the dynamics look at the first angle.
     pub(super) weighs: bool,
@@ -27,7 +27,7 @@ impl StepKind {
     pub(super) fn of<const N: usize>(arm: &Simulation<N>) -> Self {
         Self {
             method: arm.method,
-            controlled: arm.pid.is_enabled(),
+            controlled: arm.pid.is_enabled() && arm.hold.every_step,
             weighs: !leaves_out_first_angle(&arm.arm),
         }
     }
@@ -61,7 +61,23 @@ pub(super) struct Seat<'a, const N: usize> {
     left: u64,
     /// How many steps its disturbance acts in.
     pushes: u64,
+    /// The control period that it is in, where that may have several steps.
+    period: Option<HeldSteps<N>>,
     observer: Option<Observer<'a, N>>,
+}
+
+/// A control period, or the rest of one, in which the effort is given.
+struct HeldSteps<const N: usize> {
+    effort: [f64; N],
+    /// What the arm holds before it, and after the first step.
+    before: Held<N>,
+    after_one: Held<N>,
+    /// Steps that have been taken.
+    taken: u64,
+    /// The integral before it \[rad s\].
+    integral: [f64; N],
+    /// Whether it ends by itself: not where the controller is off or the arm is driven by hand.
+    ends: bool,
 }
 
 impl<'a, const N: usize> Seat<'a, N> {
@@ -77,8 +93,52 @@ impl<'a, const N: usize> Seat<'a, N> {
             taken: 0,
             left: steps,
             pushes,
+            period: None,
             observer,
         }
+    }
+
+    /// The effort where no law runs in every step \[N m\].
+    pub(super) fn given(&self) -> [f64; N] {
+        match &self.period {
+            Some(period) => period.effort,
+            None => [0.0; N],
+        }
+    }
+
+    /// Whether the law may be due.
+    pub(super) fn ends_period(&self) -> bool {
+        self.period
+            .as_ref()
+            .is_some_and(|period| period.left() == 0)
+    }
+
+    /// Begins a control period in `state`, if it has several steps; `integral` is as of now. Answers the integral in
+    /// it.
+    pub(super) fn begin_period(
+        &mut self,
+        state: &State<N>,
+        integral: impl FnOnce() -> [f64; N],
+    ) -> [f64; N] {
+        if let Some(period) = self.period.take() {
+            self.arm.hold.held = period.held();
+            self.arm.pid.commit(integral());
+        }
+        let before = *self.arm.pid.integral();
+        if self.arm.hold.every_step {
+            return before;
+        }
+        let (hold, pid) = (&self.arm.hold, &self.arm.pid);
+        let (control, after_one) = hold.begin_step(pid, state);
+        self.period = Some(HeldSteps {
+            effort: control.effort,
+            before: hold.held,
+            after_one,
+            taken: 0,
+            integral: before,
+            ends: pid.is_enabled() && hold.held.driven.is_none(),
+        });
+        control.integral
     }
 
     /// Takes the steps alone, in no lane.
@@ -97,12 +157,15 @@ impl<'a, const N: usize> Seat<'a, N> {
     /// How many steps can be taken before it is looked at: each, or until the disturbance ends or all are taken.
     pub(super) fn until_look(&self) -> u64 {
         if self.observer.is_some() {
-            1
-        } else if self.is_pushed() {
-            self.left.min(self.pushes - self.taken)
-        } else {
-            self.left
+            return 1;
         }
+        let pushed = if self.is_pushed() {
+            self.pushes - self.taken
+        } else {
+            u64::MAX
+        };
+        let held = self.period.as_ref().map_or(u64::MAX, HeldSteps::left);
+        self.left.min(pushed).min(held)
     }
 
     /// Whether the disturbance acts in the next step.
@@ -113,6 +176,9 @@ impl<'a, const N: usize> Seat<'a, N> {
     /// Counts steps that were taken. Returns whether the disturbance ended with the last of them.
     pub(super) fn count(&mut self, steps: u64) -> bool {
         let was_pushed = self.is_pushed();
+        if let Some(period) = &mut self.period {
+            period.taken += steps;
+        }
         self.taken += steps;
         self.left -= steps;
         was_pushed && !self.is_pushed()
@@ -131,11 +197,40 @@ impl<'a, const N: usize> Seat<'a, N> {
     pub(super) fn end(&mut self, diverged: bool) {
         self.arm.steps += self.taken;
         self.arm.steps_since_base += self.taken;
+        if let Some(period) = &self.period {
+            self.arm.hold.held = period.held();
+            if period.taken == 0 {
+                self.arm.pid.commit(period.integral);
+            }
+        }
         if diverged {
             self.arm.diverge();
         }
         if self.taken + u64::from(diverged) > self.pushes {
             self.arm.disturbance = None;
+        }
+    }
+}
+
+impl<const N: usize> HeldSteps<N> {
+    /// Steps that it still has.
+    fn left(&self) -> u64 {
+        if self.ends {
+            self.after_one.due + 1 - self.taken
+        } else {
+            u64::MAX
+        }
+    }
+
+    /// What the arm holds now.
+    fn held(&self) -> Held<N> {
+        match self.taken.checked_sub(1) {
+            None => self.before,
+            Some(_) if !self.ends => self.after_one,
+            Some(more) => Held {
+                due: self.after_one.due - more,
+                ..self.after_one
+            },
         }
     }
 }

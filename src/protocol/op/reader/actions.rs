@@ -48,14 +48,19 @@ impl OpReader<'_> {
             "unadvertise_action" => ActionServerOp::Unadvertise,
             "action_feedback" => {
                 self.required("id")?;
-                let values = self.required("values")?.into();
+                let values = self.object("values")?;
                 ActionServerOp::Feedback { values }
             }
             _ => {
                 self.required("id")?;
                 let is_good = self.boolean("result")?;
+                let values = self.get("values").filter(|raw| raw.get() != "null");
                 ActionServerOp::End {
-                    values: Payload::from(self.get("values").unwrap_or(RawValue::NULL)),
+                    // The values of a failure may be a text that says why.
+                    values: match values {
+                        Some(_) if is_good => self.object("values")?,
+                        values => Payload::from(values.unwrap_or(RawValue::NULL)),
+                    },
                     status: self.goal_status(is_good)?,
                     result: is_good,
                 }

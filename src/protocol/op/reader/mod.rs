@@ -3,13 +3,14 @@
 //! **Invariant:** a member is looked at only for the operations that have it; for all others only its syntax counts.
 
 mod actions;
+mod answers;
 mod ours;
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use serde_json::value::RawValue;
 
+pub use self::answers::read_start;
 use super::{
     CallService, Compression, Encoding, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
     OpError, Problem, Subscribe, Verbosity,
@@ -25,7 +26,7 @@ use crate::protocol::wire::{json, text};
 const MAX_COMPLAINT: usize = 160;
 
 /// The members of a frame that mean something to us.
-const KEYS: [&str; 24] = [
+const KEYS: [&str; 25] = [
     "op",
     "id",
     "topic",
@@ -42,6 +43,7 @@ const KEYS: [&str; 24] = [
     "level",
     "errors",
     "token",
+    "command",
     "compression",
     "fragment_size",
     "data",
@@ -77,22 +79,21 @@ pub const OPS: [&str; 18] = [
 /// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
 #[must_use]
 pub fn read(frame: &str) -> Incoming {
-    let members = match json::members(frame, &KEYS) {
-        Ok(members) => members,
-        Err(error) => {
-            let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
-            return Incoming {
-                id: None,
-                op: Err(OpError::Status(Problem::NotJson(complaint))),
-            };
-        }
-    };
+    let mut members = [None; KEYS.len()];
+    let read = json::members_into(frame, &KEYS, &mut members);
     let reader = OpReader { op: "", members };
+    if let Err(error) = read {
+        let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
+        return reader.refused(Problem::NotJson(complaint));
+    }
     let id = reader.get("id").map(Payload::from);
     let op = match reader.known_op() {
         Ok(op @ "call_service") => OpReader { op, ..reader }.call(),
         Ok(op @ "send_action_goal") => OpReader { op, ..reader }.goal(),
-        Ok(op) => OpReader { op, ..reader }.other().map_err(OpError::Status),
+        Ok(op) => {
+            let reader = OpReader { op, ..reader };
+            reader.or_bad_answer(reader.other())
+        }
         Err(problem) => Err(OpError::Status(problem)),
     };
     Incoming { id, op }
@@ -143,7 +144,7 @@ impl<'a> OpReader<'a> {
                 topic: self.name("topic")?,
             },
             "publish" => {
-                let (topic, msg) = (self.name("topic")?, self.message()?);
+                let (topic, msg) = (self.name("topic")?, self.object("msg")?);
                 let heard = self.heard(&topic, &msg)?;
                 Op::Publish { topic, msg, heard }
             }
@@ -166,9 +167,7 @@ impl<'a> OpReader<'a> {
                 verbosity: self.verbosity()?,
                 errors: self.error_form()?,
             },
-            "auth" => Op::Auth {
-                token: self.secret()?,
-            },
+            "auth" => self.auth()?,
             "service_response" => self.response()?,
             _ => self.serve_action()?,
         })
@@ -264,6 +263,14 @@ impl<'a> OpReader<'a> {
     }
 
     /// Reads the token that a client shows. A complaint about it does not repeat it.
+    /// A command of this program says that it is one, and has a token only if one was given to it.
+    fn auth(&self) -> Result<Op, Problem> {
+        let is_command = self.get("command").is_some() && self.boolean("command")?;
+        let has_none = is_command && self.get("token").is_none();
+        let token = if has_none { None } else { Some(self.secret()?) };
+        Ok(Op::Auth { token, is_command })
+    }
+
     fn secret(&self) -> Result<String, Problem> {
         let raw = self.required("token")?;
         let token = json::text(raw).ok_or(Problem::Mistyped {
@@ -274,16 +281,6 @@ impl<'a> OpReader<'a> {
         })?;
         self.short("token", &token)?;
         Ok(token.into_owned())
-    }
-
-    fn response(&self) -> Result<Op, Problem> {
-        self.required("id")?;
-        Ok(Op::ServiceResponse {
-            service: self.name("service")?,
-            values: self.required("values")?.into(),
-            result: self.boolean("result")?,
-            status: self.get("status").and_then(json::text).map(Cow::into_owned),
-        })
     }
 
     /// The member of that name; it is one of [`KEYS`].
@@ -345,13 +342,13 @@ impl<'a> OpReader<'a> {
         json::boolean(raw).ok_or_else(|| self.mistyped(field, "true or false", raw))
     }
 
-    /// A ROS message is an object.
-    fn message(&self) -> Result<Payload, Problem> {
-        let raw = self.required("msg")?;
+    /// A ROS message, which is an object.
+    fn object(&self, field: &'static str) -> Result<Payload, Problem> {
+        let raw = self.required(field)?;
         if raw.get().starts_with('{') {
             return Ok(raw.into());
         }
-        Err(self.mistyped("msg", "an object", raw))
+        Err(self.mistyped(field, "an object", raw))
     }
 
     fn throttle(&self) -> Result<Duration, Problem> {
@@ -366,13 +363,13 @@ impl<'a> OpReader<'a> {
 
     fn queue_length(&self) -> Result<usize, Problem> {
         let Some(raw) = self.get("queue_length") else {
-            return Ok(1);
+            return Ok(0);
         };
         let length = json::integer(raw)
             .ok_or_else(|| self.mistyped("queue_length", "an integer, at least 0", raw))?;
         Ok(usize::try_from(length)
             .unwrap_or(MAX_QUEUE_LENGTH)
-            .clamp(1, MAX_QUEUE_LENGTH))
+            .min(MAX_QUEUE_LENGTH))
     }
 
     fn timeout(&self) -> Result<Option<Duration>, Problem> {

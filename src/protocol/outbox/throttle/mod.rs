@@ -3,7 +3,7 @@
 //! It is told the time, and knows no clock. Only the [outbox](crate::protocol::outbox) uses it.
 //!
 //! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held back
-//! the newest remain. Little memory is kept beside what is held back, however much was, since nobody is charged for it.
+//! the newest remain.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap, VecDeque};
@@ -12,10 +12,22 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use crate::protocol::outbox::blocks::fit;
+use crate::protocol::limits::MODEST_MESSAGE;
+use crate::protocol::outbox::queues::{Timestamp, counted};
 
+/// How long a message of more than [`MODEST_MESSAGE`] may be held back: it takes room that others wait for.
+const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 /// Dues that may be out of date, beside as many as are up to date, before all are rebuilt.
 const SLACK: usize = 32;
+
+/// A message that is held back.
+#[derive(Debug)]
+pub(super) struct HeldMessage {
+    pub(super) number: u64,
+    /// When it was produced.
+    pub(super) since: Timestamp,
+    pub(super) frame: Bytes,
+}
 
 /// The throttles of one connection and what they hold back.
 #[derive(Debug, Default)]
@@ -40,8 +52,8 @@ struct TopicThrottle {
     queue_length: usize,
     /// When the last message was let go.
     last: Option<Instant>,
-    /// Held back messages with their numbers, oldest first.
-    held: VecDeque<(u64, Bytes)>,
+    /// Held back messages, oldest first.
+    held: VecDeque<HeldMessage>,
 }
 
 impl TopicThrottle {
@@ -71,6 +83,13 @@ impl Throttles {
         self.topics.get(topic).map_or(0, |one| one.queue_length)
     }
 
+    /// Whether a message of the topic is a long one, and would be held back for longer than such may be.
+    pub(super) fn holds_for_long(&self, topic: &str, frame: &Bytes, now: Instant) -> bool {
+        let due = self.topics.get(topic).and_then(TopicThrottle::next);
+        let is_long = frame.len() > MODEST_MESSAGE;
+        is_long && due.is_some_and(|due| due > now + MAX_HELD_BACK)
+    }
+
     /// Bytes held back.
     pub(super) const fn bytes(&self) -> usize {
         self.bytes
@@ -81,14 +100,8 @@ impl Throttles {
         self.count
     }
 
-    /// Sets the throttle of a topic. Moves what is held back beyond `queue_length` into `given_up`.
-    pub(super) fn set(
-        &mut self,
-        topic: &Arc<str>,
-        interval: Duration,
-        queue_length: usize,
-        given_up: &mut Vec<Bytes>,
-    ) {
+    /// Sets the throttle of a topic. What is held back beyond `queue_length` goes.
+    pub(super) fn set(&mut self, topic: &Arc<str>, interval: Duration, queue_length: usize) {
         let queue_length = queue_length.max(1);
         let throttle = self
             .topics
@@ -102,18 +115,18 @@ impl Throttles {
         throttle.interval = interval;
         throttle.queue_length = queue_length;
         let mut surplus = throttle.held.len().saturating_sub(queue_length);
-        let goes = |_, _: &Bytes| {
+        let goes = |_: &HeldMessage| {
             let goes = surplus > 0;
             surplus = surplus.saturating_sub(1);
             goes
         };
-        self.give_up(topic, goes, given_up);
+        self.give_up(topic, goes);
         self.schedule(topic);
         self.tidy();
     }
 
     /// Lifts the throttle of a topic and gives what was held back, oldest first.
-    pub(super) fn forget(&mut self, topic: &str) -> VecDeque<(u64, Bytes)> {
+    pub(super) fn forget(&mut self, topic: &str) -> VecDeque<HeldMessage> {
         let held = self.discard(topic);
         if self.topics.remove(topic).is_some() {
             self.topics.shrink_to(2 * self.topics.len());
@@ -123,15 +136,15 @@ impl Throttles {
     }
 
     /// Takes out what is held back of a topic, oldest first; its throttle stays.
-    pub(super) fn discard(&mut self, topic: &str) -> VecDeque<(u64, Bytes)> {
+    pub(super) fn discard(&mut self, topic: &str) -> VecDeque<HeldMessage> {
         let throttle = self.topics.get_mut(topic);
         let held = throttle.map(|throttle| std::mem::take(&mut throttle.held));
         let held = held.unwrap_or_default();
-        if let Some((oldest, _)) = held.front() {
-            self.oldest.remove(oldest);
+        if let Some(oldest) = held.front() {
+            self.oldest.remove(&oldest.number);
         }
         self.count -= held.len();
-        self.bytes -= held.iter().map(|(_, frame)| frame.len()).sum::<usize>();
+        self.bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
         held
     }
 
@@ -140,20 +153,20 @@ impl Throttles {
     pub(super) fn offer(
         &mut self,
         topic: &Arc<str>,
-        number: u64,
-        frame: Bytes,
+        message: HeldMessage,
         now: Instant,
-    ) -> Option<Bytes> {
+    ) -> Option<HeldMessage> {
         let Some(throttle) = self.topics.get_mut(topic) else {
-            return Some(frame);
+            return Some(message);
         };
         if throttle.held.is_empty() && throttle.is_due(now) {
             throttle.last = Some(now);
-            return Some(frame);
+            return Some(message);
         }
         self.count += 1;
-        self.bytes += frame.len();
-        throttle.held.push_back((number, frame));
+        self.bytes += counted(&message.frame);
+        let number = message.number;
+        throttle.held.push_back(message);
         if throttle.held.len() == 1 {
             self.oldest.insert(number, Arc::clone(topic));
             self.schedule(topic);
@@ -165,13 +178,13 @@ impl Throttles {
     }
 
     /// Lets go of one message whose time has come by `now`, the one that was due first.
-    pub(super) fn release(&mut self, now: Instant) -> Option<Bytes> {
+    pub(super) fn release(&mut self, now: Instant) -> Option<(Arc<str>, HeldMessage)> {
         while self.next_release().is_some_and(|next| next <= now) {
             let Reverse((_, topic)) = self.releases.pop()?;
-            if let Some(frame) = self.pop(&topic) {
+            if let Some(message) = self.pop(&topic) {
                 self.topics.get_mut(&topic)?.last = Some(now);
                 self.schedule(&topic);
-                return Some(frame);
+                return Some((topic, message));
             }
         }
         None
@@ -197,66 +210,55 @@ impl Throttles {
         self.oldest.keys().next().copied()
     }
 
-    /// Moves the oldest messages of all, which are of one topic, into `given_up`, as long as `goes` says so of the next
-    /// one's bytes. It stops at the message with number `before`, and where another topic has an older one.
+    /// Drops the oldest messages of all, which are of one topic, as long as `goes` says so of the next one's bytes. It
+    /// stops at the message with number `before`, and where another topic has an older one. Returns how many went.
     pub(super) fn give_up_oldest(
         &mut self,
         before: u64,
         mut goes: impl FnMut(usize) -> bool,
-        given_up: &mut Vec<Bytes>,
-    ) {
+    ) -> u64 {
         let mut topics = self.oldest.iter();
         let Some((_, topic)) = topics.next() else {
-            return;
+            return 0;
         };
         let before = topics.next().map_or(before, |(next, _)| before.min(*next));
         let topic = Arc::clone(topic);
-        let goes = |number, frame: &Bytes| number < before && goes(frame.len());
-        self.give_up(&topic, goes, given_up);
+        let goes = |held: &HeldMessage| held.number < before && goes(counted(&held.frame));
+        self.give_up(&topic, goes)
     }
 
-    /// Moves messages of a topic that are held back into `given_up`, the oldest first, as long as `goes` says so of the
-    /// next.
-    fn give_up(
-        &mut self,
-        topic: &Arc<str>,
-        mut goes: impl FnMut(u64, &Bytes) -> bool,
-        given_up: &mut Vec<Bytes>,
-    ) {
+    /// Drops messages of a topic that are held back, the oldest first, as long as `goes` says so of the next. Returns
+    /// how many went.
+    fn give_up(&mut self, topic: &Arc<str>, mut goes: impl FnMut(&HeldMessage) -> bool) -> u64 {
         let Some(TopicThrottle { held, .. }) = self.topics.get_mut(topic) else {
-            return;
+            return 0;
         };
-        let count = held
-            .iter()
-            .take_while(|(number, frame)| goes(*number, frame))
-            .count();
-        let Some((oldest, _)) = held.front().filter(|_| count > 0) else {
-            return;
+        let count = held.iter().take_while(|held| goes(held)).count();
+        let Some(oldest) = held.front().filter(|_| count > 0) else {
+            return 0;
         };
-        self.oldest.remove(oldest);
+        self.oldest.remove(&oldest.number);
         self.count -= count;
-        given_up.extend(held.drain(..count).map(|(_, frame)| {
-            self.bytes -= frame.len();
-            frame
-        }));
-        fit(held);
-        if let Some((next, _)) = held.front() {
-            self.oldest.insert(*next, Arc::clone(topic));
+        for message in held.drain(..count) {
+            self.bytes -= counted(&message.frame);
         }
+        if let Some(next) = held.front() {
+            self.oldest.insert(next.number, Arc::clone(topic));
+        }
+        count as u64
     }
 
     /// Takes out the oldest message of a topic that is held back.
-    fn pop(&mut self, topic: &Arc<str>) -> Option<Bytes> {
+    fn pop(&mut self, topic: &Arc<str>) -> Option<HeldMessage> {
         let held = &mut self.topics.get_mut(topic)?.held;
-        let (number, frame) = held.pop_front()?;
-        fit(held);
-        self.oldest.remove(&number);
-        if let Some((next, _)) = held.front() {
-            self.oldest.insert(*next, Arc::clone(topic));
+        let message = held.pop_front()?;
+        self.oldest.remove(&message.number);
+        if let Some(next) = held.front() {
+            self.oldest.insert(next.number, Arc::clone(topic));
         }
         self.count -= 1;
-        self.bytes -= frame.len();
-        Some(frame)
+        self.bytes -= counted(&message.frame);
+        Some(message)
     }
 
     /// Notes when the topic's next held back message is due.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::protocol::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
-use crate::protocol::catalog::{Action, Direction, Node, Playback, Rosapi, Service, Topic};
+use crate::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
 use crate::protocol::names;
 
 /// Topics, and services, of clients in one answer: more than any screen shows. The first by name are listed.
@@ -25,8 +25,21 @@ pub struct Census {
     pub services: Vec<Arc<ListedService>>,
     /// Actions that clients serve, by absolute name.
     pub actions: Vec<Arc<ListedService>>,
-    /// The runtime's own services, where they are not those of the live arm: a record is replayed.
-    pub replayed: Option<Arc<BTreeSet<Service>>>,
+}
+
+impl Census {
+    /// The most bytes that a list of it can take: every byte of a name may be written as six.
+    #[must_use]
+    pub fn most_bytes(&self) -> usize {
+        let length = |name: &str, type_name: Option<&str>| {
+            64 + 6 * (name.len() + type_name.map_or(0, str::len))
+        };
+        let topics = self.topics.iter();
+        let topics = topics.map(|one| length(&one.name, one.type_name.as_deref()));
+        let served = self.services.iter().chain(&self.actions);
+        let served = served.map(|one| length(&one.name, one.type_name.as_deref()));
+        topics.chain(served).sum()
+    }
 }
 
 /// A topic that clients use.
@@ -57,20 +70,6 @@ pub(super) struct Graph<'a> {
 }
 
 impl Graph<'_> {
-    /// Every service of the runtime's own, in the order of the documentation.
-    fn own_services(&self) -> impl Iterator<Item = Service> {
-        let replayed = self.census.replayed.as_deref();
-        own_services().filter(move |service| match replayed {
-            Some(served) => served.contains(service),
-            None => !matches!(service, Service::Playback(_)),
-        })
-    }
-
-    fn own_services_of(&self, type_name: &str) -> impl Iterator<Item = Service> {
-        self.own_services()
-            .filter(move |service| same_service_type(service.type_name(), type_name))
-    }
-
     /// Topics of clients alone.
     fn foreign(&self) -> impl Iterator<Item = &ListedTopic> {
         let topics = self.census.topics.iter().map(Arc::as_ref);
@@ -140,14 +139,14 @@ impl Graph<'_> {
 
     pub(super) fn services(&self) -> Vec<String> {
         let foreign = self.census.services.iter().map(|one| one.name.to_string());
-        self.own_services()
+        own_services()
             .flat_map(service_names)
             .chain(foreign)
             .collect()
     }
 
     pub(super) fn services_of(&self, type_name: &str) -> Vec<String> {
-        let own = self.own_services_of(type_name).flat_map(service_names);
+        let own = own_services_of(type_name).flat_map(service_names);
         let foreign = self.foreign_services_of(type_name);
         own.chain(foreign.map(|one| one.name.to_string())).collect()
     }
@@ -164,7 +163,7 @@ impl Graph<'_> {
     /// A service's type and node; both empty where there is no such service.
     pub(super) fn service(&self, name: &str) -> (String, String) {
         let own = Service::from_name(name);
-        if let Some(service) = own.filter(|own| self.own_services().any(|one| one == *own)) {
+        if let Some(service) = own {
             return (service.type_name().to_owned(), node_name(service.owner()));
         }
         let name = names::absolute(name);
@@ -179,22 +178,16 @@ impl Graph<'_> {
     }
 
     pub(super) fn providers(&self, type_name: &str) -> BTreeSet<String> {
-        let own = self
-            .own_services_of(type_name)
-            .map(|service| node_name(service.owner()));
+        let own = own_services_of(type_name).map(|service| node_name(service.owner()));
         let foreign = self.foreign_services_of(type_name).take(1);
         own.chain(foreign.map(|_| node_name(Node::Gateway)))
             .collect()
     }
 
     pub(super) fn actions(&self) -> Vec<String> {
-        let is_live = self.census.replayed.is_none();
-        let own = Action::ALL
-            .into_iter()
-            .filter(|_| is_live)
-            .map(|action| action.name().to_owned());
+        let own = Action::ALL.map(|action| action.name().to_owned());
         let foreign = self.census.actions.iter().map(|one| one.name.to_string());
-        own.chain(foreign).collect()
+        own.into_iter().chain(foreign).collect()
     }
 
     /// An action's type; empty where there is no such action, or nobody has said its type.
@@ -222,8 +215,7 @@ impl Graph<'_> {
         let mut publishing = own(&|topic| publishing_nodes(topic).contains(&node));
         let mut subscribing =
             own(&|topic| topic.direction() == Direction::Subscribed && topic.owner() == node);
-        let mut services: Vec<String> = self
-            .own_services()
+        let mut services: Vec<String> = own_services()
             .filter(|service| service.owner() == node)
             .flat_map(service_names)
             .collect();
@@ -257,11 +249,14 @@ pub(super) fn node_name(node: Node) -> String {
     format!("/{}", node.name())
 }
 
-/// Every service that the runtime may have, in the order of the documentation.
+/// Every service of the runtime's own, in the order of the documentation.
 pub(super) fn own_services() -> impl Iterator<Item = Service> {
     let questions = Rosapi::ALL.into_iter().map(Service::Rosapi);
-    let player = Playback::ALL.into_iter().map(Service::Playback);
-    Service::ALL.into_iter().chain(questions).chain(player)
+    Service::ALL.into_iter().chain(questions)
+}
+
+fn own_services_of(type_name: &str) -> impl Iterator<Item = Service> {
+    own_services().filter(move |service| same_service_type(service.type_name(), type_name))
 }
 
 /// The names of a service: a question of rosapi has two.

@@ -23,7 +23,7 @@ use crate::protocol::catalog::{Node, Rosapi, Service, types};
 const ROS_VERSION: u8 = 2;
 /// The distribution that the answer names: clients refuse one that they have not heard of, and the types and their
 /// definitions here are those of this one.
-const DISTRO: &str = "jazzy";
+pub(crate) const DISTRO: &str = "jazzy";
 
 /// Why a question has no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

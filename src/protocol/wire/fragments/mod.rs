@@ -11,6 +11,7 @@ mod split;
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
+use super::frame::start_of;
 use crate::protocol::limits::MAX_FRAME;
 pub use split::{MIN_SIZE, split};
 
@@ -72,6 +73,8 @@ pub struct Fragments {
     messages: HashMap<String, Incomplete>,
     /// Bytes of all pieces.
     bytes: usize,
+    /// The first bytes of the message that was refused last.
+    refused: Vec<u8>,
 }
 
 #[derive(Debug)]
@@ -125,7 +128,9 @@ impl Fragments {
         } = piece;
         let checked = self.check(&id, data.len(), num, total);
         if let Err(why) = checked {
-            self.forget(&id);
+            let first = self.forget(&id).and_then(|mut one| one.pieces.remove(&0));
+            let first = first.or_else(|| Some(data).filter(|_| num == 0));
+            self.refused = start_of(first.unwrap_or_default().as_bytes());
             return Err(why);
         }
         let unfinished = self
@@ -147,6 +152,11 @@ impl Fragments {
             bytes: whole.bytes(),
             pieces: whole.pieces,
         }))
+    }
+
+    /// The first bytes of the message that was refused last, if its first piece had come.
+    pub fn take_refused(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.refused)
     }
 
     /// Bytes of what is kept.

@@ -12,12 +12,13 @@ mod raw;
 
 use bytes::Bytes;
 
-pub use self::raw::{Cut, Frame, FrameError, RawFrame};
+pub(super) use self::raw::start_of;
+pub use self::raw::{Cut, Frame, FrameError, KEPT_START, RawFrame};
 use super::nesting::{Event, Nesting};
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
 use super::text;
-use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::limits::{MAX_FRAME, SHORT};
 
 /// Bytes of a line that is no object, kept for the error message.
 const MAX_PREFIX: usize = 32;
@@ -60,6 +61,8 @@ pub struct FrameReader {
     of_messages: bool,
     /// The object of a message that has not ended.
     held: Option<RawFrame>,
+    /// The first bytes of the object that was refused last; a line that is no object has none.
+    refused: Vec<u8>,
 }
 
 impl Default for FrameReader {
@@ -87,6 +90,7 @@ impl FrameReader {
             limit,
             of_messages: false,
             held: None,
+            refused: Vec::new(),
         }
     }
 
@@ -111,7 +115,8 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The series of messages with which the stream goes on, if it does. It must be asked for before the next frame.
+    /// The series of messages with which the stream goes on, if it does, short in all. It must be asked for before the
+    /// next frame.
     pub fn series(&mut self) -> Option<Series> {
         if self.state != Within::Between {
             return None;
@@ -119,6 +124,7 @@ impl FrameReader {
         let rest = self.rest();
         let space = rest.iter().position(|byte| !is_space(*byte))?;
         let rest = rest.get(space..)?;
+        let rest = rest.get(..SHORT).unwrap_or(rest);
         let (topic, length) = series::leading(rest)?;
         let series = Series {
             topic: topic.into(),
@@ -137,7 +143,7 @@ impl FrameReader {
         }
         Some(match self.next_raw()? {
             Ok(frame) => Cut::Frame(frame),
-            Err(error) => Cut::Error(error),
+            Err(error) => Cut::Error(error, std::mem::take(&mut self.refused)),
         })
     }
 
@@ -276,6 +282,9 @@ impl FrameReader {
             }
             Some(Event::TooDeep) => (on, FrameError::TooDeep),
         };
+        if kept {
+            self.refused = start_of(self.buffer.get(self.start..self.at).unwrap_or_default());
+        }
         self.state = state;
         self.start = self.at;
         kept.then_some(Err(if too_long {
@@ -336,6 +345,7 @@ impl FrameReader {
             self.state = Within::Between;
             return frame.map(|frame| Ok(RawFrame { newline, ..frame }));
         }
+        self.refused = frame.map_or_else(Vec::new, |frame| start_of(&frame.bytes));
         self.state = Within::SkippedLine;
         Some(Err(FrameError::MoreBehind))
     }
@@ -370,7 +380,7 @@ impl Iterator for FrameReader {
 
     fn next(&mut self) -> Option<Result<Frame, FrameError>> {
         self.next_raw()
-            .map(|frame| frame.and_then(RawFrame::decode))
+            .map(|frame| frame?.decode().map_err(|(error, _)| error))
     }
 }
 

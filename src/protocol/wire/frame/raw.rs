@@ -64,8 +64,17 @@ pub enum Cut {
     Lines(Series),
     /// Any other frame.
     Frame(RawFrame),
-    /// A stretch that is no frame.
-    Error(FrameError),
+    /// A stretch that is no frame, and its first bytes, at most [`KEPT_START`] of them.
+    Error(FrameError, Vec<u8>),
+}
+
+/// Bytes that are kept from the start of a frame that cannot be read: they hold the names and the id by which the call
+/// that it answers is found.
+pub const KEPT_START: usize = 1024;
+
+/// The bytes that are kept of the start of a frame that cannot be read.
+pub(in crate::protocol::wire) fn start_of(bytes: &[u8]) -> Vec<u8> {
+    bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
 }
 
 /// A [`Frame`] whose bytes nobody has looked at but to find its end: reading on may be left to another thread.
@@ -94,10 +103,11 @@ impl RawFrame {
     /// The frame.
     ///
     /// # Errors
-    /// If it is not UTF-8.
-    pub fn decode(self) -> Result<Frame, FrameError> {
-        let text = String::from_utf8(self.bytes).map_err(|error| FrameError::NotUtf8 {
-            at: error.utf8_error().valid_up_to(),
+    /// If it is not UTF-8; with the frame's first bytes.
+    pub fn decode(self) -> Result<Frame, (FrameError, Vec<u8>)> {
+        let text = String::from_utf8(self.bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            (FrameError::NotUtf8 { at }, start_of(error.as_bytes()))
         })?;
         let text = if self.has_literals {
             json::accept_literals(text)

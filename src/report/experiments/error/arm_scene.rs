@@ -3,7 +3,7 @@
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the
 //! law in every stage).
 
-use super::scene::{OUTPUTS, RunOutcome, SAMPLES, Scene, Worst};
+use super::scene::{RunOutcome, Scene, Worst, looks};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, forward_dynamics, kinetic_energy, potential_energy};
@@ -11,9 +11,7 @@ use crate::math::integrator::{Method, increment, two_sum};
 use crate::math::kinematics::forward;
 use crate::math::pid::{Gains, Pid, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::report::experiments::reference::{
-    DoubleDouble, Law, ReferenceMotion, largest_difference,
-};
+use crate::report::experiments::reference::{DoubleDouble, Law, ReferencePath, largest_difference};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, largest_timestep};
@@ -38,7 +36,8 @@ pub struct ArmScene<const N: usize> {
     start: State<N>,
     drive: Drive<N>,
     duration: f64,
-    reference: ReferenceMotion<N>,
+    /// `None` where there is none: of a law that has no motion of its own.
+    reference: Option<ReferencePath<N>>,
     energy_scale: f64,
 }
 
@@ -59,8 +58,7 @@ impl<const N: usize> ArmScene<N> {
                 Law::Continuous(gains, setpoint)
             }
         };
-        let spacing = duration / in_f64(OUTPUTS);
-        let reference = ReferenceMotion::of(&arm, &start, &law, spacing, SAMPLES);
+        let reference = ReferencePath::new(&arm, &start, &law, duration);
         let energy_scale = energy_scale(&arm, &start);
         Self {
             name,
@@ -189,35 +187,32 @@ impl<const N: usize> Scene for ArmScene<N> {
     }
 
     fn uncertainty(&self) -> f64 {
-        self.reference
-            .uncertainty()
-            .iter()
-            .copied()
-            .fold(0.0, f64::max)
+        let reference = self.reference.as_ref();
+        reference.map_or(f64::INFINITY, ReferencePath::uncertainty)
     }
 
-    fn run(&self, method: Method, steps: u64) -> RunOutcome {
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
         let start_energy = energy(&self.arm, &self.start);
-        let spacing = self.duration / in_f64(OUTPUTS);
-        let every = (steps / OUTPUTS).max(1);
+        let timestep = self.duration / in_f64(steps);
+        let looks = looks(steps);
         let mut evaluations = 0;
-        let mut worst = Worst::NONE;
+        let mut worst = Worst::within(most);
         let mut drift: f64 = 0.0;
-        let mut exact = self.reference.samples().iter();
         self.march(
             method,
             steps,
             || evaluations += 1,
             |step, state| {
-                if step % every != 0 {
+                if !looks(step) {
                     return true;
                 }
-                let Some((exact, _)) = exact.next() else {
+                let Some(reference) = &self.reference else {
                     return false;
                 };
+                let exact = &reference.after(step, timestep);
                 drift = drift.max((energy(&self.arm, state) - start_energy).abs());
                 worst.take(
-                    spacing * in_f64(step / every),
+                    timestep * in_f64(step),
                     largest_difference(exact, &state.position),
                     self.end_effector_distance(exact, &state.position),
                 )
@@ -226,7 +221,7 @@ impl<const N: usize> Scene for ArmScene<N> {
         let conserved = matches!(self.drive, Drive::Free) && worst.diverged.is_none();
         RunOutcome {
             steps,
-            timestep: self.duration / in_f64(steps),
+            timestep,
             evaluations,
             error: worst.error,
             end_error: worst.end_error,

@@ -1,10 +1,9 @@
 //! Error against cost: the same scenes for every method, each against one reference.
 //!
-//! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration, cut
-//! into [`OUTPUTS`] equal intervals. A run takes `64 k` equal steps, so that every method at every timestep lands on
-//! the same output times. Its error is the largest, over outputs and joints, of the angles' distances to the reference.
-//! Cost is counted in evaluations of the dynamics here; who wants seconds times [`Scene::replay`], which takes the same
-//! steps and does no more.
+//! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration. A run
+//! takes any number of equal steps. Its error is the largest, over joints and over its steps (or [`MOST_LOOKS`] or so
+//! of them), of the angles' distances to the reference, which is known at any instant. Cost is counted in evaluations
+//! of the dynamics here; who wants seconds times [`Scene::replay`], which takes the same steps and does no more.
 //!
 //! **Invariant:** nothing is chosen per method: same starts, same timesteps, same reference, same measure.
 
@@ -15,7 +14,7 @@ mod scene;
 pub use arm_scene::{ArmScene, Drive, energy_scale};
 pub use particle_scene::ParticleScene;
 pub(super) use scene::SAMPLES;
-pub use scene::{LOST, OUTPUTS, RunOutcome, Scene};
+pub use scene::{LOST, MOST_LOOKS, OUTPUTS, RunOutcome, Scene};
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};

@@ -3,7 +3,7 @@
 //! **Invariant:** what is run is the computation behind `/arm_sim/integration_step`, expression and all; the closed
 //! form is evaluated with 106 bits.
 
-use super::scene::{OUTPUTS, RunOutcome, Scene, Worst};
+use super::scene::{MOST_LOOKS, RunOutcome, Scene, Worst};
 use crate::math::count::in_f64;
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
@@ -62,11 +62,13 @@ impl Scene for ParticleScene {
         1e-30
     }
 
-    fn run(&self, method: Method, steps: u64) -> RunOutcome {
-        let mut worst = Worst::NONE;
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
+        let mut worst = Worst::within(most);
         let mut evaluations = 0;
         if let Some(mut particle) = Self::particle(method, steps) {
-            let every = usize::try_from(steps / OUTPUTS).unwrap_or(1).max(1);
+            let every = usize::try_from(steps.div_ceil(MOST_LOOKS))
+                .unwrap_or(1)
+                .max(1);
             while particle.advance(every) > 0 {
                 let t = particle.time(particle.done());
                 let x = particle.positions().last().copied().unwrap_or(f64::NAN);

@@ -1,15 +1,25 @@
 //! A scene, which every method computes, and the outcome of a run.
 //!
-//! **Invariant:** every run lands on the same output times, whatever its timestep.
+//! **Invariant:** every run is looked at after each of its steps, or evenly at [`MOST_LOOKS`] or so of them.
 
 use crate::math::integrator::Method;
 
-/// Output times of every run. Enough that no swing hides between two of them; a power of two, so that the timesteps of
-/// a duration that is one too are exact.
+/// Steps of the coarsest run of a row: a power of two, so that the timesteps of a duration that is one too are exact.
 pub const OUTPUTS: u64 = 64;
 
 /// [`OUTPUTS`] as a length.
 pub(in crate::report::experiments) const SAMPLES: usize = 64;
+
+/// Steps after which a run is compared, at most twice as many: a millisecond apart in two seconds, where no peak of an
+/// error hides in between.
+pub const MOST_LOOKS: u64 = 2048;
+
+/// Says after which steps of a run of `steps` steps it is compared: all of them, every second, every third..., and the
+/// last one.
+pub(super) fn looks(steps: u64) -> impl Fn(u64) -> bool {
+    let every = steps.div_ceil(MOST_LOOKS).max(1);
+    move |step| step.is_multiple_of(every) || step == steps
+}
 
 /// A run whose angles are off by a whole turn \[rad\] shows nothing any more, and counts as diverged.
 pub const LOST: f64 = std::f64::consts::TAU;
@@ -23,15 +33,15 @@ pub struct RunOutcome {
     pub timestep: f64,
     /// Evaluations of the dynamics, counted.
     pub evaluations: u64,
-    /// Largest angle error over all outputs and joints \[rad\] (\[m\] for the particle).
+    /// Largest angle error over all comparisons and joints \[rad\] (\[m\] for the particle).
     pub error: f64,
-    /// Largest angle error at the last output \[rad\].
+    /// Largest angle error after the last step \[rad\].
     pub end_error: f64,
     /// Largest distance of the end effector from where it should be \[m\].
     pub end_effector_error: f64,
     /// Largest `|E - E(0)|` over the scene's energy scale; `None` where energy is not conserved.
     pub energy_drift: Option<f64>,
-    /// The output time at which the run was lost or left the finite numbers \[s\], if it was.
+    /// The time at which the run was lost or left the finite numbers \[s\], if it was.
     pub diverged: Option<f64>,
 }
 
@@ -51,8 +61,12 @@ pub trait Scene {
     fn duration(&self) -> f64;
     /// How far the reference itself may be off \[rad\].
     fn uncertainty(&self) -> f64;
-    /// Runs `steps` steps, a multiple of [`OUTPUTS`], and compares.
-    fn run(&self, method: Method, steps: u64) -> RunOutcome;
+    /// Runs `steps` steps and compares.
+    fn run(&self, method: Method, steps: u64) -> RunOutcome {
+        self.run_within(method, steps, LOST)
+    }
+    /// As [`Scene::run`], but a run whose error exceeds `most` ends there and counts as diverged.
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome;
     /// The same steps without counting or comparing. What comes back only keeps them from being optimised away.
     fn replay(&self, method: Method, steps: u64) -> f64;
     /// The value that [`Scene::replay`] must come back with, taken from the run that is judged.
@@ -67,6 +81,7 @@ pub trait Scene {
 
 /// The largest errors so far of a run in progress.
 pub(super) struct Worst {
+    most: f64,
     pub(super) error: f64,
     pub(super) end_error: f64,
     pub(super) end_effector_error: f64,
@@ -74,16 +89,20 @@ pub(super) struct Worst {
 }
 
 impl Worst {
-    pub(super) const NONE: Self = Self {
-        error: 0.0,
-        end_error: 0.0,
-        end_effector_error: 0.0,
-        diverged: None,
-    };
+    /// None so far; a run is lost beyond `most`.
+    pub(super) const fn within(most: f64) -> Self {
+        Self {
+            most,
+            error: 0.0,
+            end_error: 0.0,
+            end_effector_error: 0.0,
+            diverged: None,
+        }
+    }
 
-    /// Takes in one output; `false` once there is nothing left to compare.
+    /// Takes in one comparison; `false` once there is nothing left to compare.
     pub(super) fn take(&mut self, time: f64, error: f64, end_effector_error: f64) -> bool {
-        if error.is_nan() || error > LOST {
+        if error.is_nan() || error > self.most {
             self.diverged = Some(time);
             self.error = f64::INFINITY;
             self.end_error = f64::INFINITY;

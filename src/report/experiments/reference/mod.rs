@@ -11,11 +11,13 @@
 mod double_double;
 mod lagrangian;
 mod moving;
+mod path;
 mod steps;
 mod taylor;
 
 pub use double_double::DoubleDouble;
 pub use moving::MovingSetpoint;
+pub use path::ReferencePath;
 pub use steps::exact_steps;
 
 use crate::math::arm::{Arm, State};
@@ -198,24 +200,17 @@ fn motion<const N: usize>(
     let mut state = exact(start);
     let mut samples = Vec::with_capacity(intervals.len());
     for &interval in intervals {
-        match law {
-            Law::Constant(effort) => {
-                let mut drive = JointDrive::Constant(effort.map(DoubleDouble::from));
-                taylor.advance(&mut state, &mut drive, interval);
-            }
-            Law::Continuous(gains, setpoint) => {
-                let setpoint = (constant(&setpoint.position), constant(&setpoint.velocity));
-                taylor.advance(&mut state, &mut law_drive(gains, setpoint), interval);
-            }
-            Law::Held {
-                gains,
-                setpoint,
-                period,
-            } => {
-                for _ in 0..whole_periods(interval, *period) {
-                    let effort = held(gains, setpoint, &mut state, *period);
-                    taylor.advance(&mut state, &mut JointDrive::Constant(effort), *period);
-                }
+        if let Some(mut drive) = continuous_drive(law) {
+            taylor.advance(&mut state, &mut drive, interval);
+        } else if let Law::Held {
+            gains,
+            setpoint,
+            period,
+        } = law
+        {
+            for _ in 0..whole_periods(interval, *period) {
+                let effort = held(gains, setpoint, &mut state, *period);
+                taylor.advance(&mut state, &mut JointDrive::Constant(effort), *period);
             }
         }
         samples.push(state);
@@ -237,6 +232,18 @@ fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
         position: start.position.map(DoubleDouble::from),
         velocity: start.velocity.map(DoubleDouble::from),
         integral: [DoubleDouble::ZERO; N],
+    }
+}
+
+/// The drive of a law that acts at every instant.
+fn continuous_drive<const N: usize>(law: &Law<N>) -> Option<JointDrive<N>> {
+    match law {
+        Law::Constant(effort) => Some(JointDrive::Constant(effort.map(DoubleDouble::from))),
+        Law::Continuous(gains, setpoint) => {
+            let setpoint = (constant(&setpoint.position), constant(&setpoint.velocity));
+            Some(law_drive(gains, setpoint))
+        }
+        Law::Held { .. } => None,
     }
 }
 

@@ -56,6 +56,14 @@ pub(super) enum JointDrive<const N: usize> {
 /// Coefficients of one series per link or joint.
 type Coefficients<const N: usize> = Vec<[Real; N]>;
 
+/// The link angles of one step of a motion, as a series in the time from its beginning.
+#[derive(Debug, Clone)]
+pub(super) struct AngleSeries<const N: usize> {
+    /// When it begins \[s\].
+    pub(super) begins: Real,
+    pub(super) angle: Coefficients<N>,
+}
+
 /// The series of one motion. Kept between steps, so that a step allocates nothing.
 #[derive(Debug, Clone)]
 pub(super) struct Taylor<const N: usize> {
@@ -94,9 +102,37 @@ impl<const N: usize> Taylor<N> {
 
     /// Moves `state` and `drive` on by `time` \[s\], in as many steps as the tolerance asks for.
     pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &mut JointDrive<N>, time: f64) {
+        self.go(state, drive, time, |_, _| ());
+    }
+
+    /// As [`Taylor::advance`], and keeps the series of every step.
+    pub(super) fn path(
+        &mut self,
+        state: &mut Exact<N>,
+        drive: &mut JointDrive<N>,
+        time: f64,
+    ) -> Vec<AngleSeries<N>> {
+        let mut pieces = Vec::new();
+        self.go(state, drive, time, |taylor, rest| {
+            pieces.push(AngleSeries {
+                begins: Real::from(time) - rest,
+                angle: taylor.angle[..=taylor.setting.order].to_vec(),
+            });
+        });
+        pieces
+    }
+
+    fn go(
+        &mut self,
+        state: &mut Exact<N>,
+        drive: &mut JointDrive<N>,
+        time: f64,
+        mut keep: impl FnMut(&Self, Real),
+    ) {
         let mut rest = Real::from(time);
         while rest.to_f64() > 0.0 {
             self.expand(state, drive);
+            keep(self, rest);
             let allowed = self.allowed_step();
             let last = allowed >= rest.to_f64();
             let step = if last { rest } else { Real::from(allowed) };
@@ -261,7 +297,11 @@ impl<const N: usize> Taylor<N> {
     }
 }
 
-fn evaluate<const N: usize>(series: &Coefficients<N>, order: usize, step: Real) -> [Real; N] {
+pub(super) fn evaluate<const N: usize>(
+    series: &[[Real; N]],
+    order: usize,
+    step: Real,
+) -> [Real; N] {
     let mut value = series[order];
     for coefficient in series[..order].iter().rev() {
         value = std::array::from_fn(|i| value[i] * step + coefficient[i]);

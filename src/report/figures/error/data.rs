@@ -1,17 +1,21 @@
 //! The runs, and how they are read: the cost of an error, the order of a method, the time of a step.
 //!
-//! **Invariant:** every time stands beside the error of the same steps.
+//! **Invariant:** every time stands beside the error of the same steps, and nothing is interpolated between two runs.
 
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{RunOutcome, Scene};
 use crate::report::figures::slope::slope;
-use crate::report::timing::Timing;
+use crate::report::timing::{Effort, Timing, time};
+use crate::study::fewest::StepSearch;
 
 /// One scene with all its runs.
 pub(super) struct Data {
     pub(super) scene: Box<dyn Scene>,
+    /// Runs of ever half the timestep.
     pub(super) runs: Vec<Run>,
+    /// The run of each method that reaches each of [`TARGETS`] with the fewest steps.
+    pub(super) reached: Vec<(f64, Run)>,
 }
 
 #[derive(Clone, Copy)]
@@ -27,29 +31,53 @@ const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
 /// How many runs a slope is fitted to.
 const FITTED: usize = 4;
 
+/// The fewest steps for an error are found to this part of them.
+const RESOLUTION: u64 = 256;
+
 pub(super) const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
 impl Data {
+    /// The scene with its runs of ever half the timestep. The runs between them are searched that reach the targets.
+    pub(super) fn new(scene: Box<dyn Scene>, runs: Vec<Run>, effort: Effort) -> Self {
+        let mut reached = Vec::new();
+        for method in Method::ALL {
+            // A smaller error takes no fewer steps.
+            let mut least = 1;
+            for target in TARGETS {
+                let enough = runs.iter().find(|run| {
+                    let RunOutcome { error, .. } = run.outcome;
+                    run.method == method && error <= target
+                });
+                let fewest = enough
+                    .and_then(|run| fewest(&*scene, method, target, (least, run.outcome.steps)));
+                least = fewest.map_or(least, |outcome| outcome.steps);
+                reached.extend(fewest.map(|outcome| {
+                    let timing = time(effort, || scene.replay(method, outcome.steps));
+                    let run = Run {
+                        method,
+                        outcome,
+                        timing,
+                    };
+                    (target, run)
+                }));
+            }
+        }
+        Self {
+            scene,
+            runs,
+            reached,
+        }
+    }
+
     pub(super) fn of(&self, method: Method) -> impl Iterator<Item = &Run> {
         self.runs.iter().filter(move |run| run.method == method)
     }
 
-    /// The cost at which `method` reaches `target`, where two neighbouring runs lie on both sides of it: interpolated
-    /// between them along a straight line in logarithms. The coarsest run, if it is already better.
-    pub(super) fn reaching(&self, method: Method, target: f64) -> Option<Cost> {
-        let mut before: Option<&Run> = None;
-        for run in self.of(method) {
-            if run.outcome.error <= target {
-                let Some(coarse) = before.filter(|run| run.outcome.diverged.is_none()) else {
-                    return Some(Cost::of(run));
-                };
-                let part = (coarse.outcome.error / target).ln()
-                    / (coarse.outcome.error / run.outcome.error).ln();
-                return Some(Cost::of(coarse).towards(&Cost::of(run), part));
-            }
-            before = Some(run);
-        }
-        None
+    /// The run of `method` that reaches `target` with the fewest steps.
+    pub(super) fn reaching(&self, method: Method, target: f64) -> Option<&Run> {
+        let mut reached = self.reached.iter();
+        let of = |one: &&(f64, Run)| one.1.method == method && one.0.to_bits() == target.to_bits();
+        reached.find(of).map(|one| &one.1)
     }
 
     pub(super) fn order(&self, method: Method) -> Option<f64> {
@@ -75,44 +103,35 @@ impl Data {
     }
 }
 
-/// The work that it takes.
-#[derive(Clone, Copy)]
-pub(super) struct Cost {
-    pub(super) timestep: f64,
-    pub(super) evaluations: f64,
-    pub(super) wall: f64,
+/// The run that keeps within `target` with the fewest steps between the two, found to a part of [`RESOLUTION`].
+fn fewest(
+    scene: &dyn Scene,
+    method: Method,
+    target: f64,
+    (least, most): (u64, u64),
+) -> Option<RunOutcome> {
+    let mut search = StepSearch::new(least, most).to_part(RESOLUTION);
+    let mut best = None;
+    while let Some(steps) = search.wanted() {
+        let outcome = scene.run_within(method, steps, target);
+        let is_enough = outcome.error <= target;
+        if is_enough {
+            best = Some(outcome);
+        }
+        search.tell(is_enough);
+    }
+    best
 }
 
-impl Cost {
-    fn of(run: &Run) -> Self {
-        Self {
-            timestep: run.outcome.timestep,
-            evaluations: in_f64(run.outcome.evaluations),
-            wall: run.timing.minimum,
-        }
-    }
+/// The method that reaches `target` with the fewest evaluations, its run, and the next best.
+pub(super) type Best<'a> = (&'a Run, Option<&'a Run>);
 
-    fn towards(self, other: &Self, part: f64) -> Self {
-        let between = |a: f64, b: f64| a * (b / a).powf(part);
-        Self {
-            timestep: between(self.timestep, other.timestep),
-            evaluations: between(self.evaluations, other.evaluations),
-            wall: between(self.wall, other.wall),
-        }
-    }
-}
-
-/// A method and its cost, and the next best.
-pub(super) type Best = (Method, Cost, Option<(Method, Cost)>);
-
-/// The method that reaches `target` with the fewest evaluations, its cost, and the next best.
-pub(super) fn best(data: &Data, target: f64) -> Option<Best> {
-    let mut reached: Vec<(Method, Cost)> = Method::ALL
+pub(super) fn best(data: &Data, target: f64) -> Option<Best<'_>> {
+    let mut reached: Vec<&Run> = Method::ALL
         .into_iter()
-        .filter_map(|method| Some((method, data.reaching(method, target)?)))
+        .filter_map(|method| data.reaching(method, target))
         .collect();
-    reached.sort_by(|a, b| a.1.evaluations.total_cmp(&b.1.evaluations));
+    reached.sort_by_key(|run| run.outcome.evaluations);
     let mut reached = reached.into_iter();
-    let (method, cost) = reached.next()?;
-    Some((method, cost, reached.next()))
+    Some((reached.next()?, reached.next()))
 }

@@ -75,7 +75,7 @@ fn compute(making: &mut Making<'_>) -> Vec<Data> {
                 making.at(done, of);
             }
         }
-        data.push(Data { scene, runs });
+        data.push(Data::new(scene, runs, effort));
     }
     data
 }

@@ -3,6 +3,7 @@
 //! **Invariant:** what no run reached is called not reached.
 
 use super::data::{Data, Run, TARGETS, best};
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::{Csv, CsvField};
 use crate::report::section::{Cell, Table, by_method};
@@ -16,8 +17,8 @@ pub(super) fn cheapest(data: &[Data]) -> Table {
         "cheapest",
         "At a glance: the cheapest method for each error",
         "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last \
-         how many times more evaluations the next best method needs. Between two measured timesteps the values are \
-         interpolated. The particle's errors are in m.",
+         how many times more evaluations the next best method needs. Every cell is a run: that of the fewest \
+         steps that were found to keep the error. The particle's errors are in m.",
         &head,
     );
     for data in data {
@@ -25,15 +26,17 @@ pub(super) fn cheapest(data: &[Data]) -> Table {
         for target in TARGETS {
             row.push(match best(data, target) {
                 None => Cell::new("not reached").class("soft"),
-                Some((method, cost, next)) => {
-                    let per_second = cost.evaluations / data.scene.duration();
-                    let time = seconds(cost.wall / data.scene.duration());
-                    let next = next.map_or_else(String::new, |(next, other)| {
-                        format!("; {next} ×{}", number(other.evaluations / cost.evaluations))
+                Some((run, next)) => {
+                    let evaluations = |run: &Run| in_f64(run.outcome.evaluations);
+                    let per_second = evaluations(run) / data.scene.duration();
+                    let time = seconds(run.timing.minimum / data.scene.duration());
+                    let next = next.map_or_else(String::new, |next| {
+                        let more = evaluations(next) / evaluations(run);
+                        format!("; {} ×{}", next.method, number(more))
                     });
-                    Cell::method(method).detail(format!(
+                    Cell::method(run.method).detail(format!(
                         "dt {}; {} evaluations, {time} per s{next}",
-                        seconds(cost.timestep),
+                        seconds(run.outcome.timestep),
                         number(per_second.round())
                     ))
                 }

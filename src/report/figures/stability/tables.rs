@@ -13,7 +13,7 @@ pub(super) fn table(lines: &[LimitRow]) -> Table {
         "limits",
         "Largest stable timesteps",
         "Predicted from the loop linearised where it rests, at (0.4, 0.8), with 3 links (0.4, 0.8, -0.5), measured by \
-         nudging the arm itself and watching whether it settles; the smallest limit of all poses, proven where it can \
+         nudging the arm itself and watching whether it settles; the smallest limit of all poses, bounded where it can \
          be, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
         &[
             "Links",

@@ -24,7 +24,8 @@ pub(super) fn findings(lines: &[LimitRow]) -> Vec<String> {
         findings.push(format!(
             "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
              Verlet**: the same, since the effort is held for the step. With the law in every stage RK4 would be \
-             stable up to {}.{least}",
+             stable up to {}. That belongs to the simulation; the first limit belongs to the controller, and a real \
+             arm would show it.{least}",
             seconds(rk4.predicted),
             seconds(verlet.predicted),
             seconds(continuous.predicted),

@@ -13,6 +13,7 @@ use crate::arm_sim::{ArmBench, enable, pause};
 struct Oracle {
     asked: Rc<RefCell<Vec<ControlLoop<2>>>>,
     limit: Rc<Cell<f64>>,
+    period_limit: Rc<Cell<f64>>,
 }
 
 impl Actor for Oracle {
@@ -20,11 +21,18 @@ impl Actor for Oracle {
 }
 
 impl Handler<HeldLimit<2>> for Oracle {
-    type Result = Option<f64>;
+    type Result = Option<ClockLimits>;
 
-    fn handle(&mut self, HeldLimit(control): HeldLimit<2>, _: &mut Context<Self>) -> Option<f64> {
+    fn handle(
+        &mut self,
+        HeldLimit(control): HeldLimit<2>,
+        _: &mut Context<Self>,
+    ) -> Option<ClockLimits> {
         self.asked.borrow_mut().push(control);
-        Some(self.limit.get())
+        Some(ClockLimits {
+            period: Some(self.period_limit.get()),
+            timestep: Some(self.limit.get()),
+        })
     }
 }
 
@@ -46,6 +54,7 @@ impl Consulting {
     async fn new(limit: f64) -> Self {
         let oracle = Oracle {
             asked: Rc::default(),
+            period_limit: Rc::new(Cell::new(f64::INFINITY)),
             limit: Rc::new(Cell::new(limit)),
         };
         let bench = ArmBench::new(Arm::default());

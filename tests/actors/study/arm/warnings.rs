@@ -56,6 +56,52 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
     });
 }
 
+/// Which clock is too slow, and that a shorter timestep mends neither a period that is too long nor the other way round.
+#[test]
+fn a_warning_names_the_clock_that_is_too_slow() {
+    in_virtual_time(async {
+        let arm = Consulting::new(0.004).await;
+        arm.oracle.period_limit.set(0.008);
+        arm.ask(enable(true)).await;
+        arm.want(Topic::Diagnostics, true).await;
+        let period = |period: f64| SetPeriod {
+            period: Some(period),
+            ..SetPeriod::default()
+        };
+        for (time, timestep, warning) in [
+            (0.0, 0.001, ""),
+            (
+                0.01,
+                0.001,
+                "the control period 0.01 s exceeds 0.008 s, up to which the controller is predicted to be stable at \
+                 the present setpoint",
+            ),
+            (0.006, 0.001, ""),
+            (
+                0.006,
+                0.006,
+                "the timestep 0.006 s exceeds 0.004 s, up to which rk4 is predicted to be stable at the present \
+                 setpoint with a control period of 0.006 s",
+            ),
+            (
+                0.012,
+                0.006,
+                "the control period 0.012 s exceeds 0.008 s, up to which the controller is predicted to be stable \
+                 at the present setpoint",
+            ),
+        ] {
+            arm.ask(period(time)).await;
+            arm.ask(integrator(Some(timestep), None)).await;
+            sleep(Duration::from_millis(300)).await;
+            arm.heard.messages(Topic::Diagnostics);
+            sleep(Duration::from_millis(1100)).await;
+            let told = arm.heard.messages(Topic::Diagnostics);
+            assert_eq!(value(&told[0], "warning"), warning, "{time} and {timestep}");
+            assert_eq!(value(&told[0], "control_period_limit"), "0.008");
+        }
+    });
+}
+
 #[test]
 fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
     in_virtual_time(async {
@@ -93,7 +139,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
             assert!((0.05..0.15).contains(&limit), "{limit}");
             let warning = value(message, "warning");
             assert_eq!(!warning.is_empty(), warned, "{warning}");
-            let said = "up to which rk4 is predicted to carry a motion of 16.4 rad/s";
+            let said = "up to which rk4 is predicted to carry a motion of 16.403 rad/s";
             assert_eq!(warning.contains(said), warned, "{warning}");
         }
         // Beyond both limits the smaller one is told.
@@ -101,7 +147,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
         sleep(Duration::from_secs(2)).await;
         let told = arm.heard.messages(Topic::Diagnostics);
         let warning = value(told.last().unwrap(), "warning").to_owned();
-        assert!(warning.contains("16.4 rad/s"), "{warning}");
+        assert!(warning.contains("16.403 rad/s"), "{warning}");
     });
 }
 

@@ -28,7 +28,8 @@ fn mask(rng: &mut fastrand::Rng) -> [u8; 4] {
 /// One request or the beginning of one.
 pub async fn requests(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fault> {
     let host = world.address;
-    let right = |path: &str| format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    let right =
+        |path: &str| format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
     let long = format!(
         "GET / HTTP/1.1\r\nHost: {host}\r\nX: {}\r\n\r\n",
         "y".repeat(20_000)

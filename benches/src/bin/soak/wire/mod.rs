@@ -74,12 +74,7 @@ pub struct Client {
     ended: bool,
     sent: Recent,
     came: Recent,
-    /// The most bytes that it can make the program hold: what it has sent and asked so far, as often as that is kept.
-    may_hold: usize,
 }
-
-/// A client that holds no more never gives way, whatever the others hold.
-const MODEST: usize = 256 * 1024;
 
 impl Client {
     /// Connects. Over WebSocket it asks for every status, as there are over TCP.
@@ -124,7 +119,6 @@ impl Client {
             ended: false,
             sent: Recent::default(),
             came: Recent::default(),
-            may_hold: 0,
         };
         if door == Door::Web {
             client.shake_hands().await?;
@@ -164,37 +158,6 @@ impl Client {
             what: what.into(),
             sent: self.sent.frames(),
             came: self.came.frames(),
-            gave_way: false,
-        }
-    }
-
-    /// It asks for an answer of so many bytes.
-    pub fn expect_bytes(&mut self, bytes: usize) {
-        self.may_hold += bytes;
-    }
-
-    /// It is told that it held the most: rightly, if it can have held what it is told, and that is more than is modest.
-    fn gives_way(&self, why: &str) -> Fault {
-        let told = why
-            .rsplit_once('(')
-            .and_then(|(_, rest)| rest.split(' ').next()?.parse::<usize>().ok());
-        let can = self.may_hold.div_ceil(1_000_000);
-        let gave_way = self.may_hold > MODEST && told.is_some_and(|told| told <= can);
-        let may_hold = self.may_hold;
-        Fault {
-            gave_way,
-            ..self.fault(format!(
-                "cut off, though it can hold {may_hold} bytes at most: {why}"
-            ))
-        }
-    }
-
-    /// A fault of a client that reads late. If it can hold more than is modest its stream may have ended before the end
-    /// of a frame: it held the most, and who has not read the frame before can't be told.
-    pub fn read_late(&self, fault: Fault) -> Fault {
-        Fault {
-            gave_way: fault.gave_way || (self.ended && self.may_hold > MODEST),
-            ..fault
         }
     }
 }

@@ -13,9 +13,6 @@ use tokio::time::timeout_at;
 use super::{Came, Client};
 use crate::world::Fault;
 
-/// The status for the client that held the most when all together held too much.
-const HELD_MOST: &str = "memory: this connection held the most";
-
 impl Client {
     pub(super) fn take_in(&mut self) {
         match self.stream.try_read(&mut self.chunk) {
@@ -27,27 +24,6 @@ impl Client {
             Err(error) if error.kind() == ErrorKind::WouldBlock => {}
             Err(_) => self.ended = true,
         }
-    }
-
-    /// Why the program has ended the connection, if it gave way for memory: what had come before can still be read.
-    pub(super) fn why_it_ended(&mut self) -> Option<Fault> {
-        while !self.ended {
-            let before = self.codec.pending().len();
-            self.take_in();
-            if self.codec.pending().len() == before {
-                break;
-            }
-        }
-        while let Ok(Some(event)) = self.codec.next_event() {
-            if let Event::Text(text) = event
-                && let Ok(frame) = serde_json::from_str::<Value>(&text)
-                && let Some(why) = frame["msg"].as_str()
-                && why.starts_with(HELD_MOST)
-            {
-                return Some(self.gives_way(why));
-            }
-        }
-        None
     }
 
     /// Waits for bytes; false if none came until `deadline`.
@@ -133,12 +109,6 @@ impl Client {
         let frame: Value = serde_json::from_str(&text).map_err(|error| {
             self.fault(format!("{} bytes that are no JSON: {error}", text.len()))
         })?;
-        if let Some(why) = frame["msg"]
-            .as_str()
-            .filter(|why| why.starts_with(HELD_MOST))
-        {
-            return Err(self.gives_way(why));
-        }
         if frame["op"] != "service_response" {
             return Ok(Some(Came::Other(frame)));
         }

@@ -13,10 +13,6 @@ use super::Client;
 use crate::ledger::Check;
 use crate::world::{Fault, PATIENCE};
 
-/// How often the bytes of a frame may be there at once: as they came, in a buffer that may be twice as long, as text,
-/// and as what was read of it.
-const COPIES: usize = 5;
-
 impl Client {
     /// Appends a frame to what goes out next.
     pub fn push(&mut self, frame: &Value) {
@@ -26,7 +22,6 @@ impl Client {
     /// The same for a frame as text.
     pub fn push_text(&mut self, frame: &str) {
         self.sent.keep(frame);
-        self.may_hold += COPIES * frame.len();
         self.world.count("frames sent", 1);
         self.codec.write(frame, &mut self.out);
     }
@@ -91,12 +86,7 @@ impl Client {
                         bytes = &bytes[written..];
                     }
                     Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                    Err(error) => {
-                        let why = self.why_it_ended();
-                        return Err(
-                            why.unwrap_or_else(|| self.fault(format!("cannot send: {error}")))
-                        );
-                    }
+                    Err(error) => return Err(self.fault(format!("cannot send: {error}"))),
                 }
             }
         }

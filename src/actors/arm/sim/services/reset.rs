@@ -50,6 +50,7 @@ impl<const N: usize> ArmSim<N> {
         let diverged = self.simulation.divergence().is_some();
         self.end_goal_for_reset();
         self.change(ArmInput::Reset);
+        self.goals.setpoint_waits = false;
         self.paused_at = self.simulation.time();
         self.restart_pacer();
         self.restart_energy_drift();
@@ -58,6 +59,7 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 }
+
 impl<const N: usize> FieldByField for Reset<N> {
     fn of(_: &mut Fields<'_>) -> Self {
         Self {
@@ -71,13 +73,18 @@ impl<const N: usize> FieldByField for Reset<N> {
 }
 
 impl<const N: usize> Answered for Reset<N> {
-    fn write(Echo { values, rejected }: Echo<State<N>>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values<'a> {
-            position: &'a [f64],
-            velocity: &'a [f64],
-        }
-        let State { position, velocity } = &values;
-        to.response(&Values { position, velocity }, &rejected.status())
+    fn write(echo: Echo<State<N>>, to: &Address) -> Bytes {
+        write_state(&echo, to)
     }
+}
+
+/// Writes the state in which the arm is now.
+pub(super) fn write_state<const N: usize>(echo: &Echo<State<N>>, to: &Address) -> Bytes {
+    #[derive(Serialize)]
+    struct Values<'a> {
+        position: &'a [f64],
+        velocity: &'a [f64],
+    }
+    let State { position, velocity } = &echo.values;
+    to.response(&Values { position, velocity }, &echo.rejected.status())
 }

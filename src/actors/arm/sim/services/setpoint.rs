@@ -34,6 +34,7 @@ impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
     fn handle(&mut self, message: SetSetpoint<N>, ctx: &mut Context<Self>) {
         self.attend(ctx);
         self.change(ArmInput::Setpoint(message.setpoint));
+        self.goals.setpoint_waits = !self.simulation.pid().is_enabled();
     }
 }
 

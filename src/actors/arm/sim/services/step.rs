@@ -16,13 +16,14 @@ use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
 use crate::actors::node::{Ask, Call, ShutDown, Unserved};
 use crate::actors::wire::{Address, Answered, Nodes};
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
-use crate::protocol::op::fields::{Fields, Rejections};
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
-    nodes.serve::<Step>(Service::Step, arm.clone());
+    nodes.serve::<Step<N>>(Service::Step, arm.clone());
 }
 
 /// Steps in one request: what one wake-up's budget is worth, and ten seconds of the default timestep.
@@ -32,16 +33,18 @@ pub const MAX_STEPS: u64 = 10_000;
 pub const STEPS_IN_A_ROW: u64 = 1000;
 
 /// Takes steps while paused. Refused if something was rejected, or the arm can't be stepped.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Step {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step<const N: usize> {
     /// How many, 1 to [`MAX_STEPS`].
     pub steps: Option<u64>,
+    /// The effort that is applied in them \[N m\], while the controller stands still; none for the controller's.
+    pub effort: Option<[f64; N]>,
     /// Fields that were not valid.
     pub rejected: Rejections,
 }
 
-impl Ask for Step {
-    type Answer = Result<Stepped, Rejections>;
+impl<const N: usize> Ask for Step<N> {
+    type Answer = Result<Stepped<N>, Rejections>;
 }
 
 impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
@@ -56,11 +59,11 @@ impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
+impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
     type Result = ();
 
     /// Wall time plays no part in the steps, and the arm goes on from there when it is resumed.
-    fn handle(&mut self, Call { ask, reply }: Call<Step>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
         let mut rejected = ask.rejected;
         if !self.paused {
@@ -74,6 +77,7 @@ impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
         let steps = Steps {
             asked,
             taken: 0,
+            effort: ask.effort,
             reply,
         };
         if self.is_stepping && self.goals.is_judged() {
@@ -110,7 +114,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     /// Takes the next steps in a row; answers if they are the last, or puts the request behind those of the others.
-    fn take_row(&mut self, mut steps: Steps) {
+    fn take_row(&mut self, mut steps: Steps<N>) {
         if steps.reply.caller_is_gone() {
             return steps.reply.refuse(Unserved::CallerGone);
         }
@@ -118,6 +122,9 @@ impl<const N: usize> ArmSim<N> {
             return self.end_steps(steps, StepsEnd::Resumed);
         }
         let has_diverged = self.simulation.divergence().is_some();
+        if steps.effort.is_some() {
+            self.change(ArmInput::Drive(steps.effort));
+        }
         let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
         // A goal that is reached on the way ends an advance, not the steps; what is to be told of it ends the row.
         while steps.taken < row_end
@@ -125,6 +132,9 @@ impl<const N: usize> ArmSim<N> {
             && self.simulation.divergence().is_none()
         {
             steps.taken += self.advance(row_end - steps.taken, true);
+        }
+        if steps.effort.is_some() {
+            self.change(ArmInput::Drive(None));
         }
         if self.simulation.divergence().is_some() {
             if !has_diverged {
@@ -138,19 +148,22 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 
-    fn end_steps(&self, steps: Steps, end: StepsEnd) {
+    fn end_steps(&self, steps: Steps<N>, end: StepsEnd) {
         steps.reply.conclude(Ok(Stepped {
             steps: steps.taken,
             time: self.simulation.time(),
+            state: *self.simulation.state(),
+            effort: *self.simulation.effort(),
             end,
         }));
     }
 }
 
-impl FieldByField for Step {
+impl<const N: usize> FieldByField for Step<N> {
     fn of(fields: &mut Fields<'_>) -> Self {
         Self {
             steps: fields.count("steps", MAX_STEPS),
+            effort: fields.array("effort", Bound::Finite),
             rejected: Rejections::default(),
         }
     }
@@ -160,21 +173,31 @@ impl FieldByField for Step {
     }
 }
 
-impl Answered for Step {
-    fn write(answer: Result<Stepped, Rejections>, to: &Address) -> Bytes {
+impl<const N: usize> Answered for Step<N> {
+    fn write(answer: Result<Stepped<N>, Rejections>, to: &Address) -> Bytes {
         #[derive(Serialize)]
-        struct Values {
+        struct Values<'a> {
             steps: u64,
             time: f64,
+            position: &'a [f64],
+            velocity: &'a [f64],
+            effort: &'a [f64],
         }
         match answer {
-            Ok(Stepped { steps, time, end }) => {
-                let status = match end {
+            Ok(stepped) => {
+                let status = match stepped.end {
                     StepsEnd::AllTaken => "",
                     StepsEnd::Diverged => "steps ended early: the simulation has diverged",
                     StepsEnd::Resumed => "steps ended early: the arm has been resumed",
                 };
-                to.response(&Values { steps, time }, status)
+                let values = Values {
+                    steps: stepped.steps,
+                    time: stepped.time,
+                    position: &stepped.state.position,
+                    velocity: &stepped.state.velocity,
+                    effort: &stepped.effort,
+                };
+                to.response(&values, status)
             }
             Err(rejected) => to.response(&Empty {}, &rejected.status()),
         }

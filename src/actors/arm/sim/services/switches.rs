@@ -1,6 +1,6 @@
 //! Services with one field, `data`: `/arm_sim/pause` and `/pid_controller/enable`.
 //!
-//! **Invariant:** a switch that is in that position already changes nothing.
+//! **Invariant:** a switch that is in that position already changes nothing, but that a commanded effort ends.
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -115,16 +115,29 @@ impl<const N: usize> Handler<Call<Enable>> for ArmSim<N> {
 
     fn handle(&mut self, call: Call<Enable>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
-        call.reply.conclude(self.enable(call.ask));
+        let (reply, echo) = (call.reply, self.enable(call.ask));
+        let answer = move || reply.conclude(echo);
+        // A path ends with the controller, and before the answer.
+        if self.simulation.pid().is_enabled() {
+            answer();
+        } else {
+            self.after_barriers(ctx, answer);
+        }
     }
 }
 
 impl<const N: usize> ArmSim<N> {
     fn enable(&mut self, ask: Enable) -> Echo<bool> {
+        let commanded = self
+            .simulation
+            .command()
+            .iter()
+            .any(|effort| *effort != 0.0);
         if let Some(on) = ask.enabled
-            && on != self.simulation.pid().is_enabled()
+            && (on != self.simulation.pid().is_enabled() || commanded)
         {
             self.change(ArmInput::Enabled(on));
+            self.goals.setpoint_waits = false;
             self.restart_energy_drift();
         }
         Echo {

@@ -7,6 +7,7 @@ use std::pin::Pin;
 use actix::prelude::*;
 use glam::DVec2;
 
+use crate::actors::arm::sim::messages::Obstacle;
 use crate::actors::arm::sim::messages::{Barrier, GoalJudged, Pose};
 use crate::math::goal::{Cadence, Goal, Outcome};
 use crate::math::kinematics::forward;
@@ -18,6 +19,8 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) tracked: Option<Tracked<N>>,
     /// How the latest goal ended, for a question that crossed the news on its way.
     pub(crate) latest: Option<GoalJudged<N>>,
+    /// A client has sent a setpoint while the controller was off, and it is off still.
+    pub(crate) setpoint_waits: bool,
     /// Everything before the last reset.
     pub(crate) past: Past,
     /// The nodes that tell clients of goals, to be asked whether all news have been passed on.
@@ -128,5 +131,6 @@ pub(crate) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Po
         time: simulation.time(),
         resets: past.resets,
         simulated: past.time + simulation.time(),
+        obstacle: Obstacle::of(simulation),
     }
 }

@@ -1,4 +1,4 @@
-//! The arm's memory of its largest stable timestep, and which loops share one.
+//! The arm's memory of its largest stable timestep and control period, and which loops share one.
 //!
 //! **Invariant:** a limit is kept together with the loop that it is about.
 
@@ -6,6 +6,7 @@ use actix::prelude::*;
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::messages::HeldLimit;
+use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
 
 /// The arm's memory of its limit.
@@ -17,10 +18,11 @@ pub(crate) struct LimitWatch<const N: usize> {
     pub(crate) asked: Option<(ControlLoop<N>, Instant)>,
     /// The answer is on its way.
     pub(crate) waiting: bool,
-    /// The latest answer \[s\], infinite where nothing limits, and the loop that it is about.
-    pub(crate) known: Option<(ControlLoop<N>, f64)>,
-    /// Whether the timestep was too long when that was last published.
-    pub(crate) warned: bool,
+    /// The latest answer, and the loop that it is about.
+    pub(crate) known: Option<(ControlLoop<N>, ClockLimits)>,
+    /// Whether a timestep or a period was too long, and whether the controller held a goal up, when that was last
+    /// published.
+    pub(crate) warned: (bool, bool),
 }
 
 /// Whether two loops have one limit: it depends on everything but the timestep.
@@ -30,5 +32,8 @@ pub(crate) fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlL
 
 /// Whether two loops differ in setpoint and timestep at most.
 pub(crate) fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.arm == other.arm && one.gains == other.gains && one.method == other.method
+    one.arm == other.arm
+        && one.gains == other.gains
+        && one.method == other.method
+        && one.period == other.period
 }

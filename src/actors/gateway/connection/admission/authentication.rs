@@ -2,16 +2,16 @@
 //!
 //! **Invariant:** nothing behind a first frame that does not show the token is looked at.
 
+use bytes::BytesMut;
 use tokio::io::AsyncRead;
 use tokio::time::{Instant, timeout_at};
 
 use super::MAX_AUTH_BYTES;
 use crate::actors::gateway::connection::transport::read_some;
-use crate::actors::gateway::connection::unfinished::First;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
 use crate::protocol::op::{self, Op};
-use crate::protocol::wire::frame::{Frame, FrameError, FrameReader};
+use crate::protocol::wire::frame::{Frame, FrameReader};
 
 /// Why a client that has to show a token is not admitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -28,45 +28,57 @@ pub(crate) enum AuthError {
     Crowded,
 }
 
-/// Reads until `due` up to a first frame that shows the token; `first` has been read already, and is empty afterwards.
-/// The reader keeps what came behind the frame.
+/// Reads until `due` up to a first frame that shows the token, and returns whether it is that of a command of this
+/// program. All that was read stays in `first`.
 pub(crate) async fn authenticate<S: AsyncRead + Unpin>(
     token: &Token,
     stream: &mut S,
-    first: &mut First,
+    first: &mut BytesMut,
     due: Instant,
-) -> Result<FrameReader, AuthError> {
+) -> Result<bool, AuthError> {
+    let frame = first_frame(stream, first, due).await?;
+    match op::read(&frame.text).op {
+        Ok(Op::Auth {
+            token: Some(shown),
+            is_command,
+        }) if token.matches(&shown) => Ok(is_command),
+        Ok(Op::Auth { token: Some(_), .. }) => Err(AuthError::Wrong),
+        _ => Err(AuthError::NotShown),
+    }
+}
+
+/// Reads until `due` up to a first frame, and returns whether it is that of a command of this program. All that was
+/// read stays in `first`.
+pub(crate) async fn opens_as_command<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    first: &mut BytesMut,
+    due: Instant,
+) -> bool {
+    let frame = first_frame(stream, first, due).await;
+    let op = frame.map(|frame| op::read(&frame.text).op);
+    matches!(op, Ok(Ok(Op::Auth { is_command, .. })) if is_command)
+}
+
+async fn first_frame<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    first: &mut BytesMut,
+    due: Instant,
+) -> Result<Frame, AuthError> {
     let mut frames = FrameReader::new();
-    let mut received = 0;
+    let mut seen = 0;
     loop {
-        received += first.bytes.len();
-        frames.push(&first.bytes);
-        first.bytes.clear();
-        first
-            .unfinished
-            .keep(first.bytes.capacity() + frames.buffered());
+        frames.push(first.get(seen..).unwrap_or_default());
+        seen = first.len();
         if let Some(frame) = frames.next() {
-            return shows(token, frame.as_ref()).map(|()| frames);
+            return frame.map_err(|_| AuthError::NotShown);
         }
-        if received > MAX_AUTH_BYTES {
+        if seen > MAX_AUTH_BYTES {
             return Err(AuthError::TooMuch);
         }
-        match timeout_at(due, read_some(stream, &mut first.bytes)).await {
+        match timeout_at(due, read_some(stream, first)).await {
             Err(_) => return Err(AuthError::TooLate),
             Ok(Ok(0) | Err(_)) => return Err(AuthError::NotShown),
             Ok(Ok(_)) => {}
         }
-    }
-}
-
-/// Whether a client's first frame shows the token.
-fn shows(token: &Token, frame: Result<&Frame, &FrameError>) -> Result<(), AuthError> {
-    let Ok(frame) = frame else {
-        return Err(AuthError::NotShown);
-    };
-    match op::read(&frame.text).op {
-        Ok(Op::Auth { token: shown }) if token.matches(&shown) => Ok(()),
-        Ok(Op::Auth { .. }) => Err(AuthError::Wrong),
-        _ => Err(AuthError::NotShown),
     }
 }

@@ -23,17 +23,50 @@ pub const FREE_ATTEMPTS: u32 = 5;
 /// Addresses that are kept in mind, some 64 KiB of them. An attacker with more of them is not slowed down.
 pub const MAX_ADDRESSES: usize = 1024;
 
+/// Least time between two warnings about one address.
+const WARNING_INTERVAL: Duration = Duration::from_secs(60);
+
 /// Addresses with recent failed attempts. Each has the time at which all its attempts are answered, at one every
 /// [`ATTEMPT_INTERVAL`]; every attempt moves it further ahead of now.
 #[derive(Debug, Default)]
-pub(crate) struct FailedAttempts(Mutex<HashMap<IpAddr, Instant>>);
+pub(crate) struct FailedAttempts {
+    answers: Mutex<HashMap<IpAddr, Instant>>,
+    /// Addresses that were warned about: when, and how many wrong tokens have come from them since.
+    warnings: Mutex<HashMap<IpAddr, (Instant, u64)>>,
+}
 
 impl FailedAttempts {
+    /// Counts a wrong token. If a warning about the address is due, returns how many came since the last.
+    pub(crate) fn due_warning(&self, from: IpAddr) -> Option<u64> {
+        let (now, from) = (Instant::now(), network(from));
+        let mut known = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() >= MAX_ADDRESSES && !known.contains_key(&from) {
+            known.retain(|_, (warned, _)| now < *warned + WARNING_INTERVAL);
+        }
+        let is_full = known.len() >= MAX_ADDRESSES;
+        match known.get_mut(&from) {
+            Some((warned, wrong)) if now < *warned + WARNING_INTERVAL => {
+                *wrong += 1;
+                None
+            }
+            Some((warned, wrong)) => {
+                *warned = now;
+                Some(std::mem::take(wrong) + 1)
+            }
+            // More addresses in a minute than are kept in mind: nobody reads a line for each.
+            None if is_full => None,
+            None => {
+                known.insert(from, (now, 0));
+                Some(1)
+            }
+        }
+    }
+
     /// How long the answer to a wrong token waits that came from there now; `None` if it is not answered, because
     /// too many came before.
     pub(crate) fn wait(&self, from: IpAddr) -> Option<Duration> {
         let (now, from) = (Instant::now(), network(from));
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
         if known.len() >= MAX_ADDRESSES && !known.contains_key(&from) {
             let calmest = known.iter().min_by_key(|(_, even)| **even);
             if let Some(calmest) = calmest.map(|(address, _)| *address) {
@@ -87,6 +120,24 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
+    async fn an_address_is_warned_of_once_a_minute_with_a_count() {
+        let attempts = FailedAttempts::default();
+        assert_eq!(attempts.due_warning(HERE), Some(1));
+        for _ in 0..100 {
+            assert_eq!(attempts.due_warning(HERE), None);
+        }
+        let elsewhere = "192.0.2.1".parse().unwrap();
+        assert_eq!(attempts.due_warning(elsewhere), Some(1));
+        tokio::time::advance(WARNING_INTERVAL).await;
+        assert_eq!(attempts.due_warning(HERE), Some(101));
+        for n in 0..2 * MAX_ADDRESSES {
+            let bits = u32::try_from(n).unwrap();
+            attempts.due_warning(IpAddr::V4(bits.into()));
+        }
+        assert!(attempts.warnings.lock().unwrap().len() <= MAX_ADDRESSES);
+    }
+
+    #[tokio::test(start_paused = true)]
     async fn so_many_addresses_are_kept_and_the_calmest_goes_first() {
         let attempts = FailedAttempts::default();
         for _ in 0..=FREE_ATTEMPTS {
@@ -95,7 +146,7 @@ mod tests {
         for number in 0..2 * MAX_ADDRESSES {
             let bits = u32::try_from(number).unwrap();
             assert!(attempts.wait(IpAddr::V4(bits.into())).is_some());
-            assert!(attempts.0.lock().unwrap().len() <= MAX_ADDRESSES);
+            assert!(attempts.answers.lock().unwrap().len() <= MAX_ADDRESSES);
         }
         assert_eq!(
             attempts.wait(HERE),

@@ -5,14 +5,14 @@
 
 pub(super) mod authentication;
 mod failed_attempts;
-mod slots;
+pub(super) mod slots;
 
 use self::failed_attempts::FailedAttempts;
 pub use self::failed_attempts::{ATTEMPT_INTERVAL, FREE_ATTEMPTS, MAX_ADDRESSES};
 use self::slots::Slots;
 use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
-use crate::web::{MAX_REQUESTS, Site};
+use crate::web::Site;
 
 /// Bytes that a client may send before it has shown its token.
 pub const MAX_AUTH_BYTES: usize = 16 * 1024;
@@ -20,9 +20,8 @@ pub const MAX_AUTH_BYTES: usize = 16 * 1024;
 /// for the next: whoever shows the token at once is never the oldest of so many.
 pub const MAX_UNAUTHENTICATED: usize = 128;
 
-/// Requests whose heads are not complete: the oldest makes room for the next, and a browser sends a head at once.
-#[cfg(feature = "web")]
-pub const MAX_HEADS: usize = 128;
+/// Clients that wait for a kept place, where no other place is free. The oldest is refused when there are more.
+pub const MAX_WAITING: usize = 128;
 
 /// The conditions under which a listener admits clients.
 #[derive(Debug, Default)]
@@ -42,16 +41,8 @@ pub struct Newcomers {
     /// Slots of clients that have to show the token and have not.
     pub(super) unauthenticated: Slots,
     pub(super) failed_attempts: FailedAttempts,
-    /// Slots of requests whose heads are not complete, where there is no token to be shown.
-    #[cfg(feature = "web")]
-    pub(super) heads: Slots,
-    /// Slots of responses to requests.
-    #[cfg(feature = "web")]
-    pub(super) answers: Slots,
-    /// Slots of responses that are files of the report, apart: a client that takes one slowly keeps nobody from the
-    /// page.
-    #[cfg(feature = "web")]
-    pub(super) files: Slots,
+    /// Slots of clients that may have a kept place, while they have not shown it or none is free.
+    pub(super) waiting: Slots,
 }
 
 impl Newcomers {
@@ -61,12 +52,7 @@ impl Newcomers {
         Self {
             unauthenticated: Slots::new(unauthenticated),
             failed_attempts: FailedAttempts::default(),
-            #[cfg(feature = "web")]
-            heads: Slots::new(MAX_HEADS),
-            #[cfg(feature = "web")]
-            answers: Slots::new(MAX_REQUESTS),
-            #[cfg(feature = "web")]
-            files: Slots::new(MAX_REQUESTS),
+            waiting: Slots::new(MAX_WAITING),
         }
     }
 }

@@ -42,6 +42,10 @@ impl Slots {
         }
     }
 
+    fn remove(&self, notice: &Arc<Notify>) {
+        self.taken().retain(|one| !Arc::ptr_eq(one, notice));
+    }
+
     fn taken(&self) -> MutexGuard<'_, VecDeque<Arc<Notify>>> {
         self.taken.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -55,6 +59,12 @@ pub(crate) struct HeldSlot<'a> {
 }
 
 impl HeldSlot<'_> {
+    /// Gives the slot back before this is dropped. Nobody is evicted from it then.
+    #[cfg(feature = "web")]
+    pub(crate) fn give_back(&self) {
+        self.slots.remove(&self.notice);
+    }
+
     /// Ends when somebody else has the slot. It must not be awaited again after that.
     pub(crate) async fn evicted(&self) {
         self.notice.notified().await;
@@ -63,8 +73,7 @@ impl HeldSlot<'_> {
 
 impl Drop for HeldSlot<'_> {
     fn drop(&mut self) {
-        let mut taken = self.slots.taken();
-        taken.retain(|one| !Arc::ptr_eq(one, &self.notice));
+        self.slots.remove(&self.notice);
     }
 }
 

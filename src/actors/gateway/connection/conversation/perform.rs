@@ -6,16 +6,15 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::reader::Reader;
-use crate::actors::gateway::limits::{FREE_DELIVERIES, READ_HERE};
+use crate::actors::gateway::connection::transport::Inbound;
 use crate::actors::gateway::messages::{Request, Respond, form_of};
-use crate::actors::gateway::turns;
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
-use crate::actors::resources::budget::Share;
+use crate::actors::resources::memory::{SHORT, cover};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{
-    self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Subscribe,
+    self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
 };
 use crate::protocol::wire::frame::{Cut, Foreign, FrameError, FrameReader, RawFrame, is_host_line};
 use crate::protocol::wire::payload::Payload;
@@ -28,38 +27,39 @@ const UNREADABLE: &str = "a frame could not be read";
 
 impl Reader {
     /// Performs what has been cut off the stream, to its end.
-    pub(super) async fn take(&mut self, cut: Cut) {
-        let length = match &cut {
-            Cut::Frame(frame) => frame.len(),
-            Cut::Lines(lines) => lines.frames.len(),
-            Cut::Error(_) => 0,
-        };
-        let mut share = self.share_for(length);
+    pub(super) async fn take<I: Inbound>(&mut self, cut: Cut, input: &mut I) {
         let frame = match cut {
             Cut::Frame(frame) => frame,
             Cut::Lines(lines) => {
                 self.speaks_json = true;
                 self.shared.outgoing.set_singly(false);
-                return self.perform(None, Op::PublishLines(lines), share).await;
+                return self.perform(None, Op::PublishLines(lines), 0).await;
             }
-            Cut::Error(FrameError::NotAnObject(start))
+            Cut::Error(FrameError::NotAnObject(start), _)
                 if !self.speaks_json && !self.takes_binary() && is_host_line(&start) =>
             {
                 return self.refuse(Foreign::Http.explanation());
             }
-            Cut::Error(error) => return self.complain(&error.to_string(), None).await,
+            Cut::Error(error, start) => {
+                return self.act_on(op::read_start(&start, &error), 0).await;
+            }
         };
         self.speaks_json = true;
         self.shared.outgoing.set_singly(!frame.newline());
-        let incoming = match self.read_frame(length, move || read(frame)).await {
-            Some(Ok(incoming)) => incoming,
-            Some(Err(error)) => return self.complain(&error.to_string(), None).await,
-            None => return,
-        };
-        let Some(incoming) = self.assemble(incoming, &mut share).await else {
+        let length = frame.len();
+        if length > SHORT {
+            self.performed = Some(self.permit(input).await);
+        }
+        let Some(incoming) = self.read_frame(length, move || read(frame)).await else {
             return;
         };
-        share.resize(incoming.allocated());
+        if let Some((incoming, length)) = self.assemble(incoming, length, input).await {
+            self.act_on(incoming, length).await;
+        }
+    }
+
+    /// Acts on a frame that was read.
+    async fn act_on(&self, incoming: Incoming, length: usize) {
         let Incoming { id, op } = incoming;
         match op {
             Ok(Op::Subscribe(Subscribe { encoding, .. }))
@@ -67,7 +67,7 @@ impl Reader {
             {
                 self.complain(NO_BINARY, id.as_ref()).await;
             }
-            Ok(op) => self.perform(id, op, share).await,
+            Ok(op) => self.perform(id, op, length).await,
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
                 let form = form_of(&self.shared.wants_text);
@@ -87,40 +87,52 @@ impl Reader {
         }
     }
 
-    /// Takes room for a frame of so many bytes that is being read: its text, and what has been read of it already.
-    fn share_for(&self, length: usize) -> Share {
-        self.shared.account.take(2 * length)
-    }
-
     /// Returns `incoming` unless it is a fragment. For a fragment, returns the whole frame once the last piece is
-    /// there; `share` is then that frame's.
-    async fn assemble(&mut self, incoming: Incoming, share: &mut Share) -> Option<Incoming> {
+    /// there. With it comes the length of the frame.
+    async fn assemble<I: Inbound>(
+        &mut self,
+        incoming: Incoming,
+        length: usize,
+        input: &mut I,
+    ) -> Option<(Incoming, usize)> {
         let Ok(Op::Fragment(piece)) = incoming.op else {
-            return Some(incoming);
+            return Some((incoming, length));
         };
         let id = incoming.id;
+        if self.pieces.is_none() && self.fragments.allocated() + length > SHORT {
+            let permit = self.performed.take();
+            self.pieces = Some(match permit {
+                Some(permit) => permit,
+                None => self.permit(input).await,
+            });
+        }
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(whole) => whole?,
             Err(why) => {
-                self.complain(&why.to_string(), id.as_ref()).await;
-                return None;
+                let refused = op::read_start(&self.fragments.take_refused(), &why);
+                return Some((under_id(refused, id), 0));
             }
         };
         let length = whole.bytes();
-        *share = self.share_for(length);
-        let why = match self
+        if self.fragments.allocated() == 0 {
+            self.performed = self.pieces.take();
+        } else {
+            self.performed.clone_from(&self.pieces);
+        }
+        let whole = self
             .read_frame(length, move || read_whole(&whole.text()))
-            .await??
-        {
-            Ok(Incoming {
-                op: Ok(Op::Fragment(_)),
-                ..
-            }) => NESTED_FRAGMENT.to_owned(),
-            Ok(whole) => return Some(whole),
-            Err(why) => why.to_string(),
+            .await??;
+        let whole = match whole.op {
+            Ok(Op::Fragment(_)) => Incoming {
+                id,
+                op: Err(OpError::Status(Problem::NotAFrame(
+                    NESTED_FRAGMENT.to_owned(),
+                ))),
+            },
+            Err(OpError::Status(Problem::NotAFrame(_))) => under_id(whole, id),
+            _ => whole,
         };
-        self.complain(&why, id.as_ref()).await;
-        None
+        Some((whole, length))
     }
 
     /// Reads a frame of `length` bytes: a long one on another thread, while the other clients are served. `None` if
@@ -130,7 +142,7 @@ impl Reader {
         length: usize,
         read: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
-        if length <= READ_HERE {
+        if length <= SHORT {
             return Some(read());
         }
         let read = aside(Errand::reading(length), read).await;
@@ -158,7 +170,7 @@ impl Reader {
     async fn say(&self, frame: Bytes, status: Option<Level>) {
         let respond = Respond {
             connection: self.id,
-            frame: frame.into(),
+            frame: cover(self.performed.as_ref(), frame).into(),
             service: None,
             status,
             done: None,
@@ -166,42 +178,54 @@ impl Reader {
         let _ = self.shared.registry.send(respond).await;
     }
 
-    /// Has the registry perform an op; its share is kept until it has taken effect.
-    async fn perform(&self, id: Option<Payload>, op: Op, share: Share) {
+    /// Has the registry perform an op, which came in a frame of that length.
+    async fn perform(&self, id: Option<Payload>, op: Op, length: usize) {
         let is_computation = matches!(&op, Op::CallService(CallService { service, .. })
             if Service::from_name(service).is_some_and(Service::is_computation));
         let from = self.id;
-        let request = Request { from, id, op };
+        let permit = self.performed.clone();
+        let request = Request {
+            from,
+            id,
+            op,
+            permit,
+        };
         if is_computation {
-            return self.shared.enqueue_computation(request, share);
+            return self.shared.enqueue_computation(request, length);
         }
         if let Ok(handled) = self.shared.registry.send(request).await {
             if handled.is_with_a_node() {
                 stay_awake();
             }
-            let deliveries = handled.deliveries();
             handled.effect().await;
-            if deliveries > FREE_DELIVERIES {
-                turns::read_after(deliveries).await;
-            }
         }
-        drop(share);
     }
 }
 
-fn read(frame: RawFrame) -> Result<Incoming, FrameError> {
-    frame.decode().map(|frame| op::read(&frame.text))
+/// An error that is told under the id of the pieces, unless it ends a call.
+fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
+    match incoming.op {
+        Err(_) => Incoming { id, ..incoming },
+        Ok(_) => incoming,
+    }
+}
+
+fn read(frame: RawFrame) -> Incoming {
+    match frame.decode() {
+        Ok(frame) => op::read(&frame.text),
+        Err((error, start)) => op::read_start(&start, &error),
+    }
 }
 
 /// Reads a frame that came in pieces, under the same bounds and with the same leniency as any other. `None` if there is
 /// nothing but white space. Nothing is done of a text with more than one frame.
-fn read_whole(text: &str) -> Option<Result<Incoming, FrameError>> {
+fn read_whole(text: &str) -> Option<Incoming> {
     let mut frames = FrameReader::new();
     frames.push(text.as_bytes());
     frames.push(b"\n");
-    let frame = frames.next_raw()?;
-    Some(match (frame, frames.next_raw()) {
-        (Ok(_), Some(_)) => Err(FrameError::MoreBehind),
-        (frame, _) => frame.and_then(read),
+    Some(match (frames.next_raw()?, frames.next_raw()) {
+        (Ok(_), Some(_)) => op::read_start(text.as_bytes(), &FrameError::MoreBehind),
+        (Ok(frame), None) => read(frame),
+        (Err(error), _) => op::read_start(text.as_bytes(), &error),
     })
 }

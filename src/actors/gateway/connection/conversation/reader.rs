@@ -7,15 +7,16 @@ use std::rc::Rc;
 
 use actix::prelude::*;
 use bytes::BytesMut;
+use tokio::task::yield_now;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use crate::actors::ConnectionId;
 use crate::actors::gateway::connection::shared::Shared;
 use crate::actors::gateway::connection::transport::{CHUNK, Inbound, discard};
 use crate::actors::gateway::connection::unfinished::Unfinished;
-use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN, RESPONSES_TIME};
-use crate::actors::gateway::messages::{Disconnect, Ended, Finish, Retire};
-use crate::actors::gateway::turns;
+use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
+use crate::actors::gateway::messages::{Disconnect, Finish, Retire};
+use crate::actors::resources::memory::{Permit, SHORT};
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
 use crate::protocol::wire::frame::{Cut, FrameReader};
 
@@ -30,8 +31,14 @@ pub(crate) struct Reader {
     frames: FrameReader,
     /// Frames that come in pieces.
     pub(super) fragments: Fragments,
-    /// Counts the frames and messages that are not complete yet.
     unfinished: Unfinished,
+    /// The room for those pieces, once they are long together.
+    pub(super) pieces: Option<Permit>,
+    /// The room for the long frame that is coming.
+    coming: Option<Permit>,
+    /// The room for the long frame that has come, until its client may be read again: then the answers to it have been
+    /// written.
+    pub(super) performed: Option<Permit>,
     /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
     pub(super) speaks_json: bool,
     /// The stream has ended; what came before may still wait.
@@ -44,7 +51,6 @@ impl Reader {
         shared: Rc<Shared>,
         finish: Recipient<Finish>,
         frames: FrameReader,
-        unfinished: Unfinished,
     ) -> Self {
         Self {
             id,
@@ -52,7 +58,10 @@ impl Reader {
             finish,
             frames,
             fragments: Fragments::default(),
-            unfinished,
+            unfinished: Unfinished::default(),
+            pieces: None,
+            coming: None,
+            performed: None,
             speaks_json: false,
             has_ended: false,
         }
@@ -70,6 +79,7 @@ impl Reader {
             // A broken stream takes no answers, and nobody waits for those that don't come.
             Err(_) => self.shared.abandon_computations(),
         }
+        (self.coming, self.pieces) = (None, None);
         // Answers that are on their way arrive before the registry answers this, and so before the end.
         let _ = self.shared.registry.send(Disconnect(self.id)).await;
         let _ = self.finish.send(Finish).await;
@@ -86,27 +96,28 @@ impl Reader {
     ) -> std::io::Result<()> {
         loop {
             let full = chunk.len() >= CHUNK / 2;
-            if !turns::may_read(chunk.len()) {
-                turns::read_bytes(chunk.len()).await;
-            }
             self.frames.push(&chunk);
             chunk.clear();
             let mut in_a_row = 0;
             while let Some(cut) = self.next(input, &mut chunk).await? {
                 in_a_row += 1;
-                if in_a_row > FREE_FRAMES {
-                    turns::read().await;
+                if in_a_row % FRAMES_IN_A_ROW == 0 {
+                    yield_now().await;
                 }
                 self.unfinished.begin_anew();
-                self.take(cut).await;
+                self.take(cut, input).await;
                 if self.shared.is_refused() {
                     return Ok(());
                 }
             }
-            self.keep_unfinished(&chunk);
+            if !self.frames.is_unfinished() {
+                self.unfinished.begin_anew();
+            } else if self.coming.is_none() && self.frames.buffered() > SHORT {
+                self.coming = Some(self.permit(input).await);
+            }
             if full {
                 // The many chunks of a long frame may all be at hand.
-                turns::read().await;
+                yield_now().await;
             }
             if self.shared.is_finishing() {
                 break;
@@ -118,7 +129,7 @@ impl Reader {
                 break;
             }
             match self.read(input, &mut chunk).await? {
-                Some(0) => self.note_end(),
+                Some(0) => self.has_ended = true,
                 Some(_) => {}
                 None => {
                     self.refuse(TOO_SLOW);
@@ -130,12 +141,6 @@ impl Reader {
             self.complain(&error.to_string(), None).await;
         }
         Ok(())
-    }
-
-    /// The client has ended its stream: from now on it only waits.
-    fn note_end(&mut self) {
-        self.has_ended = true;
-        self.shared.registry.do_send(Ended(self.id));
     }
 
     /// Reads on; `None` if a frame that has begun takes too long. Meanwhile pieces of messages grow old, and are
@@ -166,17 +171,25 @@ impl Reader {
                 return Ok(None);
             }
             self.fragments.forget_old(Instant::now().into_std());
-            self.keep_unfinished(chunk);
+            self.keep_room_for_pieces();
         }
     }
 
-    /// Counts what is kept of what is not complete yet.
-    fn keep_unfinished(&mut self, chunk: &BytesMut) {
-        if !self.frames.is_unfinished() {
-            self.unfinished.begin_anew();
+    /// The room for a long frame: it has been taken, or the client has some for pieces, or it is waited for. Nobody
+    /// waits who has room: that might be what others wait for.
+    pub(super) async fn permit<I: Inbound>(&mut self, input: &mut I) -> Permit {
+        let taken = self.coming.take().or_else(|| input.take_permit());
+        match taken.or_else(|| self.pieces.clone()) {
+            Some(permit) => permit,
+            None => self.shared.memory.long_frame().await,
         }
-        let kept = self.frames.buffered() + self.fragments.allocated() + chunk.capacity();
-        self.unfinished.keep(kept);
+    }
+
+    /// Gives back the room for pieces once there are none.
+    fn keep_room_for_pieces(&mut self) {
+        if self.pieces.is_some() && self.fragments.allocated() == 0 {
+            self.pieces = None;
+        }
     }
 
     /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
@@ -205,6 +218,8 @@ impl Reader {
         while !self.shared.may_read() && !self.shared.is_finishing() {
             self.wait_for_room(input, chunk).await?;
         }
+        self.performed = None;
+        self.keep_room_for_pieces();
         Ok(self.frames.cut())
     }
 
@@ -226,9 +241,8 @@ impl Reader {
             () = shared.room.notified() => {}
             read = input.read(chunk), if chunk.len() < CHUNK => {
                 if read? == 0 {
-                    self.note_end();
+                    self.has_ended = true;
                 }
-                self.keep_unfinished(chunk);
             }
         }
         Ok(())

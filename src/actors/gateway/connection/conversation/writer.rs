@@ -2,9 +2,8 @@
 //! that is served.
 //!
 //! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
-//! put into the outbox is offered to the socket in the same turn. Where it waits in a queue
-//! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that has taken nothing wakes it by
-//! taking something.
+//! put into the outbox is offered to the socket in the same turn. A client that has taken nothing wakes it by taking
+//! something.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
@@ -20,29 +19,18 @@ use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
 pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
     let mut frames = Vec::new();
     loop {
-        wait_for_turn(shared).await;
-        shared.outgoing.take(&mut frames);
+        shared.outgoing.take(&mut frames, shared.is_finishing());
         if !frames.is_empty() {
             if !write_frames(&mut output, &mut frames, shared).await {
                 return false;
             }
         } else if shared.is_done() {
             return timeout(LINGER, output.end()).await.is_ok();
-        } else if !tend(&mut output, shared).await {
+        } else if !tend(&mut output, shared).await || shared.outgoing.is_stuck() {
             return false;
         } else {
             wait(shared).await;
         }
-    }
-}
-
-/// Waits for a turn where many clients are written to. Responses wait for none.
-async fn wait_for_turn(shared: &Shared) {
-    let outgoing = &shared.outgoing;
-    if let Some(bytes) = outgoing.topics_alone()
-        && !outgoing.queue().may_write(bytes)
-    {
-        outgoing.wait_for_turn(bytes).await;
     }
 }
 
@@ -59,7 +47,7 @@ async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
 /// may have come while the transport was being written.
 async fn wait(shared: &Shared) {
     let outgoing = &shared.outgoing;
-    let news = outgoing.news(|| !outgoing.is_empty() || shared.is_done());
+    let news = outgoing.news(|| outgoing.has_something() || shared.is_done());
     match outgoing.next_release() {
         None => news.await,
         Some(release) => {

@@ -41,10 +41,16 @@ impl Patience {
     }
 
     /// When a client that has taken nothing since `last_byte` is given up; `None` if it never is.
-    pub(super) fn end(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
+    pub(super) fn end(
+        &self,
+        last_byte: Instant,
+        is_finishing: bool,
+        has_long: bool,
+    ) -> Option<Instant> {
         let last_byte = last_byte.max(self.taken.get());
         match self.responses_since.get() {
             Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None if has_long && !is_finishing => Some(last_byte + STALL_LIMIT),
             None => is_finishing.then(|| last_byte + LINGER),
         }
     }

@@ -20,13 +20,11 @@ use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
 use super::watched::{READ_BUFFER, Watched};
 use crate::actors::gateway::connection::shared::Shared;
-use crate::actors::gateway::connection::unfinished::Unfinished;
-use crate::actors::gateway::turns;
 use crate::protocol::limits::MAX_FRAME;
 
 /// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
 /// seen to take it.
-pub(super) const FRAGMENT: usize = 64 * 1024;
+pub(super) const FRAGMENT: usize = 32 * 1024;
 /// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
 /// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
 const WRITE_BUFFER: usize = 2 * FRAGMENT;
@@ -51,8 +49,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
             behind,
             Rc::clone(&life),
             Rc::clone(&shared.outgoing),
-            Unfinished::new(&shared.account),
-            shared.account.take(0),
+            shared.memory.clone(),
         );
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
@@ -71,8 +68,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     }
 
     /// The next message; `None` once the connection is closed. Everything is received in turns, since one read may
-    /// bring a thousand pings, each of which is answered. A long message takes turns with other readers: at its last
-    /// byte the library unmasks and checks all of it.
+    /// bring a thousand pings, each of which is answered.
     pub(super) async fn next(&self) -> Option<Result<Message, Error>> {
         loop {
             if !self.socket.borrow().get_ref().is_turn_over() {
@@ -82,19 +78,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
                     return message;
                 }
             }
-            let (is_turn_over, long) = {
-                let mut socket = self.socket.borrow_mut();
-                (socket.get_mut().begin_turn(), socket.get_ref().long())
-            };
-            if !is_turn_over {
+            if self.socket.borrow_mut().get_mut().begin_turn() {
+                // Other sockets are looked at too before this one goes on.
+                yield_now().await;
+            } else {
                 let mut next = Poll::Pending;
                 poll_fn(|_| std::mem::replace(&mut next, Poll::Ready(()))).await;
-            }
-            match long {
-                Some(bytes) => turns::read_bytes(bytes).await,
-                // Other sockets are looked at too before this one goes on.
-                None if is_turn_over => yield_now().await,
-                None => {}
             }
         }
     }

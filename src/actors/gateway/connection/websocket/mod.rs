@@ -1,19 +1,20 @@
-//! HTTP and WebSocket clients: a request is answered and no more, or the stream becomes a WebSocket, whose client is
-//! served like any other.
+//! HTTP and WebSocket clients: requests are answered, until the client ends or opens a WebSocket. Then it is served
+//! like any other.
 //!
 //! A WebSocket message is a frame. The rest of the protocol is done here. Both halves share one socket, since reading a
 //! ping means writing a pong. A peer that shows no sign of life is given up.
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
-mod heads;
 mod link;
 mod watched;
 
-use std::future::poll_fn;
+use std::cell::Cell;
+use std::future::{pending, poll_fn};
 use std::io;
-use std::pin::Pin;
+use std::pin::{Pin, pin};
 use std::rc::Rc;
+use std::task::Poll;
 use std::time::Duration;
 
 use bytes::{Buf, Bytes, BytesMut};
@@ -25,52 +26,106 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 
 use self::link::{FRAGMENT, Link};
-use super::session::ClientSession;
-use super::shared::{Ending, HELD_MOST, Shared};
+use super::admission::authentication::AuthError;
+use super::admission::slots::HeldSlot;
+use super::session::{ClientSession, Newcomer};
+use super::shared::{Ending, Shared};
 use super::transport::{CHUNK, Inbound, Outbound, read_some};
-use super::unfinished::First;
-use crate::actors::ConnectionId;
-use crate::actors::gateway::messages::Request;
+use crate::actors::gateway::limits::OPENING_TIME;
+use crate::actors::gateway::messages::{Outlets, Refused, Request};
+use crate::actors::resources::memory::{Permit, SHORT};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::protocol::wire::frame::FrameReader;
 use crate::web::message::OneLine;
-use crate::web::serve;
+use crate::web::serve::{self, Gate};
 
 /// Ping interval: below the idle timeouts of NATs and proxies.
 pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
 /// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong, which can
 /// be far behind in a full pipe.
 pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
+
+/// Decides about the requests of one client.
+struct HttpGate<'a> {
+    session: &'a ClientSession,
+    /// The ways to a client that has no place yet.
+    outlets: Cell<Option<Outlets>>,
+    /// Its slot, and why it is turned away without.
+    newcomer: Option<(HeldSlot<'a>, Option<Refused>)>,
+}
+
+impl Gate for HttpGate<'_> {
+    async fn admit(&self) -> Result<(), String> {
+        let Some(outlets) = self.outlets.take() else {
+            return Ok(());
+        };
+        if let Some((slot, _)) = &self.newcomer {
+            slot.give_back();
+        }
+        let slot = self.session.admission.newcomers.waiting.take();
+        let due = Instant::now() + OPENING_TIME;
+        let place = self.session.wait_for_place(&outlets, &slot, due).await;
+        place.map(drop).map_err(|why| {
+            self.session.count_refusal(why);
+            why.to_string()
+        })
+    }
+
+    async fn delay(&self) -> bool {
+        self.session.delay_wrong_token().await
+    }
+}
+
+impl HttpGate<'_> {
+    /// Ends when the connection has to: with a sentence, if its slot is another client's.
+    async fn cut_off(&self) -> Option<String> {
+        let evicted = async {
+            let Some((slot, refused)) = &self.newcomer else {
+                return pending().await;
+            };
+            slot.evicted().await;
+            match *refused {
+                None => AuthError::Crowded.to_string(),
+                Some(why) => {
+                    self.session.count_refusal(why);
+                    why.to_string()
+                }
+            }
+        };
+        tokio::select! {
+            () = self.session.shared.finished() => None,
+            why = evicted => Some(why),
+        }
+    }
+}
+
 impl ClientSession {
-    /// Does what a client has asked for over HTTP; `behind` came after its request.
-    pub(super) async fn serve_web<S>(
-        self,
-        mut stream: S,
-        id: ConnectionId,
-        outcome: serve::Served,
-        behind: First,
+    /// Answers the requests of a client, and speaks with it once it has opened a WebSocket. A newcomer has no place
+    /// before its first request is admitted.
+    pub(super) async fn serve_http<S>(
+        &self,
+        stream: S,
+        first: BytesMut,
+        due: Instant,
+        newcomer: Option<Newcomer<'_>>,
     ) where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let (answers, files) = (
-            &self.admission.newcomers.answers,
-            &self.admission.newcomers.files,
-        );
-        let slot = match &outcome {
-            serve::Served::Answer(serve::Resource::Report(_), _) => files.take(),
-            _ => answers.take(),
+        let (outlets, newcomer) = newcomer
+            .map(|newcomer| (newcomer.outlets, (newcomer.slot, newcomer.refused)))
+            .unzip();
+        let gate = HttpGate {
+            session: self,
+            outlets: Cell::new(outlets),
+            newcomer,
         };
-        let is_socket = tokio::select! {
-            biased;
-            () = self.shared.finished() => false,
-            is_socket = serve::respond(&mut stream, outcome, &self.admission.site) => is_socket,
-            () = slot.evicted() => false,
-        };
-        drop(slot);
-        if !is_socket {
+        let place = (&self.admission.site, self.ends.local);
+        let cut_off = gate.cut_off();
+        let served = serve::serve(stream, first, due, place, &gate, cut_off).await;
+        let (Some((stream, behind)), Some(id)) = (served, self.shared.id.get()) else {
             return;
-        }
+        };
         let quiet = Request {
             from: id,
             id: None,
@@ -78,16 +133,17 @@ impl ClientSession {
                 verbosity: Verbosity::NONE,
                 errors: Some(ErrorForm::Text),
             },
+            permit: None,
         };
         let _ = self.shared.registry.send(quiet).await;
-        let link = Link::open(stream, behind.bytes.freeze(), &self.shared).await;
+        let link = Link::open(stream, behind, &self.shared).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
             shared: Rc::clone(&self.shared),
             unfinished: None,
         };
-        let reader = self.reader(id, FrameReader::of_messages(), behind.unfinished);
+        let reader = self.reader(id, FrameReader::of_messages());
         self.talk(reader, input, output, BytesMut::new()).await;
     }
 }
@@ -103,6 +159,8 @@ struct Input<S> {
     unread_since: Option<Instant>,
     /// The message that has come, while some of it has not been read.
     line: Option<OneLine>,
+    /// A long message, kept until the library reads on: it would keep the memory of one that is gone for the next.
+    spent: Option<Bytes>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
@@ -115,11 +173,20 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             asked: None,
             unread_since: Some(now),
             line: None,
+            spent: None,
         }
     }
 
     /// The next message; an error if the peer shows no sign of life.
     async fn next(&mut self) -> io::Result<Option<Result<Message, Error>>> {
+        if self.spent.is_some() {
+            let mut next = pin!(self.link.next());
+            let polled = poll_fn(|cx| Poll::Ready(next.as_mut().poll(cx))).await;
+            self.spent = None;
+            if let Poll::Ready(message) = polled {
+                return Ok(message);
+            }
+        }
         loop {
             let pong_due = self.asked.map(|asked| asked + PONG_TIME);
             let late = self.link.socket.borrow().get_ref().late();
@@ -135,13 +202,21 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
 
     /// Takes what is still to be read of a message: a long one as it would come over TCP, a chunk at a time.
     fn take(&mut self, mut line: OneLine, chunk: &mut BytesMut) {
-        let before = chunk.len();
-        if line.append(CHUNK, chunk) {
-            let read = chunk.len() - before;
-            self.link.socket.borrow_mut().get_mut().complete(read);
-        } else {
+        if !line.append(CHUNK, chunk) {
             self.line = Some(line);
         }
+    }
+
+    fn read_on(&self, unread: Duration, is_next: bool) {
+        let mut socket = self.link.socket.borrow_mut();
+        socket.get_mut().read_on(unread, is_next);
+    }
+
+    /// A message has come.
+    fn begin(&mut self, message: Bytes, chunk: &mut BytesMut) {
+        self.link.socket.borrow_mut().get_mut().complete();
+        self.spent = (message.len() > SHORT).then(|| message.clone());
+        self.take(OneLine::new(message), chunk);
     }
 
     fn look_for_life(&mut self) -> io::Result<()> {
@@ -178,15 +253,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         let unread = self.unread_since.take();
         let unread = unread.map_or(Duration::ZERO, |since| since.elapsed());
         self.asked = self.asked.map(|asked| asked + unread);
-        self.link.socket.borrow_mut().get_mut().read_on(unread);
+        let is_next = self.line.is_none();
+        self.read_on(unread, is_next);
         let before = chunk.len();
         if let Some(line) = self.line.take() {
             self.take(line, chunk);
         }
         while chunk.len() == before {
             match self.next().await? {
-                Some(Ok(Message::Text(text))) => self.take(OneLine::new(text.into()), chunk),
-                Some(Ok(Message::Binary(bytes))) => self.take(OneLine::new(bytes), chunk),
+                Some(Ok(Message::Text(text))) => self.begin(text.into(), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.begin(bytes, chunk),
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
                 // it.
                 Some(Ok(control)) => {
@@ -204,6 +280,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         }
         self.unread_since = Some(Instant::now());
         Ok(chunk.len() - before)
+    }
+
+    fn take_permit(&mut self) -> Option<Permit> {
+        self.link.socket.borrow_mut().get_mut().permit.take()
     }
 
     async fn swallow(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
@@ -294,11 +374,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
     }
 
     async fn end(&mut self) -> io::Result<()> {
-        let (code, why) = if self.shared.ending.get() == Ending::CutOff {
-            (CloseCode::Again, HELD_MOST)
-        } else {
-            self.link.close_reason.get()
-        };
+        let (code, why) = self.link.close_reason.get();
         let reason = Utf8Bytes::from_static(why);
         let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
         let close = Message::Close(Some(CloseFrame { code, reason }));

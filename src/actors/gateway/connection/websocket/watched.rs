@@ -1,7 +1,6 @@
-//! A WebSocket's stream, watched: for signs of life, and for what its other side has begun and not completed.
+//! A WebSocket's stream, watched: for signs of life, for a message that takes too long, and for one that is long.
 //!
-//! **Invariant:** what is kept of unfinished messages, and what waits to be written, is charged to the client's
-//! account.
+//! **Invariant:** of a message that has no room nothing more is read than what needs none.
 
 use std::cell::Cell;
 use std::io;
@@ -14,18 +13,22 @@ use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
-use super::heads::FrameHeads;
 use crate::actors::gateway::connection::outgoing::Outgoing;
-use crate::actors::gateway::connection::transport::CHUNK;
-use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::FRAME_TIME;
-use crate::actors::resources::budget::Share;
-use crate::protocol::limits::MAX_FRAME;
+use crate::actors::resources::memory::{Memory, Permit, SHORT};
 
 /// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
 pub(super) const READ_BUFFER: usize = 8 * 1024;
 /// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
 const TURN: usize = 32 * 1024;
+/// Bytes of a control frame beside its payload: two, and the mask's four.
+const CONTROL_HEAD: usize = 6;
+/// Bytes of a turn that a control frame counts as, beside its own: a ping is answered with a write of its own, which
+/// takes longer than reading these.
+const CONTROL_COST: usize = 1024;
+
+/// The room for a long message, while it is waited for.
+type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 
 /// A stream that notes when its other side last gave a sign of life, and how much it has sent of a message that is not
 /// complete. To send a byte is a sign of life, and so is to take one after a write found no room.
@@ -38,29 +41,17 @@ pub(super) struct Watched<S> {
     outgoing: Rc<Outgoing>,
     /// Whether the last write found no room: the next that does find some is a sign of life.
     is_blocked: bool,
-    unfinished: Unfinished,
-    /// Bytes that belong to no complete message yet, or to one that has just been read.
+    /// Bytes that belong to no complete message.
     pending: usize,
-    /// Follows the frames.
-    heads: FrameHeads,
-    /// The longest frame so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to it,
-    /// and stays so.
-    longest: usize,
-    /// Arrival time of the first byte of what is not complete, plus all time spent not reading.
+    /// Arrival time of the first of them, plus all time spent not reading.
     began: Option<Instant>,
-    /// Whether the pending bytes belong to a message that has just been read.
-    is_complete: bool,
-    /// Bytes that wait to be written, and their buffer, which may be twice as long.
-    unsent: Share,
     /// Bytes that may still be read before others have a turn, however many messages they are.
     turn: usize,
+    memory: Memory,
+    /// The room for the message that comes, if it is long.
+    pub(super) permit: Option<Permit>,
+    waiting: Option<ComingPermit>,
 }
-
-/// Bytes of a control frame beside its payload: two, and the mask's four.
-const CONTROL_HEAD: usize = 6;
-/// Bytes of a turn that a control frame counts as, beside its own: a ping is answered with a write of its own, which
-/// takes longer than reading these.
-const CONTROL_COST: usize = 1024;
 
 impl<S> Watched<S> {
     /// A stream on which `behind` has come so far; `life` is when its other side last gave a sign of life.
@@ -69,33 +60,20 @@ impl<S> Watched<S> {
         behind: Bytes,
         life: Rc<Cell<Instant>>,
         outgoing: Rc<Outgoing>,
-        unfinished: Unfinished,
-        unsent: Share,
+        memory: Memory,
     ) -> Self {
-        let mut watched = Self {
+        Self {
             stream,
             behind,
             life,
             outgoing,
             is_blocked: false,
-            unfinished,
             pending: 0,
-            heads: FrameHeads::default(),
-            longest: 0,
             began: None,
-            is_complete: false,
-            unsent,
             turn: TURN,
-        };
-        watched.set_pending(0);
-        watched
-    }
-
-    /// Bytes have come.
-    fn follow(&mut self, bytes: &[u8]) {
-        let frame = usize::try_from(self.heads.follow(bytes)).unwrap_or(MAX_FRAME);
-        if frame > READ_BUFFER {
-            self.longest = self.longest.max(frame.min(MAX_FRAME));
+            memory,
+            permit: None,
+            waiting: None,
         }
     }
 
@@ -111,49 +89,49 @@ impl<S> Watched<S> {
         self.turn == 0
     }
 
-    /// Bytes that the library has to look at once their message has come, if it is a long one.
-    pub(super) fn long(&self) -> Option<usize> {
-        (self.pending > TURN).then_some(self.pending)
+    /// A message has come whole. Of the next, some may have come with it, which counts as nothing.
+    pub(super) const fn complete(&mut self) {
+        self.pending = 0;
+        self.began = None;
     }
 
-    /// Notes that all of a message has been read; `left` bytes of it have not been dealt with.
-    pub(super) fn complete(&mut self, left: usize) {
-        self.is_complete = true;
-        self.set_pending(left);
-    }
-
-    /// Reading goes on after so long a time: what was complete has been dealt with.
-    pub(super) fn read_on(&mut self, unread: Duration) {
+    /// Reading goes on after so long a time. Where `is_next`, the last message has been read.
+    pub(super) fn read_on(&mut self, unread: Duration, is_next: bool) {
         self.began = self.began.map(|began| began + unread);
-        if std::mem::take(&mut self.is_complete) {
-            // The next message may have come with its end, in part.
-            self.began = self.heads.is_within().then(Instant::now);
-            self.set_pending(0);
+        if is_next && self.pending <= SHORT {
+            self.permit = None;
         }
     }
 
     /// A control frame with so much payload has come: it may stand between the parts of a message.
-    pub(super) fn control(&mut self, payload: usize) {
+    pub(super) const fn control(&mut self, payload: usize) {
         self.turn = self.turn.saturating_sub(CONTROL_COST);
-        self.set_pending(self.pending.saturating_sub(CONTROL_HEAD + payload));
-    }
-
-    /// Counts what is kept, now that `pending` bytes belong to no complete message.
-    fn set_pending(&mut self, pending: usize) {
-        self.pending = pending;
-        if pending == 0 && !self.heads.is_within() {
+        self.pending = self.pending.saturating_sub(CONTROL_HEAD + payload);
+        if self.pending == 0 {
             self.began = None;
         }
-        // Input is kept twice, as it came and as a message. The heads of empty frames are part of neither, and are not
-        // kept.
-        let unfinished = (2 * pending).min(3 * MAX_FRAME);
-        let behind = if self.behind.is_empty() { 0 } else { CHUNK };
-        self.unfinished.keep(unfinished.max(self.longest) + behind);
     }
 
     /// When the message that has begun is late.
     pub(super) fn late(&self) -> Option<Instant> {
         self.began.map(|began| began + FRAME_TIME)
+    }
+
+    /// Waits until there is room for the message that comes, if it is long.
+    fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+        if self.pending <= SHORT || self.permit.is_some() {
+            return Poll::Ready(());
+        }
+        let waiting = self.waiting.get_or_insert_with(|| {
+            let memory = self.memory.clone();
+            Box::pin(async move { memory.long_frame().await })
+        });
+        let Poll::Ready(permit) = waiting.as_mut().poll(cx) else {
+            return Poll::Pending;
+        };
+        self.waiting = None;
+        self.permit = Some(permit);
+        Poll::Ready(())
     }
 }
 
@@ -164,7 +142,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         // No waker is needed: the reader itself begins the next turn.
-        if self.is_turn_over() {
+        if self.is_turn_over() || self.poll_room(cx).is_pending() {
             return Poll::Pending;
         }
         let before = buffer.filled().len();
@@ -185,9 +163,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             let now = Instant::now();
             self.life.set(now);
             self.began.get_or_insert(now);
-            self.follow(buffer.filled().get(before..).unwrap_or_default());
-            let pending = self.pending + received;
-            self.set_pending(pending);
+            self.pending += received;
         }
         polled
     }
@@ -204,16 +180,8 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Watched<S> {
             self.life.set(Instant::now());
         }
         self.is_blocked = polled.is_pending();
-        let taken = match &polled {
-            Poll::Ready(Ok(taken)) => *taken,
-            _ => 0,
-        };
-        if taken > 0 {
+        if matches!(&polled, Poll::Ready(Ok(taken)) if *taken > 0) {
             self.outgoing.note_taken();
-        }
-        let unsent = 2 * (bytes.len() - taken);
-        if unsent != self.unsent.bytes() {
-            self.unsent.resize(unsent);
         }
         polled
     }

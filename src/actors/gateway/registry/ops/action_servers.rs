@@ -5,12 +5,13 @@
 use std::sync::Arc;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{CALL_BYTES, MAX_BACKLOG, MAX_PROVIDED, MAX_WAITING_GOALS};
-use crate::actors::gateway::messages::{Deliver, Frames};
+use crate::actors::gateway::limits::MAX_BACKLOG;
+use crate::actors::gateway::messages::Deliver;
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
 use crate::actors::gateway::registry::tables::action_servers::ForwardedGoal;
 use crate::actors::gateway::registry::tables::services::Provider;
+use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
@@ -54,12 +55,10 @@ impl Registry {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        let provided = client.provided.len() + client.served_actions.len();
-        if provided >= MAX_PROVIDED && !client.served_actions.contains_key(action) {
-            return Err(Refusal::TooManyProvided);
-        }
-        let share = client.register(spelling.len() + type_name.map_or(0, str::len));
-        client.served_actions.insert(action.into(), share);
+        let names = spelling.len() + type_name.map_or(0, str::len);
+        let before = client.served_actions.get(action);
+        let entry = client.kept.enter(names, before)?;
+        client.served_actions.insert(action.into(), entry);
         let server = Provider {
             connection: origin.from,
             spelling: spelling.into(),
@@ -118,9 +117,6 @@ impl Registry {
         if matches!(goal.args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);
         }
-        if self.action_servers.sent_by(from) >= MAX_WAITING_GOALS {
-            return Err(Refusal::TooManyGoals);
-        }
         let (Some(client), Some(sender)) = (
             self.clients.get(&server.connection),
             self.clients.get(&from),
@@ -135,7 +131,7 @@ impl Registry {
         }
         let id_bytes = id.as_ref().map_or(0, Payload::allocated);
         let names = 2 * action.len() + server.spelling.len();
-        let share = sender.outlets.account.take(CALL_BYTES + id_bytes + names);
+        let entry = sender.kept.enter(id_bytes + names, None)?;
         let known_as = self.action_servers.remember(ForwardedGoal {
             sender: from,
             id,
@@ -143,15 +139,15 @@ impl Registry {
             action: Arc::from(action),
             spelling: server.spelling.clone(),
             wants_feedback: goal.feedback,
-            _share: share,
+            _entry: entry,
         });
-        client.send(messages::action_goal(
+        client.send(self.covered(messages::action_goal(
             &server.spelling,
             &known_as,
             goal.type_name.as_deref(),
             goal.args.payload(),
             goal.feedback,
-        ));
+        )));
         Ok(())
     }
 
@@ -194,9 +190,12 @@ impl Registry {
     ) -> Result<(), Refusal> {
         let meant = self
             .action_servers
-            .meant_by_server(origin.id.as_ref(), action, origin.from);
+            .meant_by_server(origin.id.as_ref(), None, origin.from);
         let goal = meant.and_then(|number| self.action_servers.goal(number));
         let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
+        if !names::are_same(&goal.action, action) {
+            return Err(Refusal::OtherAction(goal.action.to_string()));
+        }
         if let Some(sender) = self
             .clients
             .get(&goal.sender)
@@ -204,8 +203,8 @@ impl Registry {
         {
             let frame = messages::action_feedback_raw(&goal.action, goal.id.as_ref(), values);
             sender.outlets.deliver.do_send(Deliver {
-                topic: Arc::clone(&goal.action),
-                frames: Frames::Feedback(self.count(frame)),
+                topic: None,
+                frame: cover_message(self.permit.as_ref(), frame),
                 underway: None,
             });
         }
@@ -219,20 +218,48 @@ impl Registry {
         action: &str,
         encode: impl FnOnce(&ForwardedGoal) -> bytes::Bytes,
     ) -> Result<(), Refusal> {
-        let meant = self
-            .action_servers
-            .meant_by_server(origin.id.as_ref(), action, origin.from);
-        let goal = meant.and_then(|number| self.action_servers.take(number));
-        let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
+        let goal = self
+            .take_ended(origin, None)
+            .ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
+        if !names::are_same(&goal.action, action) {
+            return self.discard_result(&goal, Refusal::OtherAction(goal.action.to_string()));
+        }
         if let Some(sender) = self.clients.get(&goal.sender) {
             if sender.backlog() > MAX_BACKLOG {
                 let why = Refusal::CallerBusy(action.to_owned());
                 self.abort(&goal, &why);
             } else {
-                sender.send(encode(&goal));
+                sender.send(self.covered(encode(&goal)));
             }
         }
         Ok(())
+    }
+
+    /// Ends the goal that a bad result is for, if there is one.
+    pub(crate) fn fail_goal(
+        &mut self,
+        origin: &FrameOrigin,
+        action: Option<&str>,
+        why: Refusal,
+    ) -> Result<(), Refusal> {
+        match self.take_ended(origin, action) {
+            Some(goal) => self.discard_result(&goal, why),
+            None => Err(why),
+        }
+    }
+
+    fn take_ended(&mut self, origin: &FrameOrigin, action: Option<&str>) -> Option<ForwardedGoal> {
+        let meant = self
+            .action_servers
+            .meant_by_server(origin.id.as_ref(), action, origin.from);
+        self.action_servers.take(meant?)
+    }
+
+    /// The goal's sender is told why the result is discarded, and so is the action server.
+    fn discard_result(&self, goal: &ForwardedGoal, why: Refusal) -> Result<(), Refusal> {
+        let action = goal.action.to_string();
+        self.abort(goal, &Refusal::BadAnswer(action, Box::new(why.clone())));
+        Err(why)
     }
 
     /// Tells who sent a goal that it has ended without a result of its server.

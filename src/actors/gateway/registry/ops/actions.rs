@@ -8,7 +8,7 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::messages::{Deliver, Frames, Handled};
+use crate::actors::gateway::messages::{Deliver, Handled};
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
 use crate::actors::node::Feedback;
@@ -39,11 +39,6 @@ impl Registry {
         let Some(client) = self.clients.get(&from) else {
             return Handled::at_once();
         };
-        let id_bytes = id.as_ref().map_or(0, Payload::allocated);
-        let share = client
-            .outlets
-            .account
-            .take(size_of::<ActionClient>() + goal.action.len() + id_bytes);
         let action_client = ActionClient {
             respond: ctx.address().recipient(),
             feedback: ctx.address().recipient(),
@@ -52,7 +47,6 @@ impl Registry {
             id,
             wants_feedback: goal.feedback,
             gone: Arc::clone(&client.outlets.gone),
-            share,
         };
         let node = match refusal.map_or_else(|| self.action_route(&goal), Err) {
             Ok(node) => node,
@@ -121,8 +115,8 @@ impl Handler<Feedback> for Registry {
     fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
         if let Some(client) = self.clients.get(&feedback.connection) {
             client.outlets.deliver.do_send(Deliver {
-                topic: feedback.action,
-                frames: Frames::Feedback(self.count(feedback.frame.write())),
+                topic: None,
+                frame: feedback.frame.write(),
                 underway: None,
             });
         }

@@ -8,7 +8,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
+use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::gateway::messages::{Handled, Tapped};
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
@@ -57,7 +57,7 @@ impl Registry {
                         service,
                         arguments: call.args,
                         caller: caller
-                            .within(Arc::clone(&client.outlets.account))
+                            .within(self.gauges.memory().clone(), self.permit.clone())
                             .with_errors(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
@@ -96,25 +96,21 @@ impl Registry {
         if matches!(call.args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);
         }
-        if self.services.waiting_for(origin.from) >= MAX_WAITING_CALLS {
-            return Err(Refusal::TooManyWaiting);
-        }
         if client.backlog() > MAX_BACKLOG {
             return Err(Refusal::ProviderBusy(service.to_owned()));
         }
+        let Some(caller) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        let id_bytes = origin.id.as_ref().map_or(0, Payload::allocated);
+        let entry = caller.kept.enter(id_bytes + service.len(), None)?;
         let number = self.services.next_call();
         let frame = messages::call(
             &provider.spelling,
             &Services::call_id(number),
             call.args.payload(),
         );
-        let Some(caller) = self.clients.get(&origin.from) else {
-            return Ok(());
-        };
-        let account = &caller.outlets.account;
-        client.send(frame);
-        let id_bytes = origin.id.as_ref().map_or(0, Payload::allocated);
-        let share = account.take(CALL_BYTES + id_bytes + 2 * service.len());
+        client.send(self.covered(frame));
         let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
         self.services.remember(
             number,
@@ -124,7 +120,7 @@ impl Registry {
                 provider: provider.connection,
                 service: service.into(),
                 deadline,
-                _share: share,
+                _entry: entry,
             },
         );
         self.schedule_cleanup(ctx);
@@ -140,8 +136,11 @@ impl Registry {
     ) -> Result<(), Refusal> {
         let call = self
             .services
-            .complete(origin.id.as_ref(), service, origin.from)
+            .complete(origin.id.as_ref(), None, origin.from)
             .ok_or_else(|| Refusal::StaleCall(service.to_owned()))?;
+        if !names::are_same(&call.service, service) {
+            return self.discard_answer(&call, Refusal::OtherService(call.service.to_string()));
+        }
         let Some(caller) = self.clients.get(&call.caller) else {
             return Ok(());
         };
@@ -151,8 +150,31 @@ impl Registry {
             return Ok(());
         }
         let frame = encode(&call.service, call.id.as_ref());
-        caller.send(frame);
+        caller.send(self.covered(frame));
         self.note_answered(call.caller);
         Ok(())
+    }
+
+    /// Fails the call that a bad answer is for, if there is one.
+    pub(crate) fn fail_call(
+        &mut self,
+        origin: &FrameOrigin,
+        service: Option<&str>,
+        why: Refusal,
+    ) -> Result<(), Refusal> {
+        match self
+            .services
+            .complete(origin.id.as_ref(), service, origin.from)
+        {
+            Some(call) => self.discard_answer(&call, why),
+            None => Err(why),
+        }
+    }
+
+    /// The caller is told why its provider's answer is discarded, and so is the provider.
+    fn discard_answer(&mut self, call: &Forwarded, why: Refusal) -> Result<(), Refusal> {
+        let service = call.service.to_string();
+        self.answer_forwarded(call, &Refusal::BadAnswer(service, Box::new(why.clone())));
+        Err(why)
     }
 }

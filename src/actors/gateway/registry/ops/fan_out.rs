@@ -2,35 +2,35 @@
 //! subscriber.
 //!
 //! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
-//! bytes.
+//! bytes. What takes long to encode holds up its publisher alone.
 
 use std::sync::Arc;
 
+use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::encoded::Encoded;
-use crate::actors::gateway::messages::{Deliver, Frames, Handled, Publish, Tapped, Underway};
+use crate::actors::gateway::encoded::{Made, ToEncode};
+use crate::actors::gateway::messages::{Deliver, Handled, Publish, Tapped, Underway};
 use crate::actors::gateway::registry::state::Registry;
 use crate::actors::gateway::registry::tables::topics::Subscriber;
+use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding};
-use crate::protocol::wire::series;
 
 /// Holds a publisher back until its message has been offered to the socket of every subscriber.
 #[derive(Default)]
 pub(crate) struct Pace {
     underway: Option<(Underway, oneshot::Receiver<()>)>,
-    deliveries: usize,
 }
 
 impl Pace {
     /// Makes the guard that goes with the message to a subscriber.
     fn underway(&mut self) -> Underway {
-        self.deliveries += 1;
         let (underway, _) = self.underway.get_or_insert_with(|| {
             let (underway, end) = oneshot::channel();
             (Arc::new(underway), end)
@@ -41,7 +41,7 @@ impl Pace {
     /// Has the message's publisher wait for `handled`, and until every subscriber has the message.
     pub(crate) fn and(self, handled: Handled) -> Handled {
         let end = self.underway.map(|(_, end)| end);
-        handled.and_by_subscribers(end, self.deliveries)
+        handled.and_by_subscribers(end)
     }
 }
 
@@ -50,7 +50,7 @@ impl Registry {
     pub(crate) fn publish_own(
         &mut self,
         Publish { topic, frame }: Publish,
-        pace: Option<&mut Pace>,
+        ctx: &mut Context<Self>,
     ) {
         let name = topic.name();
         if !self.is_wanted(name) {
@@ -58,9 +58,8 @@ impl Registry {
         }
         let frame = frame.write();
         self.tap.pass(Tapped::Published(topic, &frame));
-        self.fan_out(name, pace, |spelling| {
-            messages::respelled(name, spelling, &frame)
-        });
+        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
+        self.fan_out(name, None, encode, ctx);
         if topic.is_latched() {
             self.latched.insert(topic, frame);
         }
@@ -73,38 +72,75 @@ impl Registry {
         topic: &str,
         mut pace: Option<&mut Pace>,
         encode: impl Fn(&str) -> Bytes,
+        ctx: &mut Context<Self>,
     ) {
         for spelling in names::spellings(topic) {
             let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
                 continue;
             };
-            let plain = self.count(encode(spelling));
-            let is_series = series::first_message(&plain) < plain.len();
-            let mut made: Vec<(Encoding, Arc<Encoded>)> = Vec::new();
+            let plain = cover_message(self.permit.as_ref(), encode(spelling));
+            let mut encodings = Vec::new();
             for subscriber in subscribers {
-                let encoding = subscriber.encoding;
-                // Some messages of a series may not be wanted.
-                let is_apart = is_series && subscriber.newest.is_some();
-                let frames = if !is_apart && is_sent_plain(encoding, &plain) {
-                    Frames::Plain(plain.clone())
-                } else {
-                    let known = made.iter().find(|(one, _)| *one == encoding);
-                    let encoded = if let Some((_, encoded)) = known {
-                        Arc::clone(encoded)
-                    } else {
-                        let encoded = Arc::new(self.encoded(name, plain.clone(), encoding));
-                        made.push((encoding, Arc::clone(&encoded)));
-                        encoded
-                    };
-                    Frames::Encoded(encoded, subscriber.newest)
-                };
+                if is_sent_plain(subscriber.encoding, &plain) {
+                    let underway = pace.as_deref_mut().map(Pace::underway);
+                    deliver(subscriber, name, plain.clone(), underway);
+                } else if !encodings.contains(&subscriber.encoding) {
+                    encodings.push(subscriber.encoding);
+                }
+            }
+            if !encodings.is_empty() {
+                let message = self.to_encode(name, plain, encodings);
                 let underway = pace.as_deref_mut().map(Pace::underway);
-                deliver(subscriber, name, frames, underway);
+                self.deliver_encoded(message, underway, ctx);
             }
         }
     }
 
-    /// Delivers a latched topic's last message to a subscriber who came after it.
+    /// Delivers a message in other forms, where it takes long once another thread has made them.
+    fn deliver_encoded(
+        &self,
+        message: ToEncode,
+        underway: Option<Underway>,
+        ctx: &mut Context<Self>,
+    ) {
+        let spelling = Arc::clone(&message.spelling);
+        // A node does not wait, and none of its messages is long.
+        if underway.is_none() || !message.is_long() {
+            return self.deliver_made(&spelling, &message.make(), underway.as_ref());
+        }
+        let made = aside(Errand::writing(message.plain.len()), move || message.make());
+        ctx.spawn(made.into_actor(self).map(move |made, registry, _| {
+            registry.deliver_made(&spelling, &made.unwrap_or_default(), underway.as_ref());
+        }));
+    }
+
+    fn deliver_made(&self, spelling: &str, made: &[(Encoding, Made)], underway: Option<&Underway>) {
+        let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
+            return;
+        };
+        for subscriber in subscribers {
+            let of_form = made.iter().find(|(form, _)| *form == subscriber.encoding);
+            if let Some((_, made)) = of_form {
+                self.deliver_form(subscriber, name, made, underway);
+            }
+        }
+    }
+
+    /// Delivers what could be made of a message in a form; what could not counts as dropped.
+    fn deliver_form(
+        &self,
+        subscriber: &Subscriber,
+        name: &Arc<str>,
+        made: &Made,
+        underway: Option<&Underway>,
+    ) {
+        self.gauges.add_dropped(made.lost);
+        for frame in &made.messages {
+            deliver(subscriber, name, frame.clone(), underway.cloned());
+        }
+    }
+
+    /// Delivers a latched topic's last message for a subscription that came after it.
     pub(crate) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
         let latched =
             Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
@@ -113,18 +149,14 @@ impl Registry {
             .subscribers(spelling)
             .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
         if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
-            let mut plain = messages::respelled(topic.name(), spelling, frame);
-            // Under the topic's own name it is one frame for all, else a copy for this one.
-            if **spelling != *topic.name() {
-                plain = self.count(plain);
+            let plain = messages::respelled(topic.name(), spelling, frame);
+            if is_sent_plain(subscriber.encoding, &plain) {
+                return deliver(subscriber, spelling, plain, None);
             }
-            let frames = if is_sent_plain(subscriber.encoding, &plain) {
-                Frames::Plain(plain)
-            } else {
-                let encoded = self.encoded(spelling, plain, subscriber.encoding);
-                Frames::Encoded(Arc::new(encoded), subscriber.newest)
-            };
-            deliver(subscriber, spelling, frames, None);
+            let message = self.to_encode(spelling, plain, vec![subscriber.encoding]);
+            for (_, made) in message.make() {
+                self.deliver_form(subscriber, spelling, &made, None);
+            }
         }
     }
 
@@ -136,16 +168,16 @@ impl Registry {
         }
     }
 
-    /// A JSON frame, or a series of them, in another encoding.
-    fn encoded(&self, spelling: &Arc<str>, plain: Bytes, encoding: Encoding) -> Encoded {
-        let type_name = self.known_type(spelling);
-        let counters = (&self.fragmented, self.gauges.memory());
-        Encoded::new(spelling, plain, encoding, type_name, counters)
-    }
-
-    /// A message that is being delivered counts once, until the last copy is gone.
-    pub(crate) fn count(&self, frame: Bytes) -> Bytes {
-        self.gauges.memory().count(frame)
+    /// A JSON frame, or a series of them, that is to be made in other forms.
+    fn to_encode(&self, spelling: &Arc<str>, plain: Bytes, encodings: Vec<Encoding>) -> ToEncode {
+        ToEncode {
+            spelling: Arc::clone(spelling),
+            plain,
+            encodings,
+            type_name: self.known_type(spelling).map(Into::into),
+            fragmented: Arc::clone(&self.fragmented),
+            permit: self.permit.clone(),
+        }
     }
 }
 
@@ -156,10 +188,10 @@ fn is_sent_plain(encoding: Encoding, plain: &Bytes) -> bool {
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
-fn deliver(subscriber: &Subscriber, topic: &Arc<str>, frames: Frames, underway: Option<Underway>) {
+fn deliver(subscriber: &Subscriber, topic: &Arc<str>, frame: Bytes, underway: Option<Underway>) {
     subscriber.outlet.do_send(Deliver {
-        topic: Arc::clone(topic),
-        frames,
+        topic: Some(Arc::clone(topic)),
+        frame,
         underway,
     });
 }

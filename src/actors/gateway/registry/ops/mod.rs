@@ -10,12 +10,13 @@ mod cleanup;
 pub(crate) mod fan_out;
 mod subscriptions;
 
+use std::sync::Arc;
+
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use self::fan_out::Pace;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED};
 use crate::actors::gateway::messages::{Handled, Request, Tapped};
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
@@ -41,7 +42,7 @@ impl Registry {
             Op::Publish { topic, msg, heard } => {
                 return self.publish(origin, &topic, &msg, heard, ctx);
             }
-            Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines),
+            Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines, ctx),
             Op::CallService(call) => return self.call(origin, call, ctx),
             Op::SendActionGoal(goal) => {
                 return self.send_action_goal(origin.from, origin.id, goal, ctx);
@@ -87,6 +88,14 @@ impl Registry {
                     messages::response_raw(service, id, &values, result, &status)
                 })
             }
+            Op::BadAnswer {
+                of_goal: true,
+                name,
+                problem,
+            } => self.fail_goal(&origin, name.as_deref(), Refusal::Unreadable(problem)),
+            Op::BadAnswer { name, problem, .. } => {
+                self.fail_call(&origin, name.as_deref(), Refusal::Unreadable(problem))
+            }
         };
         if let Err(why) = refusal {
             self.send_status(
@@ -110,11 +119,10 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let new = !client.advertised.contains_key(topic);
-        if new && client.advertised.len() >= MAX_ADVERTISED {
-            return Err(Refusal::TooManyAdvertised);
-        }
-        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let before = client.advertised.get(topic);
+        let new = before.is_none();
+        let names = topic.len() + type_name.map_or(0, str::len);
+        let entry = client.kept.enter(names, before)?;
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -123,8 +131,7 @@ impl Registry {
         }
         let is_noted = |type_name| self.tally.note_type(topic, type_name);
         if new || type_name.is_some_and(is_noted) {
-            let share = client.register(bytes);
-            client.advertised.insert(topic.into(), share);
+            client.advertised.insert(topic.into(), entry);
         }
         if let Some(topic) = Topic::from_name(topic) {
             client.withdrawn.remove(&topic);
@@ -174,9 +181,8 @@ impl Registry {
             return Handled::at_once();
         }
         let mut pace = Pace::default();
-        self.fan_out(topic, Some(&mut pace), |spelling| {
-            messages::publish_raw(spelling, msg)
-        });
+        let encode = |spelling: &str| messages::publish_raw(spelling, msg);
+        self.fan_out(topic, Some(&mut pace), encode, ctx);
         let Some(listener) = listener else {
             return pace.and(Handled::at_once());
         };
@@ -188,6 +194,8 @@ impl Registry {
             heard: heard.unwrap_or_else(|| msg.clone().into()),
             respond: ctx.address().recipient(),
             connection: origin.from,
+            present: Arc::downgrade(&client.present),
+            listening: Arc::downgrade(&client.listening),
             id: origin.id,
             done,
         });
@@ -195,14 +203,18 @@ impl Registry {
     }
 
     /// Delivers messages of a client as they are, if it advertises the topic.
-    fn publish_lines(&self, from: ConnectionId, lines: &Series) -> Handled {
+    fn publish_lines(
+        &self,
+        from: ConnectionId,
+        lines: &Series,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
         let topic = &*lines.topic;
         let mut pace = Pace::default();
         let client = self.clients.get(&from);
         if client.is_some_and(|client| client.advertised.contains_key(topic)) {
-            self.fan_out(topic, Some(&mut pace), |spelling| {
-                messages::respelled(topic, spelling, &lines.frames)
-            });
+            let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
+            self.fan_out(topic, Some(&mut pace), encode, ctx);
         }
         pace.and(Handled::at_once())
     }
@@ -220,15 +232,12 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let provided = client.provided.len() + client.served_actions.len();
-        if provided >= MAX_PROVIDED && !client.provided.contains_key(service) {
-            return Err(Refusal::TooManyProvided);
-        }
+        let names = spelling.len() + type_name.map_or(0, str::len);
+        let entry = client.kept.enter(names, client.provided.get(service))?;
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        let share = client.register(spelling.len() + type_name.map_or(0, str::len));
-        client.provided.insert(service.into(), share);
+        client.provided.insert(service.into(), entry);
         if let Some(before) = self
             .services
             .provider(service)

@@ -5,9 +5,7 @@
 use std::sync::Arc;
 
 use super::is_listened_to;
-use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::MAX_SUBSCRIPTIONS;
-use crate::actors::gateway::messages::Configure;
+use crate::actors::gateway::messages::{Configure, Throttle};
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
 use crate::actors::gateway::registry::tables::census::Use;
@@ -26,13 +24,21 @@ impl Registry {
         subscribe: &Subscribe,
     ) -> Result<(), Refusal> {
         let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
-        self.may_subscribe(origin.from, id.as_deref(), subscribe)?;
+        self.may_subscribe(id.as_deref(), subscribe)?;
         let topic = subscribe.topic.as_str();
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
         let client = self.clients.get(&origin.from);
         let before = client.and_then(|client| client.subscription(topic, id.as_deref()));
+        let is_new = before.is_none();
+        let entry = client.map(|client| {
+            let instead = before.map(|one| &one.entry);
+            client.kept.enter(topic.len() + bytes, instead)
+        });
+        let Some(entry) = entry.transpose()? else {
+            return Ok(());
+        };
         let size = subscribe.encoding.fragment_size.map(|size| {
             let given_up = before.and_then(|one| one.size.as_ref());
             self.topics.share_size(&absolute, size, given_up)
@@ -41,7 +47,6 @@ impl Registry {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        let share = client.register(topic.len() + bytes);
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
@@ -62,11 +67,18 @@ impl Registry {
                 ..encoding_for(subscribe)
             },
             size,
-            _share: share,
+            entry,
         });
         let throttle = throttle_of(subscriptions);
         self.topics.configure(&name, origin.from, subscriptions);
         let shared = Arc::clone(&name);
+        if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
+            // The throttle of an earlier subscription must not hold back the latched message of this one.
+            client.outlets.configure.do_send(Configure {
+                topic: Arc::clone(&name),
+                throttle: Some(Throttle::NONE),
+            });
+        }
         client.outlets.configure.do_send(Configure {
             topic: name,
             throttle,
@@ -76,29 +88,17 @@ impl Registry {
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
         if first {
             self.tell_owner(topic, true);
-        } else if new {
+        } else if is_new {
             self.deliver_latched(&shared, origin.from);
         }
         Ok(())
     }
 
-    fn may_subscribe(
-        &self,
-        from: ConnectionId,
-        id: Option<&str>,
-        subscribe: &Subscribe,
-    ) -> Result<(), Refusal> {
+    fn may_subscribe(&self, id: Option<&str>, subscribe: &Subscribe) -> Result<(), Refusal> {
         if id.is_some_and(|id| id.len() > MAX_NAME) {
             return Err(Refusal::LongSubscriptionId(MAX_NAME));
         }
         let topic = subscribe.topic.as_str();
-        if let Some(client) = self.clients.get(&from) {
-            let is_new = client.subscription(topic, id).is_none();
-            let held = || client.subscriptions.values().map(Vec::len).sum::<usize>();
-            if is_new && held() >= MAX_SUBSCRIPTIONS {
-                return Err(Refusal::TooManySubscriptions);
-            }
-        }
         if subscribe.encoding.compression == Compression::CborRaw {
             let own = || subscribe.type_name.as_deref().and_then(types::find);
             if self.known_type(topic).is_none() && own().is_none() {

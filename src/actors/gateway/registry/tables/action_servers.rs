@@ -6,10 +6,10 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
+use super::kept::KeptEntry;
 use super::numbers::Numbers;
 use super::services::{Provider, Services};
 use crate::actors::ConnectionId;
-use crate::actors::resources::budget::Share;
 use crate::protocol::names;
 use crate::protocol::wire::payload::Payload;
 
@@ -25,8 +25,8 @@ pub(crate) struct ForwardedGoal {
     /// The same as the server spells it.
     pub(crate) spelling: Box<str>,
     pub(crate) wants_feedback: bool,
-    /// Its share of its sender's account.
-    pub(crate) _share: Share,
+    /// What it takes of its sender's room.
+    pub(crate) _entry: KeptEntry,
 }
 
 /// Action servers, and goals on their way.
@@ -60,11 +60,6 @@ impl ActionServers {
         serves
     }
 
-    /// Goals of `sender` that have not ended.
-    pub(crate) fn sent_by(&self, sender: ConnectionId) -> usize {
-        self.by_sender.count(sender)
-    }
-
     /// Adds a goal. Returns the id under which it goes to its server.
     pub(crate) fn remember(&mut self, goal: ForwardedGoal) -> String {
         self.goals_made += 1;
@@ -75,18 +70,22 @@ impl ActionServers {
         Services::call_id(number)
     }
 
-    /// The number of the goal that `server` means by `id`, if it is that server's and of that action.
+    /// The number of the goal that `server` means by `id`, if it is that server's. Without an id, it is the only one
+    /// that `server` carries out, if it is of `action`.
     pub(crate) fn meant_by_server(
         &self,
         id: Option<&Payload>,
-        action: &str,
+        action: Option<&str>,
         server: ConnectionId,
     ) -> Option<u64> {
-        let number = Services::number_of(id?)?;
+        let number = match id {
+            Some(id) => Services::number_of(id)?,
+            None => self.by_server.only(server)?,
+        };
         let goal = self.goals.get(&number)?;
-        let is_its =
-            goal.server == server && names::absolute(&goal.action) == names::absolute(action);
-        is_its.then_some(number)
+        let is_meant =
+            id.is_some() || action.is_none_or(|name| names::are_same(&goal.action, name));
+        (goal.server == server && is_meant).then_some(number)
     }
 
     /// The id at its server, and the goal, that `sender` means by `id`.
@@ -98,9 +97,8 @@ impl ActionServers {
     ) -> Option<(String, &ForwardedGoal)> {
         let sent = self.by_sender.newest(sender);
         let mut goals = sent.filter_map(|number| Some((number, self.goals.get(&number)?)));
-        let action = names::absolute(action);
         let (number, goal) = goals
-            .find(|(_, goal)| goal.id.as_ref() == id && names::absolute(&goal.action) == action)?;
+            .find(|(_, goal)| goal.id.as_ref() == id && names::are_same(&goal.action, action))?;
         Some((Services::call_id(number), goal))
     }
 

@@ -2,10 +2,9 @@
 //!
 //! **Invariant:** a topic stands here as long as a client advertises it or subscribes to it, and no longer.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::protocol::catalog::Service;
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
 
@@ -22,8 +21,6 @@ pub(crate) struct Tally {
     topics: BTreeMap<Arc<str>, Users>,
     services: BTreeMap<Arc<str>, Arc<ListedService>>,
     actions: BTreeMap<Arc<str>, Arc<ListedService>>,
-    /// The runtime's own services, where a record is replayed.
-    replayed: Option<Arc<BTreeSet<Service>>>,
     /// The last census, if nothing has changed since.
     taken: Option<Arc<Census>>,
 }
@@ -149,12 +146,6 @@ impl Tally {
         self.actions.remove(action);
     }
 
-    /// Sets the runtime's own services, if any are given.
-    pub(crate) fn set_replayed(&mut self, replayed: Option<Arc<BTreeSet<Service>>>) {
-        self.taken = None;
-        self.replayed = replayed;
-    }
-
     /// Topics and services, up to the limit of what is listed; none if there are more than `at_most`. The list is made
     /// anew only if something has changed.
     pub(crate) fn census(&mut self, at_most: usize) -> Option<Arc<Census>> {
@@ -173,7 +164,6 @@ impl Tally {
             topics: topics.take(MAX_LISTED).cloned().collect(),
             services: services.take(MAX_LISTED).cloned().collect(),
             actions: actions.take(MAX_LISTED).cloned().collect(),
-            replayed: self.replayed.clone(),
         }
     }
 }
@@ -216,7 +206,7 @@ mod tests {
     fn a_census_is_shared_until_something_changes_and_none_is_made_of_more_than_is_wanted() {
         let mut tally = Tally::default();
         assert_eq!(*tally.census(0).unwrap(), Census::default());
-        let changes: [fn(&mut Tally); 10] = [
+        let changes: [fn(&mut Tally); 9] = [
             |tally| tally.add("/t", Use::Subscribed, None),
             |tally| assert!(tally.note_type("/t", "a/b")),
             |tally| tally.add("/t", Use::Advertised, Some("c/d")),
@@ -226,7 +216,6 @@ mod tests {
             |tally| tally.serve_action("/a", None),
             |tally| tally.withdraw("/s"),
             |tally| tally.drop_action("/a"),
-            |tally| tally.set_replayed(Some(Arc::default())),
         ];
         for (n, change) in changes.into_iter().enumerate() {
             let before = whole(&mut tally);

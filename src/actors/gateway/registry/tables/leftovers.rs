@@ -5,9 +5,9 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use super::kept::KeptEntry;
 use super::topics::Subscription;
 use crate::actors::ConnectionId;
-use crate::actors::resources::budget::Share;
 
 /// All leftovers, one entry for each client that has gone: goals and calls by their numbers.
 #[derive(Default)]
@@ -20,12 +20,12 @@ pub(crate) struct Leftovers {
 /// All that one client had registered.
 pub(crate) type Registrations = Box<dyn Iterator<Item = Registration>>;
 
-/// One thing that a client had registered, under its name, with its share of the account.
+/// One thing that a client had registered, under its name, with its entry.
 pub(crate) enum Registration {
-    Advertised(Box<str>, Share),
+    Advertised(Box<str>, KeptEntry),
     Subscribed(Arc<str>, Vec<Subscription>),
-    Provided(Box<str>, Share),
-    ServedAction(Box<str>, Share),
+    Provided(Box<str>, KeptEntry),
+    ServedAction(Box<str>, KeptEntry),
 }
 
 impl Leftovers {

@@ -4,6 +4,7 @@
 
 pub(crate) mod action_servers;
 pub(crate) mod census;
+pub(crate) mod kept;
 pub(crate) mod leftovers;
 mod numbers;
 pub(crate) mod services;

@@ -33,6 +33,12 @@ impl Numbers {
         self.0.get(&client).into_iter().flatten().rev().copied()
     }
 
+    /// The client's number, if it has one and no more.
+    pub(crate) fn only(&self, client: ConnectionId) -> Option<u64> {
+        let numbers = self.0.get(&client).filter(|numbers| numbers.len() == 1)?;
+        numbers.first().copied()
+    }
+
     /// Takes all numbers of the client.
     pub(crate) fn take(&mut self, client: ConnectionId) -> BTreeSet<u64> {
         self.0.remove(&client).unwrap_or_default()

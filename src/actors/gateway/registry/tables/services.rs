@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use tokio::time::Instant;
 
+use super::kept::KeptEntry;
 use super::numbers::Numbers;
 use crate::actors::ConnectionId;
-use crate::actors::resources::budget::Share;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::wire::payload::Payload;
 
@@ -24,8 +24,8 @@ pub(crate) struct Forwarded {
     pub(crate) service: Box<str>,
     /// When the caller's patience ends. The registry may look later, if the process has stood still.
     pub(crate) deadline: Instant,
-    /// Its share of its caller's account.
-    pub(crate) _share: Share,
+    /// What it takes of its caller's room.
+    pub(crate) _entry: KeptEntry,
 }
 
 /// The provider of a service.
@@ -101,19 +101,22 @@ impl Services {
         self.by_caller.count(connection)
     }
 
-    /// Takes the outstanding call that `provider` answers with `id`, if it is that provider's and of that service.
+    /// Takes the outstanding call that `provider` answers with `id`, if it is that provider's. Without an id, takes the
+    /// only one that waits for `provider`, if it is of `service`.
     pub(crate) fn complete(
         &mut self,
         id: Option<&Payload>,
-        service: &str,
+        service: Option<&str>,
         provider: ConnectionId,
     ) -> Option<Forwarded> {
-        let number = Self::number_of(id?)?;
+        let number = match id {
+            Some(id) => Self::number_of(id)?,
+            None => self.by_provider.only(provider)?,
+        };
         let call = self.outstanding.get(&number)?;
-        if Instant::now() > call.deadline {
-            return None;
-        }
-        if call.provider != provider || names::absolute(&call.service) != names::absolute(service) {
+        let is_meant =
+            id.is_some() || service.is_none_or(|name| names::are_same(&call.service, name));
+        if Instant::now() > call.deadline || call.provider != provider || !is_meant {
             return None;
         }
         self.take(number)

@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use actix::prelude::*;
 
+use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
 use crate::actors::gateway::messages::{Deliver, Throttle};
-use crate::actors::resources::budget::Share;
 use crate::protocol::names;
 use crate::protocol::op::Encoding;
 
@@ -25,8 +25,8 @@ pub(crate) struct Subscription {
     pub(crate) encoding: Encoding,
     /// A guard that keeps its `fragment_size` among those of the topic.
     pub(crate) size: Option<Arc<usize>>,
-    /// Its share of the account.
-    pub(crate) _share: Share,
+    /// What it takes of its client's room.
+    pub(crate) entry: KeptEntry,
 }
 
 /// A connection under a topic.
@@ -35,16 +35,15 @@ pub(crate) struct Subscriber {
     pub(crate) outlet: Recipient<Deliver>,
     /// The encoding that its subscriptions come to.
     pub(crate) encoding: Encoding,
-    /// Number of the newest messages that are kept, if some of them are held back or left out.
-    pub(crate) newest: Option<usize>,
 }
 
 /// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
 pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
-    let queue_lengths = subscriptions.iter().map(|one| one.queue_length.max(1));
+    let queue_lengths = || subscriptions.iter().map(|one| one.queue_length);
     Some(Throttle {
         interval: subscriptions.iter().map(|one| one.throttle).min()?,
-        queue_length: queue_lengths.min()?,
+        held_back: queue_lengths().min()?.max(1),
+        queue_length: queue_lengths().filter(|length| *length > 0).min(),
     })
 }
 
@@ -82,7 +81,6 @@ impl Topics {
                 connection,
                 outlet,
                 encoding: Encoding::default(),
-                newest: None,
             });
         }
         (name, new)
@@ -138,9 +136,6 @@ impl Topics {
         let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
         for subscriber in subscribers.filter(|one| one.connection == connection) {
             subscriber.encoding = encoding_of(subscriptions);
-            let throttle = throttle_of(subscriptions);
-            let held = throttle.filter(|throttle| !throttle.interval.is_zero());
-            subscriber.newest = held.map(|throttle| throttle.queue_length);
         }
     }
 

@@ -1,0 +1,148 @@
+"""Tasks of the environments: how arms start, what is observed of them, and what they are rewarded for."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from . import dynamics
+from ._fields import number, shown
+from ._native import Arm, Batch
+
+__all__ = ["STEP", "TIMESTEP", "Action", "Floats", "Observation", "Reach", "SwingUp", "Task"]
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+STEP = 0.05
+"""Simulation time [s] of a step of an environment."""
+
+TIMESTEP = 0.005
+"""Default timestep of the method [s]: with Runge-Kutta 4 the energy of a free arm changes by less than 0.1 % an episode."""
+
+MOST_SUBSTEPS = 10_000
+
+FASTEST = 25.0
+"""Joint rate [rad/s] at which an arm counts as lost."""
+
+
+def _substeps(timestep: float) -> int:
+    ratio = STEP / timestep if timestep > 0 else 0.0
+    count = round(min(ratio, 2.0 * MOST_SUBSTEPS))
+    if not 1 <= count <= MOST_SUBSTEPS or abs(ratio - count) > 1e-6 * count:
+        raise ValueError(f"timestep must be {STEP} s or a whole part of it, down to 1/{MOST_SUBSTEPS}, got {timestep}")
+    return count
+
+
+class Task:
+    """Arms that all have the same to do: how they start, what is seen of them, and what they are rewarded for."""
+
+    strength: ClassVar[float]
+    """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
+    most_steps: ClassVar[int]
+    """Steps after which an episode is truncated, unless told otherwise."""
+
+    def __init__(self, arms: int, links: int, threads: int | None, method: str, timestep: float) -> None:
+        if not isinstance(method, str):
+            raise ValueError(f"method must be the name of one, got {shown(method)}")
+        self.substeps = _substeps(number("timestep", timestep))
+        self.batch = Batch(arms, links, threads=threads)
+        self.batch.set_integrator(method, STEP / self.substeps)
+        arm = Arm(links)
+        self.links = links
+        self.reach = arm.reach
+        self.lengths = arm.lengths
+        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))
+        self.action_space = spaces.Box(-1.0, 1.0, (links,), np.float32)
+        bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
+        self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
+
+    def further_bounds(self) -> list[float]:
+        return []
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        """Puts arms where they start, each from its own stream."""
+        raise NotImplementedError
+
+    def further(self) -> list[Floats]:
+        """Observations beside the joints, a row per arm."""
+        return []
+
+    def reward(self) -> Floats:
+        """From 0 to 1, one per arm: an end that comes early is never a gain."""
+        raise NotImplementedError
+
+    def go_on(self, actions: Action) -> None:
+        """Takes a step with every arm under its row of `actions`, (arms, links)."""
+        self.batch.step(self.substeps, np.clip(actions, -1.0, 1.0) * self.efforts)
+
+    def observe(self) -> Observation:
+        position, rate = self.batch.position, self.batch.velocity
+        seen = [np.cos(position), np.sin(position), np.clip(rate, -FASTEST, FASTEST), *self.further()]
+        return np.concatenate(seen, axis=1, dtype=np.float32, casting="same_kind")
+
+    def goals(self) -> Floats:
+        """Points at which the end effector has the highest reward, a row per arm."""
+        raise NotImplementedError
+
+    def lost(self) -> NDArray[np.bool_]:
+        return self.batch.diverged | (np.abs(self.batch.velocity) > FASTEST).any(axis=1)
+
+
+class SwingUp(Task):
+    strength = 0.5
+    most_steps = 200
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        off = np.array([one.uniform(-0.1, 0.1, (2, self.links)) for one in random])
+        off[:, 0, 0] -= np.pi / 2
+        self.batch.reset(list(arms))
+        self.batch.set_state(off[:, 0], off[:, 1], list(arms))
+
+    def reward(self) -> Floats:
+        height: Floats = self.batch.end_effector[:, 1]
+        return 0.5 + 0.5 * height / self.reach
+
+    def goals(self) -> Floats:
+        return np.tile([0.0, self.reach], (self.batch.n_arms, 1))
+
+
+class Reach(Task):
+    strength = 2.0
+    most_steps = 100
+
+    def __init__(self, arms: int, *settings: Any) -> None:
+        super().__init__(arms, *settings)
+        self.targets = np.zeros((arms, 2))
+        # Target less end effector, looked at twice a step.
+        self.away = np.zeros((arms, 2))
+
+    def further_bounds(self) -> list[float]:
+        reach = float(Arm(self.links).reach)
+        return [reach] * 2 + [2 * reach] * 2
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        drawn = np.array([one.uniform(0.0, 1.0, self.links + 2) for one in random])
+        # Every part of the disc that is not within a twentieth of its edge is as likely as any other of the same area.
+        distance = 0.95 * self.reach * np.sqrt(drawn[:, 0])
+        bearing = 2 * np.pi * drawn[:, 1]
+        self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+        self.batch.reset(list(arms))
+        self.batch.set_state(np.pi * (2 * drawn[:, 2:] - 1), None, list(arms))
+        self.away = self.targets - self.batch.end_effector
+
+    def go_on(self, actions: Action) -> None:
+        super().go_on(actions)
+        self.away = self.targets - self.batch.end_effector
+
+    def further(self) -> list[Floats]:
+        return [self.targets, self.away]
+
+    def reward(self) -> Floats:
+        return 1.0 - np.hypot(self.away[:, 0], self.away[:, 1]) / (2 * self.reach)
+
+    def goals(self) -> Floats:
+        return self.targets

@@ -1,0 +1,95 @@
+//! The places of the clients: how many there are, which are kept, and how often somebody is warned that none is free.
+//!
+//! **Invariant:** a client that has a place keeps it until it leaves.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::actors::gateway::limits::KEPT_PLACES;
+use crate::actors::gateway::messages::Refused;
+
+/// Least time between two warnings.
+const WARNING_INTERVAL: Duration = Duration::from_secs(60);
+
+/// The places, and the refusals since the last warning.
+#[derive(Debug)]
+pub(crate) struct Places {
+    clients: usize,
+    kept: usize,
+    refused: u64,
+    warned: Option<Instant>,
+}
+
+impl Places {
+    /// Places for so many clients. At least one of them is not kept.
+    pub(crate) fn of(clients: usize) -> Self {
+        let kept = clients.div_ceil(16).min(KEPT_PLACES);
+        Self {
+            clients,
+            kept: kept.min(clients.saturating_sub(1)),
+            refused: 0,
+            warned: None,
+        }
+    }
+
+    /// How many there are.
+    pub(crate) const fn clients(&self) -> usize {
+        self.clients
+    }
+
+    /// Whether there is a place for one more client beside those that have one.
+    pub(crate) const fn has_room(&self, taken: usize, may_use_kept: bool) -> bool {
+        let kept = if may_use_kept { 0 } else { self.kept };
+        taken + kept < self.clients
+    }
+
+    /// The answer to a client for which there is none.
+    pub(crate) const fn refusal(&self) -> Refused {
+        Refused::Full {
+            clients: self.clients,
+            kept: self.kept,
+        }
+    }
+
+    /// Counts a refusal. Returns the number of refusals since the last warning, if the next warning is due.
+    pub(crate) fn count_refusal(&mut self, now: Instant) -> Option<u64> {
+        self.refused += 1;
+        if self
+            .warned
+            .is_some_and(|warned| now < warned + WARNING_INTERVAL)
+        {
+            return None;
+        }
+        self.warned = Some(now);
+        Some(std::mem::take(&mut self.refused))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sixteenth_of_the_places_is_kept_and_never_the_last_one() {
+        for (clients, kept) in [(1, 0), (2, 1), (8, 1), (17, 2), (256, 16), (4096, 16)] {
+            let places = Places::of(clients);
+            assert!(places.has_room(clients - kept - 1, false), "{clients}");
+            assert!(!places.has_room(clients - kept, false), "{clients}");
+            assert!(places.has_room(clients - 1, true), "{clients}");
+            assert!(!places.has_room(clients, true), "{clients}");
+        }
+    }
+
+    #[test]
+    fn a_warning_is_due_once_a_minute_and_counts_the_refusals_since_the_last() {
+        let mut places = Places::of(1);
+        let now = Instant::now();
+        assert_eq!(places.count_refusal(now), Some(1));
+        for _ in 0..9 {
+            assert_eq!(places.count_refusal(now + WARNING_INTERVAL / 2), None);
+        }
+        assert_eq!(places.count_refusal(now + WARNING_INTERVAL), Some(10));
+        assert_eq!(places.count_refusal(now + WARNING_INTERVAL), None);
+    }
+}

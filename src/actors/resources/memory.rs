@@ -1,0 +1,176 @@
+//! Memory that clients make the program hold: so many places times a bounded client, and two pools for what is long.
+//!
+//! What is short has a bound in each connection (`gateway::limits`). What is longer than [`SHORT`] takes a [`Permit`],
+//! and waits for one where there is none: a frame while it is read, performed and passed on, an answer from before it
+//! is computed until it has been written. The permit travels with the bytes, and is given back with their last copy.
+//!
+//! **Invariant:** whoever holds bytes longer than [`SHORT`] holds a permit for them. Of topic messages that have been
+//! delivered, only those longer than [`MODEST_MESSAGE`] need one.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::protocol::limits::MODEST_MESSAGE;
+pub use crate::protocol::limits::SHORT;
+
+const KIB: usize = 1024;
+const MIB: usize = 1024 * KIB;
+
+/// Long frames that are there at once.
+pub const LONG_FRAMES: usize = 5;
+/// Bytes of the long answers that are there at once, computed or being computed: one of a million steps, or many of
+/// ten thousand.
+pub const LONG_ANSWERS: usize = 112 * MIB;
+/// The part of an answer that one permit of the pool stands for.
+const ANSWER_PART: usize = 16 * KIB;
+
+/// The two pools; clones share them.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    frames: Arc<Semaphore>,
+    answers: Arc<Semaphore>,
+    size: (usize, usize),
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::of(LONG_FRAMES, LONG_ANSWERS)
+    }
+}
+
+impl Memory {
+    /// Pools of so many long frames, and of so many bytes of long answers.
+    #[must_use]
+    pub fn of(frames: usize, answers: usize) -> Self {
+        let size = (frames.max(1), answers.div_ceil(ANSWER_PART).max(1));
+        Self {
+            frames: Arc::new(Semaphore::new(size.0)),
+            answers: Arc::new(Semaphore::new(size.1)),
+            size,
+        }
+    }
+
+    /// The permit for a long frame, once there is one. They go to those who wait in the order in which they came.
+    pub async fn long_frame(&self) -> Permit {
+        let permit = Arc::clone(&self.frames).acquire_owned().await;
+        Permit::new(permit.ok())
+    }
+
+    /// The permit for an answer of at most so many bytes, if there is room for it now. The longest answer finds room
+    /// once all others are gone.
+    ///
+    /// # Errors
+    /// [`NoRoom`] while others have taken it.
+    pub fn answer(&self, bytes: usize) -> Result<Permit, NoRoom> {
+        let parts = bytes.div_ceil(ANSWER_PART).min(self.size.1);
+        let parts = u32::try_from(parts).unwrap_or(u32::MAX);
+        let permit = Arc::clone(&self.answers).try_acquire_many_owned(parts);
+        permit
+            .map(|permit| Permit::new(Some(permit)))
+            .map_err(|_| NoRoom)
+    }
+
+    /// Permits that are taken, of both pools.
+    #[must_use]
+    pub fn taken(&self) -> usize {
+        self.size.0 + self.size.1
+            - self.frames.available_permits()
+            - self.answers.available_permits()
+    }
+}
+
+/// Others have taken the room for long answers: some of it is free again once theirs have been written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoRoom;
+
+/// Room for a long frame, or for a long answer, until its last clone is dropped.
+#[derive(Debug, Clone)]
+pub struct Permit {
+    _taken: Arc<Option<OwnedSemaphorePermit>>,
+}
+
+impl Permit {
+    fn new(permit: Option<OwnedSemaphorePermit>) -> Self {
+        let _taken = Arc::new(permit);
+        Self { _taken }
+    }
+}
+
+/// Has the permit, if there is one, travel with these bytes, if they are long.
+#[must_use]
+pub fn cover(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
+    match permit.filter(|_| bytes.len() > SHORT) {
+        Some(permit) => Bytes::from_owner(Covered {
+            bytes,
+            _permit: permit.clone(),
+        }),
+        None => bytes,
+    }
+}
+
+/// The same for a topic message, which takes no room if it is a modest one.
+#[must_use]
+pub fn cover_message(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
+    let permit = permit.filter(|_| bytes.len() > MODEST_MESSAGE);
+    cover(permit, bytes)
+}
+
+/// Bytes, and the permit for them.
+struct Covered {
+    bytes: Bytes,
+    _permit: Permit,
+}
+
+impl AsRef<[u8]> for Covered {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::task::Poll;
+
+    use super::*;
+
+    #[test]
+    fn a_permit_travels_with_long_bytes_and_ends_with_their_last_copy() {
+        let memory = Memory::of(1, MIB);
+        for (length, taken) in [(SHORT, 0), (SHORT + 1, 2)] {
+            let permit = memory.answer(2 * ANSWER_PART).unwrap();
+            let bytes = cover(Some(&permit), vec![0; length].into());
+            drop(permit);
+            let part = bytes.slice(..1);
+            drop(bytes);
+            assert_eq!((memory.taken(), part.len()), (taken, 1));
+            drop(part);
+            assert_eq!(memory.taken(), 0);
+        }
+    }
+
+    #[test]
+    fn an_answer_longer_than_the_pool_has_it_alone() {
+        let memory = Memory::of(1, MIB);
+        let longest = memory.answer(usize::MAX).unwrap();
+        assert_eq!(memory.answer(1).unwrap_err(), NoRoom);
+        drop(longest);
+        assert!(memory.answer(1).is_ok());
+    }
+
+    #[test]
+    fn long_frames_wait_for_one_another() {
+        let mut cx = std::task::Context::from_waker(std::task::Waker::noop());
+        let memory = Memory::of(1, MIB);
+        let mut first = Box::pin(memory.long_frame());
+        let mut second = Box::pin(memory.long_frame());
+        let Poll::Ready(permit) = first.as_mut().poll(&mut cx) else {
+            panic!("there is room");
+        };
+        assert!(second.as_mut().poll(&mut cx).is_pending());
+        drop(permit);
+        assert!(second.as_mut().poll(&mut cx).is_ready());
+        assert_eq!(memory.taken(), 0);
+    }
+}

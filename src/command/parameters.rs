@@ -1,0 +1,180 @@
+//! `pendularm param`, the arm's parameters by name, and `pendularm diagnostics`, its state in short.
+//!
+//! **Invariant:** a parameter that is printed can be set again as it was printed. The exit status of diagnostics is 0
+//! only if every part is OK.
+
+use clap::{Args, Subcommand};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::arguments::read;
+use super::output::{CommandError, plain, print, raw};
+use super::session::{RuntimeOptions, Session};
+use crate::protocol::catalog::{Rosapi, Service, Topic};
+use crate::protocol::ros::parameters::NO_SUCH;
+
+/// The topic of the diagnostics.
+const TOPIC: &str = Topic::Diagnostics.name();
+/// The levels of `diagnostic_msgs/msg/DiagnosticStatus`, by their numbers.
+const LEVELS: [&str; 4] = ["OK", "WARN", "ERROR", "STALE"];
+/// Width of the column of keys: the runtime's own have room.
+const KEY_WIDTH: usize = 24;
+
+/// The verbs of parameters.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum ParamVerb {
+    /// List the parameters, each behind its node
+    #[command(after_help = "Example:\n  pendularm param list")]
+    List,
+    /// Print a parameter's value
+    #[command(after_help = "\
+Examples:
+  pendularm param get /arm_sim gravity
+  pendularm param get /arm_sim robot_description > arm.urdf
+
+A text is printed as it is, with --json as JSON.")]
+    Get(ParameterName),
+    /// Set a parameter
+    #[command(after_help = "\
+Examples:
+  pendularm param set /arm_sim timestep 0.002
+  pendularm param set /arm_sim masses '[1, 0.5]'
+  pendularm param set /arm_sim integrator verlet
+
+Nothing is printed if it was set.")]
+    Set {
+        #[command(flatten)]
+        parameter: ParameterName,
+        /// The value, in JSON or YAML
+        #[arg(allow_negative_numbers = true)]
+        value: String,
+    },
+}
+
+/// A parameter and its node.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct ParameterName {
+    /// Its node: `/arm_sim`
+    node: String,
+    /// Its name; `pendularm param list` has all
+    name: String,
+}
+
+impl ParameterName {
+    /// The name under which rosapi knows it.
+    fn full(&self) -> String {
+        format!("/{}:{}", self.node.trim_start_matches('/'), self.name)
+    }
+}
+
+pub(super) async fn run(verb: &ParamVerb, runtime: &RuntimeOptions) -> Result<(), CommandError> {
+    match verb {
+        ParamVerb::List => {
+            let mut session = runtime.open().await?;
+            let names: Vec<String> = session.ask("get_param_names", &json!({}), "names").await?;
+            let entry = |full: &String| {
+                let (node, name) = full.split_once(':').unwrap_or(("", full));
+                (
+                    json!({"node": node, "name": name}),
+                    format!("{node} {name}"),
+                )
+            };
+            session.show_list(&names.iter().map(entry).collect::<Vec<_>>())
+        }
+        ParamVerb::Get(parameter) => {
+            let mut session = runtime.open().await?;
+            let name = json!({"name": parameter.full()});
+            let answer = call(&mut session, Rosapi::GetParam, &name).await?;
+            // JSON within JSON.
+            match serde_json::from_str::<String>(&answer.value) {
+                Ok(text) if !session.is_json => {
+                    let lines: Vec<String> = text.split('\n').map(plain).collect();
+                    print(&(lines.join("\n") + "\n"))
+                }
+                _ => session.show(&raw(answer.value)?, ""),
+            }
+        }
+        ParamVerb::Set { parameter, value } => {
+            let args = json!({"name": parameter.full(), "value": read(value)?.to_string()});
+            call(&mut runtime.open().await?, Rosapi::SetParam, &args)
+                .await
+                .map(drop)
+        }
+    }
+}
+
+/// The answer to a question about a parameter.
+#[derive(Deserialize)]
+struct ParameterAnswer {
+    successful: bool,
+    reason: String,
+    #[serde(default)]
+    value: String,
+}
+
+async fn call(
+    session: &mut Session,
+    question: Rosapi,
+    args: &Value,
+) -> Result<ParameterAnswer, CommandError> {
+    let service = Service::Rosapi(question).name();
+    let values = session.call(service, args).await?;
+    let answer: ParameterAnswer = serde_json::from_str(values.get())
+        .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;
+    match answer.reason.as_str() {
+        _ if answer.successful => Ok(answer),
+        // In the words of a shell, and with the node.
+        NO_SUCH => Err(CommandError::refused(&format!(
+            "there is no parameter {}; `pendularm param list` has all",
+            args["name"]
+        ))),
+        other => Err(CommandError::refused(other)),
+    }
+}
+
+/// A message of the diagnostics, as far as it is printed.
+#[derive(Deserialize)]
+struct Diagnostics {
+    status: Vec<DiagnosedPart>,
+}
+
+#[derive(Deserialize)]
+struct DiagnosedPart {
+    level: usize,
+    name: String,
+    message: String,
+    values: Vec<Detail>,
+}
+
+#[derive(Deserialize)]
+struct Detail {
+    key: String,
+    value: String,
+}
+
+pub(super) async fn diagnostics(session: &mut Session) -> Result<(), CommandError> {
+    session.subscribe(TOPIC, None).await?;
+    let message = session.message(TOPIC).await?;
+    let Diagnostics { status } = serde_json::from_str(message.get())
+        .map_err(|error| CommandError::refused(&format!("{TOPIC} said: {error}")))?;
+    match session.is_json {
+        true => session.show(&message, "")?,
+        false => print(&status.iter().map(page).collect::<String>())?,
+    }
+    match status.iter().find(|part| part.level != 0) {
+        None => Ok(()),
+        Some(DiagnosedPart { name, message, .. }) => {
+            Err(CommandError::refused(&format!("{name}: {message}")))
+        }
+    }
+}
+
+fn page(part: &DiagnosedPart) -> String {
+    let level = LEVELS.get(part.level).unwrap_or(&"STALE");
+    let mut page = plain(&format!("{level} {}: {}", part.name, part.message)) + "\n";
+    for Detail { key, value } in &part.values {
+        page += plain(&format!("  {key:KEY_WIDTH$}  {value}")).trim_end();
+        page.push('\n');
+    }
+    page
+}

@@ -1,0 +1,138 @@
+//! A client that reads half of its messages sees the present, where it is known how much it has not read.
+
+use std::cell::Cell;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use super::*;
+use pendularm::actors::gateway::connection::{Connection, Ends};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, DuplexStream, ReadBuf, duplex};
+use tokio::time::Instant;
+
+/// A pipe whose bytes are counted as they are written.
+struct Counted(DuplexStream, Rc<Cell<usize>>);
+
+impl AsyncRead for Counted {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.0).poll_read(cx, buffer)
+    }
+}
+
+impl AsyncWrite for Counted {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
+        let polled = Pin::new(&mut self.0).poll_write(cx, bytes);
+        if let Poll::Ready(Ok(written)) = polled {
+            self.1.set(self.1.get() + written);
+        }
+        polled
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.0).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.0).poll_shutdown(cx)
+    }
+}
+
+/// Thirty seconds of 60 messages a second for a client that takes `a_second` of them, and reads `chunk` bytes at a time.
+/// Gives how late it was at most, and how many it has had.
+async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, usize) {
+    let gateway = Gateway::bare().await;
+    let unread = Rc::new(Cell::new(0));
+    let (mut client, theirs) = duplex(WIDE);
+    let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
+    let source = Rc::clone(&unread);
+    Connection::start_reading(
+        Box::new(move || Some(source.get())),
+        Arc::default(),
+        Ends::default(),
+        Counted(theirs, Rc::clone(&unread)),
+        registry,
+        gauges,
+    );
+    let subscribe =
+        format!("{{\"op\":\"subscribe\",\"topic\":\"/t\",\"queue_length\":{queue_length}}}\n");
+    tokio::io::AsyncWriteExt::write_all(&mut client, subscribe.as_bytes())
+        .await
+        .unwrap();
+    settle().await;
+    let began = Instant::now();
+    let mut publisher = gateway.connect(WIDE);
+    publisher.advertise("/t").await;
+    let publishing = actix::spawn(async move {
+        for n in 1..30 * 60 {
+            sleep_until(began + Duration::from_secs(1) * n / 60).await;
+            let msg = json!({"at": began.elapsed().as_secs_f64(), "fill": "x".repeat(400)});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+    });
+    let (mut bytes, mut late, mut count) = (Vec::new(), Duration::ZERO, 0);
+    while began.elapsed() < Duration::from_secs(30) {
+        let Some(end) = bytes.iter().position(|&byte| byte == b'\n') else {
+            let mut buffer = vec![0; chunk];
+            let reading = client.read(&mut buffer);
+            let Ok(read) = tokio::time::timeout(Duration::from_secs(1), reading).await else {
+                break;
+            };
+            let read = read.unwrap();
+            unread.set(unread.get() - read);
+            bytes.extend(&buffer[..read]);
+            continue;
+        };
+        let line: Vec<u8> = bytes.drain(..=end).collect();
+        let frame: serde_json::Value = serde_json::from_slice(&line).unwrap();
+        if let Some(at) = frame["msg"]["at"].as_f64() {
+            late = late.max(began.elapsed().saturating_sub(Duration::from_secs_f64(at)));
+            count += 1;
+            sleep(Duration::from_secs(1) / a_second).await;
+        }
+    }
+    publishing.abort();
+    (late, count)
+}
+
+#[test]
+fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
+    in_virtual_time(async {
+        for (queue_length, a_second, chunk) in [
+            (0, 30, 8192),
+            (1, 30, 8192),
+            (0, 30, 100),
+            (5, 50, 8192),
+            (0, 20, 8192),
+            (0, 10, 300),
+        ] {
+            let (late, count) = lateness(queue_length, a_second, chunk).await;
+            let case = format!("{queue_length} {a_second} {chunk}: {late:?}, {count}");
+            println!("{case}");
+            assert!(late < Duration::from_millis(1500), "{case}");
+            assert!(
+                count > 22 * a_second as usize,
+                "it has enough to do: {case}"
+            );
+        }
+    });
+}
+
+#[test]
+fn a_client_that_takes_all_loses_nothing_and_waits_for_nothing() {
+    in_virtual_time(async {
+        let (late, count) = lateness(1, 100_000, 8192).await;
+        assert_eq!(count, 30 * 60 - 1);
+        assert!(late < Duration::from_millis(3), "{late:?}");
+    });
+}

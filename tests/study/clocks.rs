@@ -1,0 +1,139 @@
+//! The two clocks of a sampled loop: predicted limits against loops that are stepped, and the two errors of a run.
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::ControlPeriod;
+use pendularm::study::clocks::clock_limits;
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::rollout::{Rollout, RolloutRequest};
+use pendularm::study::stability::limit_held;
+
+fn control(period: f64, delay: bool) -> ControlLoop<2> {
+    let setpoint = Setpoint::at([0.4, 0.8]);
+    ControlLoop::new(Arm::default(), Gains::default(), setpoint)
+        .with_period(ControlPeriod { period, delay })
+}
+
+/// Whether a small deviation dies out in a thousand periods, stepped as the live arm steps.
+fn dies_out(control: &ControlLoop<2>) -> bool {
+    let mut simulation = control.simulation(State::at_rest([0.4, 0.8]));
+    // The integral takes up the load first, at a period that is stable.
+    simulation.set_control_period(ControlPeriod {
+        period: 1e-3,
+        delay: false,
+    });
+    simulation.set_timestep(1e-3);
+    simulation.advance(20_000);
+    simulation.set_timestep(control.timestep);
+    simulation.set_control_period(control.period);
+    let nudged = State {
+        position: simulation.state().position.map(|q| q + 1e-6),
+        velocity: [0.0; 2],
+    };
+    simulation.set_state(nudged);
+    let steps = control.period.steps(control.timestep);
+    simulation.advance(1000 * steps);
+    let off = |i: usize| (simulation.state().position[i] - [0.4, 0.8][i]).abs();
+    off(0).max(off(1)) < 1e-6
+}
+
+#[test]
+fn the_limit_of_the_control_period_is_where_a_finely_stepped_loop_ceases_to_be_stable() {
+    for delay in [false, true] {
+        let limit = clock_limits(&control(0.01, delay)).period.unwrap();
+        for (part, stable) in [(0.97, true), (1.03, false)] {
+            let period = part * limit;
+            let loop_of = control(period, delay).with_timestep(period / 40.0);
+            assert_eq!(
+                dies_out(&loop_of),
+                stable,
+                "{part} of {limit}, delay {delay}"
+            );
+        }
+    }
+    // As the kept report has them, without a delay and with one.
+    let limit = |delay| clock_limits(&control(0.01, delay)).period.unwrap();
+    assert!((limit(false) - 8.21e-3).abs() < 2e-5, "{}", limit(false));
+    assert!((limit(true) - 4.01e-3).abs() < 2e-5, "{}", limit(true));
+}
+
+#[test]
+fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_stable() {
+    for method in Method::ALL {
+        for period in [2e-3, 5e-3, 7.5e-3, 8.1e-3] {
+            let sampled = control(period, false).with_method(method);
+            let limit = clock_limits(&sampled).timestep.unwrap();
+            if limit > period {
+                assert_eq!(Some(limit), limit_held(&sampled));
+                continue;
+            }
+            let steps = (period / limit).round();
+            assert!(
+                dies_out(&sampled.with_timestep(period / steps)),
+                "{method} {period}"
+            );
+            if steps > 1.0 {
+                let longer = sampled.with_timestep(period / (steps - 1.0));
+                assert!(!dies_out(&longer), "{method} {period}: {steps} steps");
+            }
+        }
+        // Beyond the period's own limit no timestep helps.
+        let beyond = control(9e-3, false).with_method(method);
+        assert_eq!(clock_limits(&beyond).timestep, Some(0.0));
+    }
+    let every_step = control(0.0, false);
+    assert_eq!(clock_limits(&every_step).timestep, limit_held(&every_step));
+}
+
+/// The student's experiment: the period stays, the timestep falls.
+#[test]
+fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_order_and_the_others_not()
+ {
+    let gains = Gains {
+        kp: [200.0, 100.0],
+        ki: [0.0; 2],
+        kd: [30.0, 12.0],
+    };
+    let errors = |method: Method, timestep: f64| {
+        let control = ControlLoop::new(Arm::default(), gains, Setpoint::at([0.8, -0.6]))
+            .with_method(method)
+            .with_timestep(timestep)
+            .with_period(ControlPeriod {
+                period: 0.01,
+                delay: false,
+            });
+        let request = RolloutRequest {
+            control,
+            start: State::rest(),
+            duration: 2.0,
+            samples: 101,
+            reference: true,
+        };
+        let mut rollout = Rollout::new(request).unwrap();
+        while rollout.advance(u64::MAX) > 0 {}
+        let method = rollout.deviation().unwrap().largest();
+        (method, rollout.from_ideal().unwrap().known().unwrap())
+    };
+    for (method, order) in [
+        (Method::Euler, 1),
+        (Method::Midpoint, 2),
+        (Method::Verlet, 2),
+        (Method::Rk4, 4),
+    ] {
+        let (long, of_long) = errors(method, 5e-4);
+        let (short, of_short) = errors(method, 2.5e-4);
+        let ratio = (long / short).log2();
+        assert!(
+            (ratio - f64::from(order)).abs() < 0.3,
+            "{method}: {long} and {short}"
+        );
+        assert!(of_short > 1e-2, "{of_short}");
+        if method != Method::Euler {
+            assert!(
+                (of_long / of_short - 1.0).abs() < 0.01,
+                "{method}: {of_long} and {of_short}"
+            );
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The timestep that is advised, tried: what settles in small steps is not lost at it.
+
+use std::f64::consts::TAU;
+
+use pendularm::math::arm::State;
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::{ControlLoop, no_control};
+
+use super::{Dice, Tally, cases, property, run};
+use crate::recomputed::advised;
+
+/// Steps of a run at most; a longer one is cut.
+const MOST_STEPS: f64 = 3e5;
+
+/// From springs that hardly matter to stiff ones, from hardly damped to sluggish, integrals or not.
+fn gains<const N: usize>(dice: &mut Dice, control: &ControlLoop<N>) -> Gains<N> {
+    let inertia = control.arm.masses().iter().sum::<f64>() * control.arm.reach().powi(2) / 3.0;
+    let stiffness = 10.0 * dice.size(4.0);
+    let damping = 0.5 * dice.size(1.0);
+    let kp: [f64; N] = std::array::from_fn(|i| {
+        stiffness * 0.3_f64.powi(i32::try_from(i).unwrap()) * dice.size(0.5)
+    });
+    let mut kd = kp;
+    for (i, kd) in kd.iter_mut().enumerate() {
+        let inertia = inertia * 0.3_f64.powi(i32::try_from(i).unwrap());
+        *kd = 2.0 * damping * (*kd * inertia).sqrt() * dice.size(0.3);
+    }
+    let ki = if dice.one_in(2) {
+        [0.0; N]
+    } else {
+        kp.map(|kp| 3.0 * kp * dice.size(0.7))
+    };
+    Gains { kp, ki, kd }
+}
+
+/// At rest at the setpoint, at rest far from it, or turning.
+fn start<const N: usize>(dice: &mut Dice, setpoint: &[f64; N]) -> State<N> {
+    let kind = dice.0.u32(0..3);
+    let amplitude = TAU * dice.size(0.5);
+    let spin = 10.0 * dice.size(0.5);
+    State {
+        position: std::array::from_fn(|i| match kind {
+            1 => setpoint[i] + amplitude * dice.any(),
+            _ => setpoint[i],
+        }),
+        velocity: std::array::from_fn(|_| match kind {
+            2 => spin * dice.any(),
+            _ => 0.0,
+        }),
+    }
+}
+
+fn what_settles_is_not_lost_at_the_advice<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let arm = if dice.one_in(2) {
+        pendularm::math::arm::Arm::default()
+    } else {
+        dice.arm::<N>()
+    };
+    let setpoint = Setpoint::at(std::array::from_fn(|_| TAU * dice.any()));
+    let method = Method::ALL[dice.0.usize(0..Method::ALL.len())];
+    let mut control = ControlLoop::new(arm, no_control(), setpoint).with_method(method);
+    control.gains = gains(&mut dice, &control);
+    let start = start(&mut dice, &setpoint.position);
+    let timestep = advised(&control, &start);
+    if timestep == 0.0 {
+        tally.open += 1;
+        return;
+    }
+    let small = timestep.min(0.01) / 8.0;
+    let duration = (small * MOST_STEPS).min(20.0);
+    let ends = |method: Method, timestep: f64| {
+        let control = control.with_method(method).with_timestep(timestep);
+        let mut live = control.simulation(start);
+        let steps = (duration / timestep).ceil() as u64;
+        let whole = live.advance(steps) == steps;
+        let velocity = live.state().velocity.iter().map(|v| v.abs());
+        let speed = velocity.fold(0.0, f64::max);
+        if whole { speed } else { f64::INFINITY }
+    };
+    if ends(Method::Rk4, small) > 0.01 {
+        tally.open += 1;
+        return;
+    }
+    tally.tried += 1;
+    let speed = ends(method, timestep);
+    if speed > 1.0 {
+        println!("case {case}: {speed} rad/s at {timestep} s: {control:?} {start:?}");
+        tally.outside += 1;
+    }
+}
+
+#[test]
+fn what_settles_is_not_lost_at_the_timestep_that_is_advised() {
+    let tally = property!(what_settles_is_not_lost_at_the_advice, 60, 100_000);
+    assert_eq!(tally.outside, 0, "{tally:?}");
+    // Many of these loops never settle.
+    assert!(4 * tally.tried > tally.open, "{tally:?}");
+}

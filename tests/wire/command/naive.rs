@@ -1,0 +1,330 @@
+//! The command line as people type it at first: names that are not there, missing spaces and quotes, addresses in any
+//! form, the controller still off.
+
+use serde_json::{Value, json};
+
+use super::{ask, json_of, refusal, said};
+use crate::common::{self, Runtime};
+
+const ENABLE: &str = "/pid_controller/enable";
+
+const FOLLOW: &str = "/joint_trajectory_controller/follow_joint_trajectory";
+const GOAL: &str =
+    "{trajectory: {points: [{positions: [0, 0], time_from_start: {sec: 1}}, {velocity: 1}]}}";
+
+/// A command, a name and a value; the words that are wrong, and some that are right.
+const UNKNOWN_FIELDS: [(&str, &str, &str, &str, &str); 17] = [
+    (
+        "service call",
+        ENABLE,
+        "{data:true}",
+        "\"data:true\"",
+        "{data: true}",
+    ),
+    (
+        "service call",
+        ENABLE,
+        "data:true",
+        "\"data:true\"",
+        "{data: true}",
+    ),
+    (
+        "service call",
+        ENABLE,
+        "{\"data:true\": null}",
+        "\"data:true\"",
+        "data",
+    ),
+    (
+        "service call",
+        ENABLE,
+        "{enable: true}",
+        "\"enable\"",
+        "it has data",
+    ),
+    (
+        "service call",
+        "arm_sim/set_params",
+        "{gravty: 5}",
+        "\"gravty\"",
+        "gravity",
+    ),
+    (
+        "service call",
+        "/arm_sim/set_params",
+        "{\"Gravity\": 5}",
+        "\"Gravity\"",
+        "gravity",
+    ),
+    (
+        "service call",
+        "/arm_sim/set_params",
+        "{gravity:5}",
+        "\"gravity:5\"",
+        "{gravity: 5}",
+    ),
+    (
+        "service call",
+        "/arm_sim/reset",
+        "{now: 1}",
+        "\"now\"",
+        "it has none",
+    ),
+    (
+        "service call",
+        "/ik_trial/start",
+        "{duration:5}",
+        "\"duration:5\"",
+        "{duration: 5}",
+    ),
+    (
+        "service call",
+        "/study/stability",
+        "{gains: {kP: [1, 1]}}",
+        "\"gains.kP\"",
+        "kp",
+    ),
+    (
+        "service call",
+        "/study/stability",
+        "[rk4, {kP: [1, 1]}]",
+        "\"gains.kP\"",
+        "kp",
+    ),
+    (
+        "topic pub",
+        "/joint_trajectory",
+        "{point: []}",
+        "\"point\"",
+        "points",
+    ),
+    (
+        "topic pub",
+        "/joint_trajectory",
+        "points: [{position: [1, 1]}]",
+        "\"points[0].position\"",
+        "positions",
+    ),
+    (
+        "topic pub",
+        "/joint_trajectory",
+        "points: [{positions:[1, 1], velocities:0}]",
+        "\"points[0].velocities:0\"",
+        "{velocities: 0}",
+    ),
+    (
+        "topic pub",
+        "/joint_trajectory",
+        "header: {stamps: 1}",
+        "\"header.stamps\"",
+        "stamp",
+    ),
+    (
+        "action send_goal",
+        "/ik_action",
+        "{x: 1, y: 1, epsilom: 1}",
+        "\"epsilom\"",
+        "epsilon",
+    ),
+    (
+        "action send_goal",
+        FOLLOW,
+        GOAL,
+        "\"trajectory.points[1].velocity\"",
+        "velocities",
+    ),
+];
+
+/// Each is refused before it is sent, in words that have what is wrong and what is right.
+#[test]
+fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_trajectory");
+    for (command, name, value, wrong, right) in UNKNOWN_FIELDS {
+        let words: Vec<&str> = command.split(' ').chain([name, value]).collect();
+        let refused = refusal(&runtime, &words, 2);
+        assert!(
+            refused.contains(wrong) && refused.contains(right),
+            "{words:?}: {refused}"
+        );
+    }
+    // The client hears the first message that is published since: this one.
+    client.ask(ENABLE, json!({"data": true}));
+    let stamped =
+        "{header: {seq: 1, stamp: {secs: 0, nsecs: 0}}, points: [{positions: [0.1, 0.2]}]}";
+    said(
+        &runtime,
+        &["topic", "pub", "-1", "/joint_trajectory", stamped],
+    );
+    let heard = client.message("/joint_trajectory");
+    assert_eq!(heard["points"][0]["positions"], json!([0.1, 0.2]));
+    assert_eq!(
+        client.ask("/arm_sim/set_params", json!({}))["gravity"],
+        9.81
+    );
+}
+
+#[test]
+fn types_that_the_runtime_does_not_know_have_any_field() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    common::provide(&mut client, "/own");
+    let call = std::thread::spawn({
+        let arguments = ["service", "call", "/own", "{any: {thing: 1}, b:c: 2}"];
+        let mut command = super::command(&runtime, &arguments);
+        move || command.output().unwrap()
+    });
+    let asked = common::forwarded(&mut client);
+    assert_eq!(asked["args"], json!({"any": {"thing": 1}, "b:c": 2}));
+    common::respond(&mut client, &asked, json!({}));
+    assert_eq!(call.join().unwrap().status.code(), Some(0));
+    let own = ["topic", "pub", "-1", "/own", "own_msgs/msg/Own", "{any: 1}"];
+    said(&runtime, &own);
+}
+
+#[test]
+fn a_value_that_the_shell_has_split_is_to_be_quoted() {
+    let runtime = Runtime::start();
+    for words in [
+        &["service", "call", ENABLE, "{data:", "true}"][..],
+        &[
+            "service",
+            "call",
+            "/arm_sim/set_params",
+            "{gravity:",
+            "1,",
+            "masses:",
+            "[1,",
+            "1]}",
+        ],
+        &["service", "call", ENABLE, "data:", "true"],
+        &[
+            "topic",
+            "pub",
+            "/joint_trajectory",
+            "{points:",
+            "[{positions:",
+            "[0.3,",
+            "-0.5]}]}",
+        ],
+        &[
+            "topic",
+            "pub",
+            "/chatter",
+            "std_msgs/msg/String",
+            "{data:",
+            "hi}",
+        ],
+        // A shell makes this of {x:1,y:2}.
+        &["action", "send_goal", "/ik_action", "x:1", "y:2"],
+        &["param", "set", "/arm_sim", "masses", "[1,", "2]"],
+    ] {
+        let refused = refusal(&runtime, words, 2);
+        assert!(
+            refused.contains("put quotes around all of it, such as '{data: true}'"),
+            "{words:?}: {refused}"
+        );
+    }
+}
+
+#[test]
+fn a_command_that_moves_the_arm_hints_that_the_controller_is_off() {
+    let runtime = Runtime::start();
+    let point = "points: [{positions: [0.3, -0.5]}]";
+    let commands = [
+        &["topic", "pub", "-1", "joint_trajectory", point][..],
+        &["service", "call", "/ik_action/send_goal", "{x: 1, y: 1}"],
+        &["service", "call", "/ik_trial/start"],
+        &["topic", "echo", "/clock", "--once"],
+    ];
+    for (command, count) in commands.iter().zip([1, 1, 1, 0]) {
+        let output = ask(&runtime, command);
+        let hint = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{hint}");
+        assert_eq!(hint.lines().count(), count, "{hint}");
+        assert!(
+            count == 0 || hint.contains("/pid_controller/enable"),
+            "{hint}"
+        );
+    }
+    said(&runtime, &["service", "call", ENABLE, "{data: true}"]);
+    for command in commands {
+        said(&runtime, command);
+    }
+}
+
+#[test]
+fn what_there_is_can_be_looked_at_as_with_ros2() {
+    let runtime = Runtime::start();
+    let nodes = said(&runtime, &["node", "list"]);
+    assert!(nodes.lines().any(|line| line == "/arm_sim"), "{nodes}");
+    let node = json_of(&runtime, &["node", "info", "arm_sim"]);
+    let has = |list: &Value, name: &str| list.as_array().unwrap().contains(&json!(name));
+    assert!(has(&node["publishing"], "/joint_states") && has(&node["services"], "/arm_sim/reset"));
+    assert!(has(&node["subscribing"], "/joint_trajectory"));
+    let topic = said(&runtime, &["topic", "info", "/clock"]);
+    assert_eq!(
+        topic,
+        "type: rosgraph_msgs/msg/Clock\npublishers:\n- /arm_sim\nsubscribers: []\n"
+    );
+    let service = said(&runtime, &["service", "info", "ik/solve"]);
+    assert_eq!(service, "type: pendularm_interfaces/srv/Solve\nnode: /ik\n");
+    let action = said(&runtime, &["action", "info", "/ik_action"]);
+    assert_eq!(action, "type: pendularm_interfaces/action/MoveTo\n");
+    for (kind, name, type_name) in [
+        ("topic", "/clock", "rosgraph_msgs/msg/Clock"),
+        ("service", "/ik/solve", "pendularm_interfaces/srv/Solve"),
+        ("action", "/ik_action", "pendularm_interfaces/action/MoveTo"),
+    ] {
+        let info = said(&runtime, &[kind, "info", name]);
+        assert!(info.starts_with(&format!("type: {type_name}\n")), "{info}");
+        let nothing = refusal(&runtime, &[kind, "info", "/nothing"], 1);
+        assert_eq!(
+            nothing,
+            format!("/nothing is no {kind}; `pendularm {kind} list` has those that are")
+        );
+    }
+}
+
+#[test]
+fn an_address_has_any_form_and_stands_anywhere() {
+    let runtime = Runtime::start();
+    let port = runtime.address.port();
+    let output = |words: &[&str]| common::program().args(words).output().unwrap();
+    for address in [
+        format!("{port}"),
+        format!(":{port}"),
+        format!("localhost:{port}"),
+        format!("ws://127.0.0.1:{port}/"),
+        format!("http://127.0.0.1:{port}/?token=none"),
+    ] {
+        for words in [
+            &["topic", "--connect", &address, "list"][..],
+            &["topic", "list", "--connect", &address],
+        ] {
+            let said = output(words);
+            let words = format!("{words:?}: {}", String::from_utf8_lossy(&said.stderr));
+            assert!(said.stdout.starts_with(b"/"), "{words}");
+        }
+    }
+    let address = port.to_string();
+    let before = [
+        "topic",
+        "--json",
+        "--timeout",
+        "60",
+        "--token",
+        "no-token-is-asked-for",
+        "--connect",
+        &address,
+    ];
+    let said = output(&[&before[..], &["list"]].concat());
+    assert!(said.stdout.starts_with(b"{\"name\":\"/"), "{said:?}");
+    for words in [&["plan", "--error", "1"][..], &["topic", "list"]] {
+        let said = output(&[&["--connect", &address], words].concat());
+        let complaint = String::from_utf8(said.stderr).unwrap();
+        assert_eq!(said.status.code(), Some(2), "{complaint}");
+        assert!(complaint.contains("--connect"), "{complaint}");
+    }
+}

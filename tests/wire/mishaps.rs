@@ -1,0 +1,217 @@
+//! Mishaps of operators: signals, limits of the shell, standard streams that take nothing, and storms of warnings.
+//!
+//! **Invariant:** each ends in order or harms nobody; the limits are the process's own.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::common::{Client, Logged, Runtime, program, signal};
+use serde_json::{Value, json};
+
+/// A file of this test's own that is not there.
+fn file(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mishaps-{name}"));
+    let _ = fs::remove_file(&path);
+    path
+}
+
+fn shell(prelude: &str) -> Command {
+    let mut shell = Command::new("sh");
+    let script = format!("{prelude} && exec \"$0\" \"$@\"");
+    shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
+    shell
+}
+
+/// Whether a record has its index: the last bytes of a whole file.
+#[cfg(feature = "record")]
+fn is_whole(path: &Path) -> bool {
+    use pendularm::record::{RecordEnding, Recording};
+    let mut recording = Recording::new(File::open(path).unwrap());
+    while recording.next_passage().unwrap().is_some() {}
+    recording.ending() == Some(RecordEnding::Whole)
+}
+
+#[cfg(all(feature = "record", target_os = "linux"))]
+#[test]
+fn every_signal_that_ends_a_process_by_default_ends_the_program_in_order_and_its_record_is_whole() {
+    for name in [
+        "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT",
+    ] {
+        let path = file(&format!("{name}.mcap"));
+        let mut runtime = Runtime::with(&["--record", path.to_str().unwrap()]);
+        let mut client = runtime.connect();
+        client.subscribe("/joint_states");
+        client.message("/joint_states");
+        signal(runtime.pid(), name);
+        assert!(runtime.end().0.success(), "{name}");
+        assert!(client.is_closed());
+        assert!(is_whole(&path), "{name}");
+    }
+}
+
+/// `nohup` ignores SIGHUP, and a shell ignores SIGINT for its jobs in the background.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_that_was_ignored_at_the_start_stays_ignored_but_for_requests_to_end() {
+    for request in ["INT", "TERM"] {
+        let mut runtime = Runtime::under("trap '' HUP QUIT USR1 INT TERM");
+        let mut client = runtime.connect();
+        for name in ["HUP", "QUIT", "USR1"] {
+            signal(runtime.pid(), name);
+            client.settle();
+        }
+        signal(runtime.pid(), request);
+        assert!(runtime.end().0.success());
+    }
+}
+
+#[test]
+fn signals_of_failed_writes_and_those_that_end_nothing_harm_nobody() {
+    let mut runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for name in ["PIPE", "XFSZ", "CHLD", "WINCH", "URG", "CONT"] {
+        signal(runtime.pid(), name);
+        client.settle();
+    }
+    signal(runtime.pid(), "TERM");
+    assert!(runtime.end().0.success());
+}
+
+/// Beyond the limit of file sizes a write fails like one to a full disk.
+#[cfg(feature = "record")]
+#[test]
+fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_served() {
+    let path = file("limited.mcap");
+    let arguments = ["--record", path.to_str().unwrap()];
+    let mut runtime = Runtime::under_with("ulimit -f 160", &arguments);
+    let mut client = runtime.connect();
+    client.subscribe("/rosout");
+    let told = client.message("/rosout");
+    assert_eq!(
+        (&told["level"], &told["name"]),
+        (&json!(40), &json!("recorder")),
+        "{told}"
+    );
+    let text = told["msg"].as_str().unwrap();
+    assert!(
+        text.contains("the record ends") && text.contains("File too large"),
+        "{text}"
+    );
+    client.settle();
+    signal(runtime.pid(), "TERM");
+    assert!(runtime.end().0.success());
+    let mut recording = pendularm::record::Recording::new(File::open(&path).unwrap());
+    assert!(
+        recording.next_passage().unwrap().is_some(),
+        "it is readable up to there"
+    );
+}
+
+#[test]
+fn a_log_beyond_the_limit_of_file_sizes_harms_nobody() {
+    let path = file("limited.log");
+    let prelude = format!("ulimit -f 1 && exec 2>'{}'", path.display());
+    let mut runtime = Runtime::under_with(&prelude, &["--log", "trace"]);
+    for _ in 0..20 {
+        runtime.connect().settle();
+    }
+    assert!([512, 1024].contains(&fs::metadata(&path).unwrap().len()));
+    signal(runtime.pid(), "TERM");
+    assert!(runtime.end().0.success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn clients_are_served_whatever_becomes_of_standard_output() {
+    let full_pipe = || {
+        let (reader, mut writer) = std::io::pipe().unwrap();
+        rustix::io::ioctl_fionbio(&writer, true).unwrap();
+        while writer.write(&[0; 4096]).is_ok() {}
+        rustix::io::ioctl_fionbio(&writer, false).unwrap();
+        (Some(reader), Stdio::from(writer))
+    };
+    let closed_pipe = || (None, Stdio::from(std::io::pipe().unwrap().1));
+    let full_disk = || {
+        (
+            None,
+            Stdio::from(File::options().write(true).open("/dev/full").unwrap()),
+        )
+    };
+    let limited = format!("ulimit -f 0 && exec >'{}'", file("limited.txt").display());
+    let nothing = || (None, Stdio::null());
+    for ((reader, stdout), command, says) in [
+        (full_pipe(), program(), None),
+        (closed_pipe(), program(), Some("Broken pipe")),
+        (full_disk(), program(), Some("No space left")),
+        (nothing(), shell(&limited), Some("File too large")),
+        (nothing(), shell("exec >&-"), None),
+    ] {
+        let mut runtime = Logged::start(command, stdout);
+        Client::to(runtime.address).settle();
+        if let Some(says) = says {
+            runtime.await_line(says);
+        }
+        runtime.end();
+        drop(reader);
+    }
+}
+
+/// The events that lines tell of: one each, or as many as the line says.
+fn events<'a>(lines: impl Iterator<Item = &'a str>) -> u64 {
+    lines
+        .map(|line| match line.split_once("(first of ") {
+            Some((_, rest)) => rest.split(' ').next().unwrap().parse().unwrap(),
+            None => 1,
+        })
+        .sum()
+}
+
+#[test]
+fn a_warning_that_a_client_causes_in_a_loop_is_told_once_a_second_with_a_number() {
+    const TIMES: u64 = 3000;
+    let runtime = Logged::start(program(), Stdio::null());
+    let mut listener = Client::to(runtime.address);
+    listener.subscribe("/rosout");
+    // Read at once, because messages that wait for a second are dropped.
+    let published = std::thread::spawn(move || {
+        let mut published = Vec::new();
+        while events(published.iter().map(String::as_str)) < TIMES {
+            let message = listener.message("/rosout");
+            published.push(message["msg"].as_str().unwrap().to_owned());
+        }
+        published
+    });
+    let mut client = Client::to(runtime.address);
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.ask("/arm_sim/set_params", json!({"gravity": 1e300}));
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e10}));
+    let began = std::time::Instant::now();
+    let call = |service: &str, args: Value| {
+        format!(
+            "{}\n",
+            json!({"op": "call_service", "service": service, "args": args})
+        )
+    };
+    let round = call("/arm_sim/reset", json!({})) + &call("/arm_sim/step", json!({"steps": 1}));
+    for _ in 0..TIMES / 100 {
+        client.send_bytes(round.repeat(100).as_bytes());
+        for _ in 0..200 {
+            client.receive();
+        }
+    }
+    let seconds = began.elapsed().as_secs() + 2;
+    let published = published.join().unwrap();
+    assert_eq!(events(published.iter().map(String::as_str)), TIMES);
+    assert!(published.len() as u64 <= seconds, "{published:?}");
+    let log = runtime.end();
+    let lines = log.iter().filter(|line| line.contains("diverged"));
+    let lines: Vec<&str> = lines.map(String::as_str).collect();
+    assert!(
+        lines.iter().all(|line| line.contains(" WARN pendularm::")),
+        "{lines:?}"
+    );
+    assert!(lines.len() as u64 <= seconds, "{lines:?}");
+    assert_eq!(events(lines.into_iter()), TIMES);
+}

@@ -1,0 +1,139 @@
+//! Places: how many clients are served, which places are kept, and what a client is told for which none is free.
+
+use std::net::SocketAddr;
+use std::process::Output;
+use std::time::Instant;
+
+use serde_json::json;
+
+use crate::common::{Client, Logged, PATIENCE, program};
+
+fn serving(clients: &str) -> Logged {
+    let mut command = program();
+    command.args(["--clients", clients]);
+    Logged::start(command, std::process::Stdio::null())
+}
+
+/// So many clients over TCP: half of them silent, the others served.
+fn occupy(address: SocketAddr, clients: usize) -> Vec<Client> {
+    let mut all: Vec<Client> = (0..clients).map(|_| Client::to(address)).collect();
+    for client in all.iter_mut().step_by(2) {
+        client.settle();
+    }
+    all
+}
+
+/// The refusal of a client that calls a service, or of one that says nothing.
+#[track_caller]
+fn refused(address: SocketAddr, speaks: bool) -> String {
+    let mut client = Client::to(address);
+    if speaks {
+        client.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
+    }
+    let status = client.receive();
+    assert_eq!(status["level"], "error", "{status}");
+    assert!(client.is_closed());
+    status["msg"].as_str().unwrap().to_owned()
+}
+
+/// Waits until a client over TCP is served.
+fn is_served_at_last(address: SocketAddr) -> bool {
+    let began = Instant::now();
+    while began.elapsed() < PATIENCE {
+        let mut next = Client::to(address);
+        next.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
+        if next.receive()["op"] == "service_response" {
+            return true;
+        }
+    }
+    false
+}
+
+#[cfg(feature = "cli")]
+fn diagnostics(address: SocketAddr) -> Output {
+    program()
+        .args(["diagnostics", "--timeout", "30", "--connect"])
+        .arg(address.to_string())
+        .output()
+        .unwrap()
+}
+
+#[cfg(all(feature = "web", feature = "cli"))]
+#[test]
+fn a_script_that_takes_all_places_leaves_the_kept_one_to_pages_and_commands() {
+    use crate::web_client::{Socket, get};
+
+    let mut runtime = serving("8");
+    let address = runtime.address;
+    let mut clients = occupy(address, 7);
+    for speaks in [true, false, true] {
+        let told = refused(address, speaks);
+        assert!(
+            told.contains("serves 8 clients at once and keeps 1") && told.contains("--clients"),
+            "{told}"
+        );
+    }
+    assert_eq!(get(address, "/").status, 200);
+    let output = diagnostics(address);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let mut page = Socket::open(address);
+    page.settle();
+    // Now the kept place is taken too.
+    let answer = get(address, "/");
+    assert_eq!(answer.status, 503);
+    assert_eq!(
+        answer.header("content-type"),
+        Some("text/plain; charset=utf-8")
+    );
+    assert!(
+        answer.text().contains("serves 8 clients"),
+        "{}",
+        answer.text()
+    );
+    let output = diagnostics(address);
+    let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{complaint}");
+    assert!(complaint.contains("serves 8 clients"), "{complaint}");
+    drop(page);
+    let began = Instant::now();
+    while get(address, "/").status != 200 {
+        assert!(began.elapsed() < PATIENCE, "no place became free");
+    }
+    for client in &mut clients {
+        client.settle();
+    }
+    clients.pop();
+    assert!(is_served_at_last(address));
+    let warning = runtime.await_line("no place is free");
+    for part in [
+        "places=8",
+        "taken=7",
+        "refused=1",
+        "most_from=127.0.0.1",
+        "held=7",
+        "--clients",
+    ] {
+        assert!(warning.contains(part), "{warning}");
+    }
+    let log = runtime.end();
+    let warnings = log.iter().filter(|line| line.contains("no place is free"));
+    assert_eq!(warnings.count(), 1, "{log:#?}");
+}
+
+#[test]
+fn one_place_and_two_are_served_too() {
+    let runtime = serving("1");
+    let alone = occupy(runtime.address, 1);
+    let told = refused(runtime.address, true);
+    assert!(
+        told.contains("serves 1 clients at once and keeps 0"),
+        "{told}"
+    );
+    drop(alone);
+    assert!(is_served_at_last(runtime.address));
+    let runtime = serving("2");
+    let _one = occupy(runtime.address, 1);
+    assert!(refused(runtime.address, false).contains("keeps 1"));
+    #[cfg(feature = "web")]
+    assert_eq!(crate::web_client::get(runtime.address, "/").status, 200);
+}
