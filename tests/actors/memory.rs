@@ -13,7 +13,7 @@ use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::limits::{CLIENT_BYTES, FRAME_TIME, MAX_MEMORY, STALL_LIMIT};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, Memory, SHORT};
-use pendularm::protocol::limits::MODEST_MESSAGE;
+use pendularm::protocol::limits::MEDIUM;
 use serde_json::{Value, json};
 use tokio::time::{Instant, sleep};
 
@@ -27,7 +27,7 @@ async fn narrow() -> Gateway {
 
 /// A message on `topic` that takes room.
 fn long(topic: &str, n: u64) -> Value {
-    json!({"op": "publish", "topic": topic, "msg": {"n": n, "blob": "x".repeat(MODEST_MESSAGE)}})
+    json!({"op": "publish", "topic": topic, "msg": {"n": n, "blob": "x".repeat(MEDIUM)}})
 }
 
 /// Whether a light call is answered at once.
@@ -41,8 +41,8 @@ async fn is_served(client: &mut Peer) -> bool {
 /// That all of it fits into the limit is asserted where the limits are.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
-    const { assert!(CLIENT_BYTES == 1456 * 1024 && MAX_MEMORY == 640 * MIB) };
-    const { assert!(LONG_FRAMES == 5 && LONG_ANSWERS == 112 * MIB && SHORT == 64 * 1024) };
+    const { assert!(CLIENT_BYTES == 1744 * 1024 && MAX_MEMORY == 640 * MIB) };
+    const { assert!(LONG_FRAMES == 3 && LONG_ANSWERS == 96 * MIB && SHORT == 64 * 1024) };
 }
 
 #[test]
@@ -76,13 +76,34 @@ fn whoever_does_not_complete_a_long_frame_gives_its_room_back_in_time() {
         let gateway = narrow().await;
         let (mut slow, mut next) = (gateway.connect(WIDE), gateway.connect(WIDE));
         let began = Instant::now();
-        slow.offer(&long("/t", 1).to_string()[..2 * SHORT]).await;
+        slow.offer(&long("/t", 1).to_string()[..=MEDIUM]).await;
         settle().await;
         next.subscribe("/t").await;
         next.advertise("/t").await;
         next.send(long("/t", 2)).await;
         assert_eq!(next.receive().await["msg"]["n"], 2);
         assert_elapsed(began, FRAME_TIME);
+    });
+}
+
+/// While one client holds all room for long frames, a published message of 256 KiB passes.
+#[test]
+fn a_medium_message_takes_no_room_and_waits_for_none() {
+    in_virtual_time(async {
+        let gateway = narrow().await;
+        let (mut slow, mut talker) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        slow.offer(&long("/t", 1).to_string()[..=MEDIUM]).await;
+        settle().await;
+        assert_eq!(gateway.gauges.memory().taken(), 1);
+        let began = Instant::now();
+        talker.subscribe("/t").await;
+        talker.advertise("/t").await;
+        let blob = "x".repeat(256 * 1024);
+        talker
+            .send(json!({"op": "publish", "topic": "/t", "msg": {"blob": blob}}))
+            .await;
+        assert_eq!(talker.receive().await["msg"]["blob"], blob.as_str());
+        assert!(began.elapsed() < Duration::from_secs(1));
     });
 }
 

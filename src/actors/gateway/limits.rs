@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, SHORT};
-use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MODEST_MESSAGE};
+use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MEDIUM};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 const KIB: usize = 1024;
@@ -14,12 +14,13 @@ const KIB: usize = 1024;
 /// Bytes that the program has resident at most with the default number of places, whatever clients do. What the system
 /// keeps for sockets is not in it.
 pub const MAX_MEMORY: usize = 640 * KIB * KIB;
-/// Bytes of one client at most, beside what is long: its input, as it comes and as a frame; topic messages that wait;
-/// what is being written; responses, with one more than may wait; computations, with one more than may wait; what the
-/// registry keeps; a WebSocket's buffers, and the connection at rest.
-pub const CLIENT_BYTES: usize = 2 * SHORT
+/// Bytes of one client at most, without long frames and answers: its input, as it comes and as a frame; pieces of a
+/// message; topic messages that wait; the message that is being written; responses, with one more than may wait;
+/// computations, with one more than may wait; the entries of the registry; a WebSocket's buffers, and the idle connection.
+pub const CLIENT_BYTES: usize = 2 * MEDIUM
+    + SHORT
     + MAX_TOPIC_BYTES
-    + MODEST_MESSAGE
+    + MEDIUM
     + MAX_BACKLOG
     + SHORT
     + 2 * SHORT
@@ -53,7 +54,7 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 /// Bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals that
 /// wait for other clients.
-pub const MAX_KEPT: usize = 256 * 1024;
+pub const MAX_KEPT: usize = 128 * 1024;
 /// Bytes that each of these takes beside three times its names: its places in the tables.
 pub const ENTRY_BYTES: usize = 640;
 /// How long a request may take from its first bytes to the end of its head, and how long a client may take from

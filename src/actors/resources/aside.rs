@@ -14,7 +14,7 @@ use tokio::task::{spawn_blocking, yield_now};
 
 use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
-use crate::protocol::limits::MODEST_MESSAGE;
+use crate::protocol::limits::MEDIUM;
 
 /// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other.
 pub const PLACES: usize = 2;
@@ -24,11 +24,11 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
-    /// The same with more than [`MODEST_MESSAGE`]. Long ones have places of their own: what is shorter waits for less.
+    /// The same with more than [`MEDIUM`]. Long ones have places of their own: what is shorter waits for less.
     ReadingLong,
     /// Writes messages in the forms that clients ask for.
     Writing,
-    /// The same with more than [`MODEST_MESSAGE`].
+    /// The same with more than [`MEDIUM`].
     WritingLong,
     /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
     Listing,
@@ -38,7 +38,7 @@ impl Errand {
     /// Reads so many bytes of a client's input.
     #[must_use]
     pub const fn reading(bytes: usize) -> Self {
-        if bytes > MODEST_MESSAGE {
+        if bytes > MEDIUM {
             Self::ReadingLong
         } else {
             Self::Reading
@@ -48,7 +48,7 @@ impl Errand {
     /// Writes a message of so many bytes in another form.
     #[must_use]
     pub const fn writing(bytes: usize) -> Self {
-        if bytes > MODEST_MESSAGE {
+        if bytes > MEDIUM {
             Self::WritingLong
         } else {
             Self::Writing

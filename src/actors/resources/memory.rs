@@ -1,28 +1,28 @@
 //! Memory that clients make the program hold: so many places times a bounded client, and two pools for what is long.
 //!
-//! What is short has a bound in each connection (`gateway::limits`). What is longer than [`SHORT`] takes a [`Permit`],
-//! and waits for one where there is none: a frame while it is read, performed and passed on, an answer from before it
-//! is computed until it has been written. The permit travels with the bytes, and is given back with their last copy.
+//! Short bytes have a bound in each connection (`gateway::limits`). An answer longer than [`SHORT`] takes a [`Permit`]
+//! before it is computed, and keeps it until it has been written. A published message longer than [`MEDIUM`], and any
+//! other frame longer than [`SHORT`], takes one while it is read, performed and passed on. The client waits if no permit
+//! is left. The permit travels with the bytes, and is given back with their last copy.
 //!
-//! **Invariant:** whoever holds bytes longer than [`SHORT`] holds a permit for them. Of topic messages that have been
-//! delivered, only those longer than [`MODEST_MESSAGE`] need one.
+//! **Invariant:** bytes longer than [`SHORT`] have a permit, except published messages of at most [`MEDIUM`].
 
 use std::sync::Arc;
 
 use bytes::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::protocol::limits::MODEST_MESSAGE;
+use crate::protocol::limits::MEDIUM;
 pub use crate::protocol::limits::SHORT;
 
 const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
 /// Long frames that are there at once.
-pub const LONG_FRAMES: usize = 5;
+pub const LONG_FRAMES: usize = 3;
 /// Bytes of the long answers that are there at once, computed or being computed: one of a million steps, or many of
 /// ten thousand.
-pub const LONG_ANSWERS: usize = 112 * MIB;
+pub const LONG_ANSWERS: usize = 96 * MIB;
 /// The part of an answer that one permit of the pool stands for.
 const ANSWER_PART: usize = 16 * KIB;
 
@@ -113,7 +113,7 @@ pub fn cover(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
 /// The same for a topic message, which takes no room if it is a modest one.
 #[must_use]
 pub fn cover_message(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
-    let permit = permit.filter(|_| bytes.len() > MODEST_MESSAGE);
+    let permit = permit.filter(|_| bytes.len() > MEDIUM);
     cover(permit, bytes)
 }
 

@@ -23,14 +23,14 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use crate::protocol::limits::{MAX_FRAME, MODEST_MESSAGE, SHORT};
+use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::outbox::queues::{Queues, Timestamp, counted};
 use crate::protocol::outbox::throttle::{HeldMessage, Throttles};
 use crate::protocol::wire::series::{first_message, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
-/// own. A longer message than [`MODEST_MESSAGE`] has room elsewhere, and counts as one of these: no two of them wait.
-pub const MAX_TOPIC_BYTES: usize = 400 * 1024;
+/// own. A longer message than [`MEDIUM`] has room elsewhere, and counts as one of these: no two of them wait.
+pub const MAX_TOPIC_BYTES: usize = 304 * 1024;
 /// The longest topic message: the longest that a client may send, and the newline behind it.
 pub const MAX_MESSAGE: usize = MAX_FRAME + 1;
 /// How long a topic message may wait before it is dropped, unless it is the newest of its topic.
@@ -344,8 +344,8 @@ impl Outbox {
     pub fn has_long(&self) -> bool {
         let mut waiting = self.topics.values();
         let mut writing = self.in_flight.iter();
-        waiting.any(|message| message.frame.len() > MODEST_MESSAGE)
-            || writing.any(|frame| frame.length > MODEST_MESSAGE && !frame.is_response)
+        waiting.any(|message| message.frame.len() > MEDIUM)
+            || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
     }
 
     /// When the next held back message is due, if any is held back: the time to take frames again.

@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use crate::protocol::limits::MODEST_MESSAGE;
+use crate::protocol::limits::MEDIUM;
 
 /// Microseconds since the outbox was first used: half the bytes of an [`Instant`](std::time::Instant).
 pub(super) type Timestamp = u64;
 
 /// Bytes of a message, or of a series, that count.
 pub(super) fn counted(frame: &Bytes) -> usize {
-    frame.len().min(MODEST_MESSAGE)
+    frame.len().min(MEDIUM)
 }
 
 /// Every topic that has messages in the outbox, or a bound.

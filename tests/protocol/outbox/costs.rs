@@ -1,6 +1,6 @@
 //! Bytes and costs of frames until they have been written.
 
-use pendularm::protocol::limits::{MODEST_MESSAGE, SHORT};
+use pendularm::protocol::limits::{MEDIUM, SHORT};
 
 use super::Bench;
 
@@ -45,12 +45,12 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
     let mut bench = Bench::new();
     bench
         .outbox
-        .push_response(vec![b'x'; MODEST_MESSAGE + 1].into(), &[]);
+        .push_response(vec![b'x'; MEDIUM + 1].into(), &[]);
     assert!(!bench.outbox.has_long(), "it is a response");
-    bench.push("/a", vec![b'x'; MODEST_MESSAGE + 1]);
+    bench.push("/a", vec![b'x'; MEDIUM + 1]);
     assert!(bench.outbox.has_long());
     bench.take(2, usize::MAX);
-    bench.outbox.written(2 * MODEST_MESSAGE + 1);
+    bench.outbox.written(2 * MEDIUM + 1);
     assert!(bench.outbox.has_long());
     bench.outbox.written(1);
     assert!(!bench.outbox.has_long());

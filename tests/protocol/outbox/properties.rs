@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use pendularm::protocol::limits::MODEST_MESSAGE;
+use pendularm::protocol::limits::MEDIUM;
 use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
 use proptest::prelude::*;
 
@@ -156,7 +156,7 @@ impl Model {
             .iter()
             .filter(|waiting| waiting.kind != Kind::Response);
         let lengths = topics.map(|waiting| waiting.frame.len());
-        lengths.map(|length| length.min(MODEST_MESSAGE)).sum()
+        lengths.map(|length| length.min(MEDIUM)).sum()
     }
 
     fn topic_cost(&self) -> usize {
@@ -198,9 +198,9 @@ fn action() -> impl Strategy<Value = Action> {
     let topic = || 0..TOPICS.len();
     let size = prop_oneof![
         1_usize..100,
-        20_000..MODEST_MESSAGE,
-        Just(MODEST_MESSAGE),
-        Just(MODEST_MESSAGE + 1),
+        20_000..MEDIUM,
+        Just(MEDIUM),
+        Just(MEDIUM + 1),
         Just(MAX_MESSAGE),
         Just(MAX_MESSAGE + 1)
     ];

@@ -1,7 +1,7 @@
 //! The queue: in which order frames leave, and which messages are dropped when it is full.
 
 use bytes::Bytes;
-use pendularm::protocol::limits::{MAX_FRAME, MODEST_MESSAGE, SHORT};
+use pendularm::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
 
 use super::{Bench, MIB};
@@ -74,7 +74,7 @@ fn the_newest_long_message_waits_and_one_that_no_client_may_send_is_dropped_alon
     }
     bench.push("/a", vec![5; MAX_MESSAGE + 1]);
     bench.push("/a", "1");
-    assert_eq!(bench.outbox.topic_bytes(), 1 + MODEST_MESSAGE);
+    assert_eq!(bench.outbox.topic_bytes(), 1 + MEDIUM);
     assert_eq!(bench.outbox.dropped(), 4);
     let left = bench.take(usize::MAX, usize::MAX);
     assert_eq!((left.len(), left[0][0]), (2, 4));

@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use crate::protocol::limits::MODEST_MESSAGE;
+use crate::protocol::limits::MEDIUM;
 use crate::protocol::outbox::queues::{Timestamp, counted};
 
-/// How long a message of more than [`MODEST_MESSAGE`] may be held back: it takes room that others wait for.
+/// How long a message of more than [`MEDIUM`] may be held back: it takes room that others wait for.
 const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 /// Dues that may be out of date, beside as many as are up to date, before all are rebuilt.
 const SLACK: usize = 32;
@@ -86,7 +86,7 @@ impl Throttles {
     /// Whether a message of the topic is a long one, and would be held back for longer than such may be.
     pub(super) fn holds_for_long(&self, topic: &str, frame: &Bytes, now: Instant) -> bool {
         let due = self.topics.get(topic).and_then(TopicThrottle::next);
-        let is_long = frame.len() > MODEST_MESSAGE;
+        let is_long = frame.len() > MEDIUM;
         is_long && due.is_some_and(|due| due > now + MAX_HELD_BACK)
     }
 

@@ -18,7 +18,7 @@ use super::nesting::{Event, Nesting};
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
 use super::text;
-use crate::protocol::limits::{MAX_FRAME, SHORT};
+use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 
 /// Bytes of a line that is no object, kept for the error message.
 const MAX_PREFIX: usize = 32;
@@ -112,6 +112,12 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
+        // A frame of at most [`MEDIUM`] bytes never allocates more than that, although a `Vec` would double.
+        let needed = self.buffer.len() + bytes.len();
+        if needed > self.buffer.capacity() && needed <= MEDIUM {
+            let capacity = needed.next_multiple_of(SHORT).min(MEDIUM);
+            self.buffer.reserve_exact(capacity - self.buffer.len());
+        }
         self.buffer.extend_from_slice(bytes);
     }
 

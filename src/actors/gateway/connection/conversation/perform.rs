@@ -12,6 +12,7 @@ use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::memory::{SHORT, cover};
 use crate::protocol::catalog::Service;
+use crate::protocol::limits::MEDIUM;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{
     self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
@@ -47,12 +48,16 @@ impl Reader {
         self.speaks_json = true;
         self.shared.outgoing.set_singly(!frame.newline());
         let length = frame.len();
-        if length > SHORT {
+        if length > MEDIUM {
             self.performed = Some(self.permit(input).await);
         }
         let Some(incoming) = self.read_frame(length, move || read(frame)).await else {
             return;
         };
+        let is_published = matches!(incoming.op, Ok(Op::Publish { .. } | Op::Fragment(_)));
+        if length > SHORT && !is_published && self.performed.is_none() {
+            self.performed = Some(self.permit(input).await);
+        }
         if let Some((incoming, length)) = self.assemble(incoming, length, input).await {
             self.act_on(incoming, length).await;
         }

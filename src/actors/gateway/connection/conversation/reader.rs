@@ -16,7 +16,8 @@ use crate::actors::gateway::connection::transport::{CHUNK, Inbound, discard};
 use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
 use crate::actors::gateway::messages::{Disconnect, Finish, Retire};
-use crate::actors::resources::memory::{Permit, SHORT};
+use crate::actors::resources::memory::Permit;
+use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
 use crate::protocol::wire::frame::{Cut, FrameReader};
 
@@ -112,7 +113,7 @@ impl Reader {
             }
             if !self.frames.is_unfinished() {
                 self.unfinished.begin_anew();
-            } else if self.coming.is_none() && self.frames.buffered() > SHORT {
+            } else if self.coming.is_none() && self.frames.buffered() > MEDIUM {
                 self.coming = Some(self.permit(input).await);
             }
             if full {

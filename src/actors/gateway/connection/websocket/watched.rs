@@ -15,7 +15,8 @@ use tokio::time::Instant;
 
 use crate::actors::gateway::connection::outgoing::Outgoing;
 use crate::actors::gateway::limits::FRAME_TIME;
-use crate::actors::resources::memory::{Memory, Permit, SHORT};
+use crate::actors::resources::memory::{Memory, Permit};
+use crate::protocol::limits::MEDIUM;
 
 /// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
 pub(super) const READ_BUFFER: usize = 8 * 1024;
@@ -98,7 +99,7 @@ impl<S> Watched<S> {
     /// Reading goes on after so long a time. Where `is_next`, the last message has been read.
     pub(super) fn read_on(&mut self, unread: Duration, is_next: bool) {
         self.began = self.began.map(|began| began + unread);
-        if is_next && self.pending <= SHORT {
+        if is_next && self.pending <= MEDIUM {
             self.permit = None;
         }
     }
@@ -119,7 +120,7 @@ impl<S> Watched<S> {
 
     /// Waits until there is room for the message that comes, if it is long.
     fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        if self.pending <= SHORT || self.permit.is_some() {
+        if self.pending <= MEDIUM || self.permit.is_some() {
             return Poll::Ready(());
         }
         let waiting = self.waiting.get_or_insert_with(|| {
