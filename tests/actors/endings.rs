@@ -11,11 +11,11 @@ use crate::virtual_time::{Gateway, Peer, WIDE, settle};
 use pendularm::actors::gateway::messages::TakeCensus;
 use serde_json::{Value, json};
 
-const CLIENTS: usize = 8;
+const CLIENTS: usize = 16;
 /// Calls, goals, or registrations of a kind, of each.
-const EACH: usize = 200;
+const EACH: usize = 100;
 
-/// Each of eight clients sends `frame` 200 times; then `end` ends all of that. Others have turns meanwhile, and in the
+/// Each of the clients sends `frame` [`EACH`] times; then `end` ends all of that. Others have turns meanwhile, and in the
 /// end everybody has heard of each once.
 fn assert_ends_in_turns(
     frame: impl Fn(usize) -> Value,

@@ -16,7 +16,8 @@ const KIB: usize = 1024;
 pub const MAX_MEMORY: usize = 640 * KIB * KIB;
 /// Bytes of one client at most, without long frames and answers: its input, as it comes and as a frame; pieces of a
 /// message; topic messages that wait; the message that is being written; responses, with one more than may wait;
-/// computations, with one more than may wait; the entries of the registry; a WebSocket's buffers, and the idle connection.
+/// computations, with one more than may wait; the entries of the registry; a WebSocket's buffers, and the idle
+/// connection.
 pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + SHORT
     + MAX_TOPIC_BYTES

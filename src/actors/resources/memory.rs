@@ -2,8 +2,8 @@
 //!
 //! Short bytes have a bound in each connection (`gateway::limits`). An answer longer than [`SHORT`] takes a [`Permit`]
 //! before it is computed, and keeps it until it has been written. A published message longer than [`MEDIUM`], and any
-//! other frame longer than [`SHORT`], takes one while it is read, performed and passed on. The client waits if no permit
-//! is left. The permit travels with the bytes, and is given back with their last copy.
+//! other frame longer than [`SHORT`], takes one while it is read, performed and passed on. The client waits if no
+//! permit is left. The permit travels with the bytes, and is given back with their last copy.
 //!
 //! **Invariant:** bytes longer than [`SHORT`] have a permit, except published messages of at most [`MEDIUM`].
 

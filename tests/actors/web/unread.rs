@@ -69,8 +69,8 @@ fn a_slow_client_loses_the_oldest_messages_and_no_response() {
         settle().await;
         let dropped = gateway.gauges.messages_dropped();
         assert!(
-            (55..=62).contains(&dropped),
-            "{dropped} of 1 MB do not fit into 400 KiB"
+            (65..=72).contains(&dropped),
+            "{dropped} of 1 MB do not fit into 304 KiB"
         );
         let unknown = json!({"op": "call_service", "service": "/nobody", "id": "last"});
         send(&mut socket, unknown).await;

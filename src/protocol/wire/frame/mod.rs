@@ -112,11 +112,10 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
-        // A frame of at most [`MEDIUM`] bytes never allocates more than that, although a `Vec` would double.
+        // A `Vec` would double beyond [`MEDIUM`] before so many bytes have come.
         let needed = self.buffer.len() + bytes.len();
-        if needed > self.buffer.capacity() && needed <= MEDIUM {
-            let capacity = needed.next_multiple_of(SHORT).min(MEDIUM);
-            self.buffer.reserve_exact(capacity - self.buffer.len());
+        if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
+            self.buffer.reserve_exact(MEDIUM - self.buffer.len());
         }
         self.buffer.extend_from_slice(bytes);
     }
