@@ -1,4 +1,4 @@
-//! The page: answers, findings in words, figures and tables, then verdicts. One file, no script, no network.
+//! The page: abstract, findings, numbered figures and tables, verdicts. One file, no script, no network.
 //!
 //! **Invariant:** everything that comes from a section is escaped, but for the panels, which are SVG of our own making.
 
@@ -6,12 +6,15 @@ use std::fmt::{self, Write};
 
 use super::machine::Machine;
 use super::section::{Block, Cell, Figure, Section, Table};
-use super::svg::{STYLE, escape};
+use super::svg::{SMALL, STYLE, escape};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 
 /// The section that only a maintainer asks for.
 const LAST: &str = "work";
+
+/// The sections whose first claims make the abstract, in this order.
+const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
 /// Rows of a table beyond which it is folded.
 const FOLDED: usize = 8;
@@ -25,22 +28,17 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
     );
     header(&mut out, sections, machine);
     out.push_str("<main>");
-    for section in sections {
-        for block in &section.glance {
-            out.push_str("<section class=\"glance\">");
-            self::block(&mut out, block, "h2");
-            out.push_str("</section>");
-        }
-    }
+    summary(&mut out, sections);
     findings(&mut out, sections);
+    let mut figures = 0;
     // A maintainer's sections come last.
     let (others, last): (Vec<_>, Vec<_>) = sections.iter().partition(|it| it.name != LAST);
     for section in others {
-        body(&mut out, section);
+        body(&mut out, section, &mut figures);
     }
     verdicts(&mut out, sections);
     for section in last {
-        body(&mut out, section);
+        body(&mut out, section, &mut figures);
     }
     making(&mut out, sections, machine);
     out.push_str("</main></body></html>\n");
@@ -52,8 +50,8 @@ fn header(out: &mut String, sections: &[Section], machine: &Machine) {
     append(
         out,
         format_args!(
-            "<p>The arm of pendularm under each of its integrators. Commit {}.</p><nav>",
-            escape(&machine.commit)
+            "<p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>",
+            escape(&machine.version)
         ),
     );
     for section in sections {
@@ -66,7 +64,25 @@ fn header(out: &mut String, sections: &[Section], machine: &Machine) {
             ),
         );
     }
-    out.push_str("<a href=\"#making\">How this was made</a></nav></header>");
+    out.push_str(
+        "<a href=\"#verdicts\">Verdicts</a><a href=\"#making\">How this was made</a></nav>",
+    );
+}
+
+/// The abstract: the claim of the first finding of each of these sections.
+fn summary(out: &mut String, sections: &[Section]) {
+    out.push_str("<section id=\"abstract\"><h2>Abstract</h2><p>");
+    for name in ABSTRACT {
+        let section = sections.iter().find(|section| section.name == name);
+        let finding = section.and_then(|section| section.findings.first());
+        if let Some(claim) = finding.and_then(|finding| finding.split("**").nth(1)) {
+            append(
+                out,
+                format_args!("{}. ", escape(claim.trim_end_matches('.'))),
+            );
+        }
+    }
+    out.push_str("</p></section>");
 }
 
 fn findings(out: &mut String, sections: &[Section]) {
@@ -97,12 +113,12 @@ fn verdicts(out: &mut String, sections: &[Section]) {
             Cell::verdict(verdict.holds),
         ]);
     }
-    out.push_str("<section class=\"verdicts\">");
+    out.push_str("<section id=\"verdicts\" class=\"verdicts\">");
     self::table(out, &table, "h2");
     out.push_str("</section>");
 }
 
-fn body(out: &mut String, section: &Section) {
+fn body(out: &mut String, section: &Section, figures: &mut usize) {
     append(
         out,
         format_args!(
@@ -112,24 +128,23 @@ fn body(out: &mut String, section: &Section) {
         ),
     );
     for block in &section.blocks {
-        self::block(out, block, "h3");
+        match block {
+            Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
+            Block::Figure(figure) => {
+                *figures += 1;
+                self::figure(out, figure, *figures);
+            }
+            Block::Table(table) => self::table(out, table, "h3"),
+        }
     }
     out.push_str("</section>");
 }
 
-fn block(out: &mut String, block: &Block, heading: &str) {
-    match block {
-        Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
-        Block::Figure(figure) => self::figure(out, figure),
-        Block::Table(table) => self::table(out, table, heading),
-    }
-}
-
-fn figure(out: &mut String, figure: &Figure) {
+fn figure(out: &mut String, figure: &Figure, number: usize) {
     append(
         out,
         format_args!(
-            "<figure id=\"{}\"><h3>{}</h3><p class=\"legend\">",
+            "<figure id=\"{}\"><h3>Figure {number}. {}</h3><p class=\"legend\">",
             escape(&figure.name),
             escape(&figure.title)
         ),
@@ -139,6 +154,7 @@ fn figure(out: &mut String, figure: &Figure) {
     }
     let few = match figure.panels.len() {
         0..=2 => " few",
+        SMALL.. => " many",
         many if many % 4 == 0 => " four",
         _ => "",
     };
@@ -175,7 +191,8 @@ fn table(out: &mut String, table: &Table, heading: &str) {
     }
     out.push_str("<div class=\"scroll\"><table><thead><tr>");
     for head in &table.head {
-        append(out, format_args!("<th>{}</th>", escape(head)));
+        let tag = if head.is_empty() { "td" } else { "th" };
+        append(out, format_args!("<{tag}>{}</{tag}>", escape(head)));
     }
     out.push_str("</tr></thead><tbody>");
     for row in &table.rows {
@@ -222,7 +239,7 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
                 "<li>{}: {:.0} s at {}{quick}</li>",
                 escape(&section.name),
                 section.seconds,
-                escape(&section.commit)
+                escape(&section.version)
             ),
         );
     }

@@ -1,4 +1,4 @@
-//! The machine that the numbers were made on: processor, load, flags, commit.
+//! The machine that the numbers were made on: processor, load, flags, and the version of the program.
 //!
 //! **Invariant:** what cannot be found out is called unknown, never guessed.
 
@@ -7,16 +7,19 @@ use std::process::Command;
 
 use serde::{Deserialize, Serialize};
 
+/// The program's version, with the commit of a release build.
+const VERSION: &str = env!("PENDULARM_VERSION");
+
 /// Facts about the machine and the build, in the order in which they are shown.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Machine {
-    pub(crate) commit: String,
+    /// The program's version, with the commit of a release build.
+    pub(crate) version: String,
     pub(crate) facts: Vec<(String, String)>,
 }
 
 impl Machine {
     pub(crate) fn here() -> Self {
-        let commit = commit();
         let fact = |name: &str, value: String| (name.to_owned(), value);
         let unknown = || "unknown".to_owned();
         let build = if cfg!(debug_assertions) {
@@ -25,11 +28,7 @@ impl Machine {
             "release build (optimised, link-time optimisation, one codegen unit)"
         };
         let facts = vec![
-            fact(
-                "Version",
-                format!("pendularm {}", env!("PENDULARM_VERSION")),
-            ),
-            fact("Commit", commit.clone()),
+            fact("Version", format!("pendularm {VERSION}")),
             fact("Build", build.to_owned()),
             fact(
                 "Target",
@@ -56,26 +55,10 @@ impl Machine {
                 }),
             ),
         ];
-        Self { commit, facts }
-    }
-}
-
-/// The commit that was built if the build was told, otherwise that of the working directory if it is this project's.
-fn commit() -> String {
-    if let Some(commit) = option_env!("PENDULARM_COMMIT") {
-        return commit.to_owned();
-    }
-    let ours = fs::read_to_string("Cargo.toml")
-        .is_ok_and(|manifest| manifest.contains("name = \"pendularm\""));
-    let head = ours
-        .then(|| output("git", &["rev-parse", "--short=12", "HEAD"]))
-        .flatten();
-    match head {
-        Some(head) => match output("git", &["status", "--porcelain", "--untracked-files=no"]) {
-            Some(changes) if !changes.is_empty() => format!("{head} with changes"),
-            _ => head,
-        },
-        None => "unknown".to_owned(),
+        Self {
+            version: VERSION.to_owned(),
+            facts,
+        }
     }
 }
 

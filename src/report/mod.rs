@@ -198,7 +198,7 @@ fn make(
     for (stem, csv) in making.tables {
         write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
     }
-    for block in section.glance.iter().chain(&section.blocks) {
+    for block in &section.blocks {
         if let Block::Figure(figure) = block {
             let path = options.out.join(format!("{}.svg", figure.name));
             write(&path, &figure.sheet)?;
@@ -206,7 +206,7 @@ fn make(
     }
     maker.name.clone_into(&mut section.name);
     maker.title.clone_into(&mut section.title);
-    section.commit.clone_from(&machine.commit);
+    section.version.clone_from(&machine.version);
     section.quick = options.quick;
     section.seconds = started.elapsed().as_secs_f64();
     Ok(section)
@@ -215,8 +215,7 @@ fn make(
 /// Everything but the drawings.
 fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
     let tables = |section: &Section| -> Vec<Value> {
-        let blocks = section.glance.iter().chain(&section.blocks);
-        let tables = blocks.filter_map(|block| match block {
+        let tables = section.blocks.iter().filter_map(|block| match block {
             Block::Table(table) => Some(table),
             Block::Text(_) | Block::Figure(_) => None,
         });
@@ -232,7 +231,7 @@ fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
                 "verdicts": section.verdicts,
                 "tables": tables(section),
                 "seconds": section.seconds,
-                "commit": section.commit,
+                "version": section.version,
                 "quick": section.quick,
             })
         })

@@ -18,12 +18,10 @@ pub(crate) struct Section {
     /// Sentences that open the report.
     pub(crate) findings: Vec<String>,
     pub(crate) verdicts: Vec<Verdict>,
-    /// Tables and figures that answer at once: they open the page.
-    pub(crate) glance: Vec<Block>,
     pub(crate) blocks: Vec<Block>,
-    /// Seconds it took, and the commit that made it.
+    /// Seconds it took, and the version that made it.
     pub(crate) seconds: f64,
-    pub(crate) commit: String,
+    pub(crate) version: String,
     /// Whether it was made with `--quick`.
     pub(crate) quick: bool,
 }

@@ -3,9 +3,8 @@
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::report::experiments::budget::Budget;
-use pendularm::report::experiments::chaos::{energy_drift, horizon, lyapunov_rate, separation};
+use pendularm::report::experiments::chaos::energy_drift;
 use pendularm::report::experiments::error::{OUTPUTS, scenes};
-use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 
 /// Halving the timestep divides the error by 2^p where truncation is all there is.
 #[test]
@@ -101,32 +100,6 @@ fn the_parts_of_an_error_add_up() {
             assert_eq!(parts.hold > 0.0, control, "{parts:?}");
         }
     }
-}
-
-#[test]
-fn a_better_method_has_a_later_horizon() {
-    let arm = Arm::<2>::default();
-    let reference = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 0.125, 96);
-    let at = |method| {
-        let errors = separation(&arm, &State::rest(), method, 1.0 / 256.0, 32, &reference);
-        horizon(&errors, 0.125).unwrap_or(f64::INFINITY)
-    };
-    assert!(at(Method::Euler) < at(Method::Verlet));
-    assert!(at(Method::Verlet) < at(Method::Rk4));
-}
-
-/// A swing of a hundredth of a radian is as good as linear: two neighbours stay neighbours.
-#[test]
-fn a_chaotic_swing_has_a_positive_lyapunov_rate_and_a_small_one_has_none() {
-    let arm = Arm::<2>::default();
-    let rate = lyapunov_rate(&arm, &State::rest(), 50.0);
-    assert!(rate > 0.5, "{rate}");
-    let small = State {
-        position: [-std::f64::consts::FRAC_PI_2 + 0.01, 0.0],
-        velocity: [0.0; 2],
-    };
-    let rate = lyapunov_rate(&arm, &small, 50.0);
-    assert!(rate.abs() < 0.1, "{rate}");
 }
 
 #[test]

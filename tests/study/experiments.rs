@@ -1,4 +1,4 @@
-//! The report's experiments: rounding, forcing, stiffness, large motions. Each does what theory says it must.
+//! The report's experiments: stiffness, large motions, uneven arms. Each gives the result that theory predicts.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -6,101 +6,13 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
-use pendularm::report::experiments::forcing::{COARSEST, DURATION, FORCES};
-use pendularm::report::experiments::moving::{LookedAt, MovingScene, distance_behind};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, are_carried, arrive, move_of, spun,
 };
-use pendularm::report::experiments::rounding::{Adding, energy_error, law};
 use pendularm::report::experiments::stiff::{By, Solver, StiffScene};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::Linear;
 use pendularm::study::stability::{Sampling, step_matrix};
-
-/// Slope of the least-squares line through the logarithms.
-fn slope(points: &[(f64, f64)]) -> f64 {
-    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let count = logs.len() as f64;
-    let x = logs.iter().map(|p| p.0).sum::<f64>() / count;
-    let y = logs.iter().map(|p| p.1).sum::<f64>() / count;
-    let along: f64 = logs.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    along / logs.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
-}
-
-/// A quarter of a million steps of a swing whose truncation error is out of sight.
-#[test]
-fn carried_rounding_hardly_moves_energy_and_plain_sums_walk() {
-    let energy = |adding| energy_error(Method::Rk4, 2e-5, 1 << 18, adding);
-    let (carried, plain) = (energy(Adding::Compensated), energy(Adding::Plain));
-    let end = |points: &[(f64, f64)]| points.last().unwrap().1;
-    assert!(
-        end(&plain) > 5.0 * end(&carried),
-        "{} {}",
-        end(&plain),
-        end(&carried)
-    );
-    // A random walk has 1/2; a decade of one is off by some tenths, and no two decades agree.
-    let (least, most) = law(&plain).unwrap();
-    assert!(0.0 <= least && least < most && most < 1.5, "{least} {most}");
-}
-
-#[test]
-fn forces_leave_a_method_the_order_that_theory_says() {
-    for force in &FORCES {
-        for method in Method::ALL {
-            // Steps so short that a period of the fastest force has many, and the error still stands out from rounding.
-            let points: Vec<(f64, f64)> = (6..12)
-                .map(|halving| {
-                    let steps = COARSEST << halving;
-                    let error = force.error(method, steps).unwrap();
-                    (DURATION / steps as f64, error)
-                })
-                .filter(|point| point.1 > 1e-13)
-                .collect();
-            if points.len() < 3 {
-                // Order 4 under a smooth force: at rounding already.
-                assert_eq!((method, force.name), (Method::Rk4, "smooth"));
-                continue;
-            }
-            let order = slope(&points);
-            let expected = f64::from((force.order)(method));
-            assert!(
-                (order - expected).abs() < 0.3,
-                "{} {method}: {order} for {expected}",
-                force.name
-            );
-        }
-    }
-}
-
-/// Halving the timestep divides the error by two to the order, and holding anything leaves the first.
-#[test]
-fn a_setpoint_that_moves_and_is_held_for_the_step_leaves_order_one() {
-    let scene = MovingScene::new();
-    assert!(scene.uncertainty() < 1e-22, "{:e}", scene.uncertainty());
-    for behind in LookedAt::ALL {
-        for method in Method::ALL {
-            let error = |steps| scene.error(behind, method, steps);
-            let seen = (error(1 << 11) / error(1 << 12)).log2();
-            let expected = f64::from(behind.order(method));
-            assert!(
-                (seen - expected).abs() < 0.15,
-                "{} {method}: {seen} for {expected}",
-                behind.name()
-            );
-        }
-    }
-}
-
-/// Without velocities damping holds the arm back; the more seldom the setpoint moves, the further behind the arm is.
-#[test]
-fn velocities_keep_an_arm_near_a_setpoint_that_moves() {
-    for every in [1, 17, 100] {
-        let (with, without) = (distance_behind(every, true), distance_behind(every, false));
-        assert!(1.5 * with < without, "every {every}: {with}, {without}");
-    }
-    assert!(distance_behind(100, true) > 2.0 * distance_behind(1, true));
-}
 
 /// Orders where nothing is stiff, and an error that hardly knows how stiff it is.
 #[test]

@@ -6,7 +6,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::report::experiments::reference::{
-    DoubleDouble, Law, MovingSetpoint, ReferenceMotion, exact_steps, largest_difference,
+    DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference,
 };
 use serde_json::Value;
 
@@ -118,32 +118,6 @@ fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     };
     let ratio = distance(1.0 / 512.0) / distance(1.0 / 1024.0);
     assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
-}
-
-/// A setpoint that stays is the law's own, and one that moves ends where it is sent, by way of the middle.
-#[test]
-fn a_moving_setpoint_is_that_of_the_law_while_it_stays() {
-    let arm = Arm::<2>::default();
-    let of = |from, to| MovingSetpoint {
-        from,
-        to,
-        duration: 2.0,
-    };
-    let stays = of(SETPOINT.position, SETPOINT.position);
-    let moving = ReferenceMotion::behind(&arm, &start(), &GAINS, &stays, 0.5, 4);
-    let continuous = Law::Continuous(GAINS, SETPOINT);
-    let still = ReferenceMotion::of(&arm, &start(), &continuous, 0.5, 4);
-    assert_eq!(moving.samples(), still.samples());
-    let moves = of([0.0, 1.0], SETPOINT.position);
-    assert_eq!(moves.at(0.0), Setpoint::at([0.0, 1.0]));
-    let near =
-        |seen: [f64; 2], wanted: [f64; 2]| (0..2).all(|i| (seen[i] - wanted[i]).abs() < 4e-16);
-    assert!(near(moves.at(2.0).position, SETPOINT.position));
-    assert_eq!(moves.at(2.0).velocity, [0.0; 2]);
-    let middle = moves.at(1.0);
-    assert!(near(middle.position, [0.4, 0.2]), "{middle:?}");
-    // 15/8 of the mean speed.
-    assert!((middle.velocity[0] - 0.75).abs() < 1e-15, "{middle:?}");
 }
 
 /// The steps of the live arm and the same steps with twice the digits differ by rounding alone: a few ulps in 128 steps.

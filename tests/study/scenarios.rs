@@ -1,6 +1,6 @@
 //! The named scenes of the study: those that are quick, here; the others in the report.
 
-use pendularm::report::experiments::scenarios::{Scenario, all};
+use pendularm::report::experiments::scenarios::{Scenario, all, live};
 
 fn check(scenes: impl Iterator<Item = Scenario>) {
     let mut failed = vec![];
@@ -45,4 +45,30 @@ fn every_quick_scene_is_as_expected() {
 #[ignore = "takes some seconds; the report runs them"]
 fn every_slow_scene_is_as_expected() {
     check(all().into_iter().filter(|scene| scene.slow));
+}
+
+/// Each scene has a picture of a live arm, or a reason why there is none; a link spells all of the arm's settings.
+#[test]
+fn scenes_are_shown_by_live_arms() {
+    let (mut hidden, mut diverged) = (Vec::new(), Vec::new());
+    for scene in all() {
+        let Ok(shown) = live(scene.id) else {
+            hidden.push(scene.id);
+            continue;
+        };
+        let watched = shown.watch().unwrap();
+        assert!(watched.samples.len() > 1, "{}", scene.id);
+        if watched.diverged {
+            diverged.push(scene.id);
+        }
+        let fragment = shown.fragment();
+        for name in [
+            "links", "method", "timestep", "masses", "period", "position",
+        ] {
+            assert!(fragment.contains(&format!("{name}=")), "{fragment}");
+        }
+    }
+    assert_eq!(hidden, ["S14", "S34", "S35", "S36"]);
+    // Both are taken, and overflow is reported.
+    assert_eq!(diverged, ["S31", "S33"]);
 }

@@ -10,10 +10,7 @@
 //! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
 //! | [`budget`] | truncation, rounding and control hold, apart |
 //! | [`step_scene`] | the arm whose steps are timed and counted |
-//! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
-//! | [`rounding`] | energy over very many steps, with the rounding of sums carried and without |
-//! | [`forcing`] | orders under forces that are hard on a method |
-//! | [`moving`] | what it costs to hold a moving setpoint between two control steps |
+//! | [`chaos`] | separation from the reference, and what becomes of the energy |
 //! | [`stiff`] | the cost of an error by stiffness, beside implicit baselines |
 //! | [`nonlinear`] | which moves and swings a timestep carries, and what becomes of deviations from a periodic swing |
 //!
@@ -26,13 +23,10 @@ pub mod budget;
 pub mod chaos;
 pub mod conditioning;
 pub mod error;
-pub mod forcing;
 pub mod growth;
 pub mod measure;
-pub mod moving;
 pub mod nonlinear;
 pub mod reference;
-pub mod rounding;
 mod sampled;
 pub mod scenarios;
 pub mod step_scene;

@@ -8,11 +8,7 @@ mod conditioning;
 mod drift;
 mod error;
 mod floquet;
-mod forcing;
-mod horizon;
-mod moving;
 mod nonlinear;
-mod rounding;
 mod scenarios;
 mod slope;
 mod stability;
@@ -72,13 +68,6 @@ pub(crate) const SECTIONS: &[Maker] = &[
         make: scenarios::make,
     },
     Maker {
-        name: "forcing",
-        title: "Forces and setpoints that cost an order",
-        weight: 4.0,
-        timed: false,
-        make: forcing::make,
-    },
-    Maker {
         name: "budget",
         title: "Where an error comes from",
         weight: 22.0,
@@ -91,20 +80,6 @@ pub(crate) const SECTIONS: &[Maker] = &[
         weight: 4.0,
         timed: false,
         make: drift::make,
-    },
-    Maker {
-        name: "rounding",
-        title: "What rounding adds up to",
-        weight: 24.0,
-        timed: false,
-        make: rounding::make,
-    },
-    Maker {
-        name: "horizon",
-        title: "How far a chaotic swing can be followed",
-        weight: 14.0,
-        timed: false,
-        make: horizon::make,
     },
     Maker {
         name: "conditioning",

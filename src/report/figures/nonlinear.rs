@@ -70,7 +70,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     making.keep("nonlinear-map", csv);
     let floquet = Floquet::of_swings();
     making.at(9, 9);
-    making.keep("floquet", floquet.csv());
     let advised = within(&moves, MOVE_STEPS, columns, 0.8);
     let carried = within(&swings, SWING_STEPS, columns, 0.8);
     Section {
@@ -83,11 +82,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             ),
             floquet.verdict(),
         ],
-        blocks: vec![
-            Block::Figure(map_figure(&moves, &swings, columns)),
-            Block::Figure(floquet.figure()),
-            Block::Table(floquet.table()),
-        ],
+        blocks: vec![Block::Figure(map_figure(&moves, &swings, columns))],
         ..Section::default()
     }
 }

@@ -28,6 +28,9 @@ pub(crate) const STYLE: &str = include_str!("style.css");
 pub(crate) const WIDTH: f64 = 420.0;
 pub(crate) const HEIGHT: f64 = 336.0;
 
+/// From so many panels on each is half as wide and half as high.
+pub(crate) const SMALL: usize = 24;
+
 /// Shapes, so that colour is never alone in telling methods apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Marker {
@@ -215,11 +218,14 @@ const LETTER: f64 = 10.4;
 pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
     let columns = match panels.len() {
         few @ 0..=2 => few.max(1),
+        SMALL.. => 6,
         many if many % 4 == 0 => 4,
         _ => 3,
     };
+    let scale = if panels.len() < SMALL { 1.0 } else { 0.5 };
+    let (panel_width, panel_height) = (scale * WIDTH, scale * HEIGHT);
     let rows = panels.len().div_ceil(columns);
-    let width = WIDTH * length_in_f64(columns);
+    let width = panel_width * length_in_f64(columns);
     let mut head = String::new();
     let mut bottom = 4.0;
     for line in lines(title, width - 2.0 * MARGIN) {
@@ -245,19 +251,19 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
         x += entry;
     }
     let header = y + 22.0;
-    let height = HEIGHT * length_in_f64(rows) + header;
+    let height = panel_height * length_in_f64(rows) + header;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
          height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>{head}"
     );
     for (index, panel) in panels.iter().enumerate() {
         let (x, y) = (
-            WIDTH * length_in_f64(index % columns),
-            header + HEIGHT * length_in_f64(index / columns),
+            panel_width * length_in_f64(index % columns),
+            header + panel_height * length_in_f64(index / columns),
         );
         let placed = panel.replacen(
             "<svg ",
-            &format!("<svg x=\"{x}\" y=\"{y}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" "),
+            &format!("<svg x=\"{x}\" y=\"{y}\" width=\"{panel_width}\" height=\"{panel_height}\" "),
             1,
         );
         out.push_str(&placed);

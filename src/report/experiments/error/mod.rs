@@ -13,7 +13,6 @@ mod scene;
 
 pub use arm_scene::{ArmScene, Drive, energy_scale};
 pub use particle_scene::ParticleScene;
-pub(super) use scene::SAMPLES;
 pub use scene::{LOST, MOST_LOOKS, OUTPUTS, RunOutcome, Scene};
 
 use crate::math::arm::{Arm, State};

@@ -7,9 +7,6 @@ use crate::math::integrator::Method;
 /// Steps of the coarsest run of a row: a power of two, so that the timesteps of a duration that is one too are exact.
 pub const OUTPUTS: u64 = 64;
 
-/// [`OUTPUTS`] as a length.
-pub(in crate::report::experiments) const SAMPLES: usize = 64;
-
 /// Steps after which a run is compared, at most twice as many: a millisecond apart in two seconds, where no peak of an
 /// error hides in between.
 pub const MOST_LOOKS: u64 = 2048;

@@ -10,20 +10,17 @@
 
 mod double_double;
 mod lagrangian;
-mod moving;
 mod path;
 mod steps;
 mod taylor;
 
 pub use double_double::DoubleDouble;
-pub use moving::MovingSetpoint;
 pub use path::ReferencePath;
 pub use steps::exact_steps;
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use lagrangian::Lagrangian;
-use moving::{Polynomial, constant};
 use taylor::{Exact, JointDrive, Setting, Taylor};
 
 /// The setting whose motion is kept.
@@ -83,29 +80,6 @@ impl<const N: usize> ReferenceMotion<N> {
     #[must_use]
     pub fn between(arm: &Arm<N>, start: &State<N>, law: &Law<N>, intervals: &[f64]) -> Self {
         Self::judged(|setting| motion(arm, start, law, intervals, setting))
-    }
-
-    /// The motion from `start` under the law at every instant, behind a setpoint that moves: at multiples of `spacing`
-    /// \[s\], `count` samples, the start not among them. The setpoint must not end before.
-    #[must_use]
-    pub fn behind(
-        arm: &Arm<N>,
-        start: &State<N>,
-        gains: &Gains<N>,
-        setpoint: &MovingSetpoint<N>,
-        spacing: f64,
-        count: usize,
-    ) -> Self {
-        Self::judged(|setting| {
-            let mut taylor = Taylor::new(arm, setting);
-            let mut state = exact(start);
-            let mut drive = law_drive(gains, setpoint.polynomials());
-            let samples = (0..count).map(|_| {
-                taylor.advance(&mut state, &mut drive, spacing);
-                state
-            });
-            samples.collect()
-        })
     }
 
     fn judged(motion: impl Fn(Setting) -> Vec<Exact<N>>) -> Self {
@@ -200,8 +174,8 @@ fn motion<const N: usize>(
     let mut state = exact(start);
     let mut samples = Vec::with_capacity(intervals.len());
     for &interval in intervals {
-        if let Some(mut drive) = continuous_drive(law) {
-            taylor.advance(&mut state, &mut drive, interval);
+        if let Some(drive) = continuous_drive(law) {
+            taylor.advance(&mut state, &drive, interval);
         } else if let Law::Held {
             gains,
             setpoint,
@@ -210,7 +184,7 @@ fn motion<const N: usize>(
         {
             for _ in 0..whole_periods(interval, *period) {
                 let effort = held(gains, setpoint, &mut state, *period);
-                taylor.advance(&mut state, &mut JointDrive::Constant(effort), *period);
+                taylor.advance(&mut state, &JointDrive::Constant(effort), *period);
             }
         }
         samples.push(state);
@@ -239,25 +213,14 @@ fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
 fn continuous_drive<const N: usize>(law: &Law<N>) -> Option<JointDrive<N>> {
     match law {
         Law::Constant(effort) => Some(JointDrive::Constant(effort.map(DoubleDouble::from))),
-        Law::Continuous(gains, setpoint) => {
-            let setpoint = (constant(&setpoint.position), constant(&setpoint.velocity));
-            Some(law_drive(gains, setpoint))
-        }
+        Law::Continuous(gains, setpoint) => Some(JointDrive::Law {
+            kp: gains.kp.map(DoubleDouble::from),
+            ki: gains.ki.map(DoubleDouble::from),
+            kd: gains.kd.map(DoubleDouble::from),
+            position: setpoint.position.map(DoubleDouble::from),
+            velocity: setpoint.velocity.map(DoubleDouble::from),
+        }),
         Law::Held { .. } => None,
-    }
-}
-
-/// The law at every instant, behind these positions and velocities.
-fn law_drive<const N: usize>(
-    gains: &Gains<N>,
-    (position, velocity): (Polynomial<N>, Polynomial<N>),
-) -> JointDrive<N> {
-    JointDrive::Law {
-        kp: gains.kp.map(DoubleDouble::from),
-        ki: gains.ki.map(DoubleDouble::from),
-        kd: gains.kd.map(DoubleDouble::from),
-        position,
-        velocity,
     }
 }
 

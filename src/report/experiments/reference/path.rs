@@ -25,8 +25,8 @@ impl<const N: usize> ReferencePath<N> {
     #[must_use]
     pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Option<Self> {
         let pieces = |setting| {
-            let (mut state, mut drive) = (exact(start), continuous_drive(law)?);
-            Some(Taylor::new(arm, setting).path(&mut state, &mut drive, duration))
+            let (mut state, drive) = (exact(start), continuous_drive(law)?);
+            Some(Taylor::new(arm, setting).path(&mut state, &drive, duration))
         };
         let (fine, coarse) = (pieces(FINE)?, pieces(COARSE)?);
         let spacing = duration / in_f64(COMPARED);

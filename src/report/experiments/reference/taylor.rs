@@ -17,7 +17,6 @@
 
 use super::double_double::DoubleDouble as Real;
 use super::lagrangian::{Factors, Lagrangian, differences, link_efforts, sums};
-use super::moving::{Polynomial, shift};
 use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
 
@@ -43,13 +42,13 @@ pub(super) struct Exact<const N: usize> {
 pub(super) enum JointDrive<const N: usize> {
     /// Efforts that do not change \[N m\].
     Constant([Real; N]),
-    /// `kp (q* - q) + ki ∫(q* - q) + kd (q̇* - q̇)` at every instant, setpoints in the time from now on.
+    /// `kp (q* - q) + ki ∫(q* - q) + kd (q̇* - q̇)` at every instant.
     Law {
         kp: [Real; N],
         ki: [Real; N],
         kd: [Real; N],
-        position: Polynomial<N>,
-        velocity: Polynomial<N>,
+        position: [Real; N],
+        velocity: [Real; N],
     },
 }
 
@@ -101,7 +100,7 @@ impl<const N: usize> Taylor<N> {
     }
 
     /// Moves `state` and `drive` on by `time` \[s\], in as many steps as the tolerance asks for.
-    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &mut JointDrive<N>, time: f64) {
+    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &JointDrive<N>, time: f64) {
         self.go(state, drive, time, |_, _| ());
     }
 
@@ -109,7 +108,7 @@ impl<const N: usize> Taylor<N> {
     pub(super) fn path(
         &mut self,
         state: &mut Exact<N>,
-        drive: &mut JointDrive<N>,
+        drive: &JointDrive<N>,
         time: f64,
     ) -> Vec<AngleSeries<N>> {
         let mut pieces = Vec::new();
@@ -125,7 +124,7 @@ impl<const N: usize> Taylor<N> {
     fn go(
         &mut self,
         state: &mut Exact<N>,
-        drive: &mut JointDrive<N>,
+        drive: &JointDrive<N>,
         time: f64,
         mut keep: impl FnMut(&Self, Real),
     ) {
@@ -141,13 +140,6 @@ impl<const N: usize> Taylor<N> {
                 velocity: differences(&evaluate(&self.rate, self.setting.order, step)),
                 integral: evaluate(&self.integral, self.setting.order, step),
             };
-            if let JointDrive::Law {
-                position, velocity, ..
-            } = drive
-            {
-                shift(position, step);
-                shift(velocity, step);
-            }
             if last {
                 break;
             }
@@ -255,7 +247,7 @@ impl<const N: usize> Taylor<N> {
                 let error = self.error(drive, k);
                 let rate = differences(&self.rate[k]);
                 std::array::from_fn(|i| {
-                    let wanted = velocity.get(k).map_or(Real::ZERO, |wanted| wanted[i]);
+                    let wanted = coefficient(velocity[i], k);
                     kp[i] * error[i] + ki[i] * self.integral[k][i] + kd[i] * (wanted - rate[i])
                 })
             }
@@ -268,10 +260,7 @@ impl<const N: usize> Taylor<N> {
             return [Real::ZERO; N];
         };
         let angle = differences(&self.angle[k]);
-        std::array::from_fn(|i| {
-            let wanted = position.get(k).map_or(Real::ZERO, |wanted| wanted[i]);
-            wanted - angle[i]
-        })
+        std::array::from_fn(|i| coefficient(position[i], k) - angle[i])
     }
 
     /// The longest step whose last two terms stay below the tolerance, relative to the state where that is above 1.
@@ -295,6 +284,11 @@ impl<const N: usize> Taylor<N> {
             .min(allowed(self.setting.order - 1))
             .min(LONGEST)
     }
+}
+
+/// Coefficient `k` of a series that stays at `value`.
+fn coefficient(value: Real, k: usize) -> Real {
+    if k == 0 { value } else { Real::ZERO }
 }
 
 pub(super) fn evaluate<const N: usize>(

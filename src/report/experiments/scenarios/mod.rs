@@ -9,12 +9,14 @@
 mod extreme;
 mod gains;
 mod inertia;
+mod live;
 mod methods;
 mod motion;
 mod sampling;
 mod scenario;
 mod support;
 
+pub use live::{LiveScene, Watched, live};
 pub use scenario::{Observation, Scenario};
 
 /// All scenes, in order.

@@ -1,4 +1,4 @@
-//! Error against evaluations, time and timestep, in every scene and for every method.
+//! Error against time and timestep, in every scene and for every method.
 //!
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost.
 
@@ -8,7 +8,7 @@ mod tables;
 mod words;
 
 use data::{Data, Run};
-use plots::{against_evaluations, against_time, against_timestep};
+use plots::{against_time, against_timestep};
 use tables::{cheapest, orders, real_time, scene_list, table_of_runs};
 use words::{findings, verdicts};
 
@@ -20,24 +20,21 @@ use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let data = compute(making);
-    making.keep("work-precision", table_of_runs(&data));
     making.keep("work-precision-time", table_of_runs(&data));
     making.keep("convergence", table_of_runs(&data));
-    let mut section = Section {
+    Section {
         findings: findings(&data),
         verdicts: verdicts(&data),
-        glance: vec![Block::Table(cheapest(&data))],
+        blocks: vec![
+            Block::Table(cheapest(&data)),
+            Block::Figure(against_time(&data)),
+            Block::Figure(against_timestep(&data)),
+            Block::Table(orders(&data)),
+            Block::Table(real_time(&data)),
+            Block::Table(scene_list(&data)),
+        ],
         ..Section::default()
-    };
-    section
-        .blocks
-        .push(Block::Figure(against_evaluations(&data)));
-    section.blocks.push(Block::Figure(against_time(&data)));
-    section.blocks.push(Block::Figure(against_timestep(&data)));
-    section.blocks.push(Block::Table(orders(&data)));
-    section.blocks.push(Block::Table(real_time(&data)));
-    section.blocks.push(Block::Table(scene_list(&data)));
-    section
+    }
 }
 
 fn compute(making: &mut Making<'_>) -> Vec<Data> {

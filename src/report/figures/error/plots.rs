@@ -1,10 +1,9 @@
-//! The three figures: error against evaluations, time and timestep.
+//! The two figures: error against time and against timestep.
 //!
 //! **Invariant:** the same error axis in every panel.
 
 use super::data::{Data, Run};
-use super::words::{headline_evaluations, headline_time, headline_timestep};
-use crate::math::count::in_f64;
+use super::words::{headline_time, headline_timestep};
 use crate::math::integrator::Method;
 use crate::report::experiments::error::RunOutcome;
 use crate::report::section::Figure;
@@ -55,34 +54,6 @@ fn panels(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
         .collect()
 }
 
-pub(super) fn against_evaluations(data: &[Data]) -> Figure {
-    let all = data.iter().flat_map(|data| &data.runs);
-    let x = Axis::log(
-        "evaluations of the dynamics",
-        Unit::Number,
-        all.map(|run| in_f64(run.outcome.evaluations)),
-    );
-    let mut plots = panels(data, &x, |run| in_f64(run.outcome.evaluations));
-    for plot in &mut plots {
-        plot.marks.push(Mark::Slopes {
-            x: x.min * 1.3,
-            y: 1e-10,
-            decades: 0.9,
-            orders: vec![-1.0, -2.0, -4.0],
-        });
-        plot.marks.push(floor());
-    }
-    Figure::new(
-        "work-precision",
-        headline_evaluations(data),
-        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same \
-         timesteps. Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the \
-         dotted line is one unit in the last place of 1 rad.",
-        &Key::methods(),
-        &plots,
-    )
-}
-
 fn floor() -> Mark {
     Mark::Horizontal {
         y: f64::EPSILON,
@@ -112,8 +83,10 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision-time",
         headline_time(data),
-        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. \
-         The scale at the top is the real-time factor, simulated time over computing time.",
+        "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is the \
+         minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: real-time factor. A \
+         cross at the top edge is a run that diverged. Dotted line: one unit in the last place of 1 rad. The error of \
+         a reach is the distance from a law that acts at every instant. Each mark's tooltip has the evaluations.",
         &Key::methods(),
         &plots,
     )
@@ -148,8 +121,8 @@ pub(super) fn against_timestep(data: &[Data]) -> Figure {
     Figure::new(
         "convergence",
         headline_timestep(data),
-        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep \
-         at the setpoint, one per method.",
+        "The runs of the figure before, by timestep: the slope is the order of the method. Dotted upright lines: the \
+         predicted largest stable timestep at the setpoint, one per method. The three strokes show orders 1, 2 and 4.",
         &Key::methods(),
         &plots,
     )

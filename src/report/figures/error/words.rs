@@ -2,34 +2,19 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
-use super::data::{Data, Run, best};
+use super::data::{Data, Run};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::REACH;
 use crate::report::section::Verdict;
 use crate::report::svg::{number, scientific, seconds};
 
-pub(super) fn headline_evaluations(data: &[Data]) -> String {
-    let (mut won, mut asked) = (0, 0);
-    for data in data.iter().filter(|data| data.scene.control() != "held") {
-        for target in [1e-4, 1e-6] {
-            if let Some((run, _)) = best(data, target) {
-                asked += 1;
-                won += usize::from(run.method == Method::Rk4);
-            }
-        }
-    }
-    format!(
-        "RK4 needs the fewest evaluations for 10⁻⁴ and 10⁻⁶ in {won} of {asked} cases where the effort is not held"
-    )
-}
-
 pub(super) fn headline_time(data: &[Data]) -> String {
     let swing = data.iter().find(|data| data.scene.name() == "swing-2");
     let cost = |method| swing.and_then(|data| data.reaching(method, 1e-6));
     match (cost(Method::Rk4), cost(Method::Verlet), swing) {
         (Some(rk4), Some(verlet), Some(data)) => format!(
-            "In time the order is the same: 10⁻⁶ rad costs RK4 {} and Verlet {} for {} s of a free swing",
+            "An error of 10⁻⁶ rad costs RK4 {} and Verlet {} of computing time for {} s of a free swing",
             seconds(rk4.timing.minimum),
             seconds(verlet.timing.minimum),
             number(data.scene.duration())

@@ -48,14 +48,6 @@ pub(super) fn in_words(sampling: Sampling) -> &'static str {
     }
 }
 
-/// The words with a capital letter.
-pub(super) fn capital(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
-}
-
 /// The line of the 2-link arm with its default gains.
 pub(super) fn with_default_gains(
     lines: &[LimitRow],

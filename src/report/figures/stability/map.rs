@@ -1,6 +1,6 @@
 //! The map: does a nudge of the arm die out or grow, by timestep and stiffness, under the predicted line.
 //!
-//! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
+//! **Invariant:** every mark is measured, and shares nothing with the line of the prediction.
 
 use super::line::Meter;
 use crate::math::count::in_f64;
@@ -10,7 +10,7 @@ use crate::report::experiments::measure::{STEPS, growths, stiffened};
 use crate::report::figures::cells::{centres, edges};
 use crate::report::making::Making;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, seconds};
 use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
@@ -30,7 +30,8 @@ pub(super) struct Map {
     /// Edges of the cells.
     timesteps: Vec<f64>,
     factors: Vec<f64>,
-    plots: Vec<Plot>,
+    /// For each method and sampling: the predicted limit, then the measured one.
+    curves: Vec<Curve>,
 }
 
 /// Measures `columns` timesteps at three quarters as many stiffnesses, for every method and kind of control.
@@ -42,78 +43,69 @@ pub(super) fn map(making: &mut Making<'_>, meter: &mut Meter, columns: usize) ->
         undecided: 0,
         timesteps: edges(TIMESTEPS, columns),
         factors: edges(FACTORS, columns * 3 / 4),
-        plots: Vec::new(),
+        curves: Vec::new(),
     };
     for sampling in Sampling::ALL {
         for method in Method::ALL {
-            map.panel(making, meter, method, sampling);
+            map.measure(making, meter, method, sampling);
         }
     }
     map
 }
 
 impl Map {
-    fn panel(
+    fn measure(
         &mut self,
         making: &mut Making<'_>,
         meter: &mut Meter,
         method: Method,
         sampling: Sampling,
     ) {
-        let mut plot = Plot::new(
-            format!("{method}, {}", sampling.name()),
-            Axis::log_between("timestep", Unit::Seconds, TIMESTEPS.0, TIMESTEPS.1),
-            Axis::log_between(
-                "stiffness, times the default gains",
-                Unit::Number,
-                FACTORS.0,
-                FACTORS.1,
-            ),
-        );
-        let (mut rows, mut line, mut disagreeing) = (Vec::new(), Vec::new(), Vec::new());
         let (factors, timesteps) = (centres(&self.factors), centres(&self.timesteps));
         let cells = factors.iter().flat_map(|factor| {
             let control = stiffened(*factor).with_method(method);
             let timesteps = timesteps.iter();
             timesteps.map(move |h| control.with_timestep(*h))
         });
-        let measured = growths(&cells.collect::<Vec<_>>(), sampling);
-        for (factor, measured) in factors.into_iter().zip(measured.chunks(timesteps.len())) {
-            let (limit, row) = self.row(factor, method, sampling, measured, &mut disagreeing);
-            line.push((limit, factor));
-            rows.push(row);
+        let growth = growths(&cells.collect::<Vec<_>>(), sampling);
+        let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+        for (factor, growth) in factors.into_iter().zip(growth.chunks(timesteps.len())) {
+            let limit = self.row(factor, method, sampling, growth);
+            predicted.push((limit, factor));
+            measured.extend(edge(&self.timesteps, growth).map(|h| {
+                let tooltip = format!(
+                    "{method}, {}: unstable from {}, predicted {}",
+                    sampling.name(),
+                    seconds(h),
+                    seconds(limit)
+                );
+                Point::new(h, factor, tooltip)
+            }));
             meter.add(making, 1);
         }
-        self.disagreeing += disagreeing.len();
-        plot.heat = Some(Heat {
-            x: self.timesteps.clone(),
-            y: self.factors.clone(),
-            rows,
+        let line = Curve::line(method.name(), predicted);
+        self.curves.push(Curve {
+            dashed: sampling == Sampling::Continuous,
+            ..line
         });
-        plot.series.push(Curve::line("ink", line));
-        plot.series.push(Curve {
-            class: "ink",
-            marker: Marker::Circle,
+        let marks = Curve::of(method, measured);
+        self.curves.push(Curve {
             line: false,
-            dashed: false,
-            points: disagreeing,
+            ..marks
         });
-        self.plots.push(plot);
     }
 
-    /// Predicted limit and levels of one stiffness, by the growths that were measured.
+    /// Compares the growths that were measured at one stiffness with the prediction; returns the predicted limit.
     fn row(
         &mut self,
         factor: f64,
         method: Method,
         sampling: Sampling,
         measured: &[Option<f64>],
-        disagreeing: &mut Vec<Point>,
-    ) -> (f64, Vec<i8>) {
+    ) -> f64 {
         let control = stiffened(factor).with_method(method);
         let linear = Linear::at_setpoint(&control);
         let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
-        let mut row = Vec::new();
         for (h, &growth) in centres(&self.timesteps).into_iter().zip(measured) {
             self.csv.row(&[
                 sampling.name().into(),
@@ -126,20 +118,26 @@ impl Map {
             // Asked before anybody looks at whether prediction and measurement agree.
             if undecided(&step_matrix(&linear, method, sampling, h)) {
                 self.undecided += 1;
-                row.push(0);
                 continue;
             }
-            row.push(level(growth));
             self.cells += 1;
-            if growth.is_some_and(|growth| growth < 1.0) != (h < limit) {
-                let tooltip = format!("predicted limit {}", seconds(limit));
-                disagreeing.push(Point::new(h, factor, tooltip));
-            }
+            self.disagreeing += usize::from(dies_out(growth) != (h < limit));
         }
-        (limit, row)
+        limit
     }
 
     pub(super) fn figure(&self) -> Figure {
+        let mut plot = Plot::new(
+            "All methods",
+            Axis::log_between("timestep", Unit::Seconds, TIMESTEPS.0, TIMESTEPS.1),
+            Axis::log_between(
+                "stiffness, times the default gains",
+                Unit::Number,
+                FACTORS.0,
+                FACTORS.1,
+            ),
+        );
+        plot.series.clone_from(&self.curves);
         Figure::new(
             "stability-map",
             format!(
@@ -149,15 +147,26 @@ impl Map {
                 self.undecided
             ),
             "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power \
-             of 3/2: the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows \
-             (orange), the darker the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: \
-             not judged, because by the prediction the slowest mode changes its energy by less than a factor e in the \
-             4000 steps watched; that is asked of every cell alike, before looking at whether it agrees. In the lowest \
-             rows the gains are too weak to carry the arm against gravity: no timestep is stable.",
-            &[Key::line("ink", "predicted limit")],
-            &self.plots,
+             of 3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as \
+             the live arm has it. Dashed lines: with the law in every stage. Marks: the shortest timestep at which a \
+             nudge of the arm itself grew. In the lowest rows the gains are too weak to carry the arm against gravity, \
+             and no timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode \
+             changes its energy by less than a factor e in the 4000 steps watched.",
+            &Key::methods(),
+            &[plot],
         )
     }
+}
+
+/// Whether a nudge with this growth of its energy dies out.
+fn dies_out(growth: Option<f64>) -> bool {
+    growth.is_some_and(|growth| growth < 1.0)
+}
+
+/// The edge \[s\] between the last cell from which on to shorter timesteps all nudges die out, and the next one.
+fn edge(edges: &[f64], growth: &[Option<f64>]) -> Option<f64> {
+    let first = growth.iter().position(|growth| !dies_out(*growth))?;
+    edges.get(first).copied().filter(|_| first > 0)
 }
 
 /// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor
@@ -165,18 +174,4 @@ impl Map {
 fn undecided(step: &Matrix) -> bool {
     let watched = in_f64(STEPS);
     2.0 * watched * step.spectral_radius().ln().abs() < 1.0
-}
-
-/// Colour of a growth of energy over a few thousand steps.
-fn level(growth: Option<f64>) -> i8 {
-    match growth {
-        None => 4,
-        Some(growth) if growth > 1e4 => 3,
-        Some(growth) if growth > 10.0 => 2,
-        Some(growth) if growth >= 1.0 => 1,
-        Some(growth) if growth > 0.1 => -1,
-        Some(growth) if growth > 1e-4 => -2,
-        Some(growth) if growth > 0.0 => -3,
-        Some(_) => -4,
-    }
 }

@@ -5,7 +5,6 @@
 mod line;
 mod map;
 mod period;
-mod radius;
 mod regions;
 mod tables;
 mod words;
@@ -13,7 +12,6 @@ mod words;
 use line::{LimitRow, Meter};
 use map::map;
 use period::{growth, period_table, periods};
-use radius::radius_figure;
 use regions::regions_figure;
 use tables::{edges, table};
 use words::{findings, verdicts};
@@ -56,8 +54,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let map = map(making, &mut meter, cells);
     making.keep("stability-map", map.csv.clone());
     let periods = periods(making, &mut meter);
-    let (radius, csv) = radius_figure(&lines);
-    making.keep("spectral-radius", csv);
     let (regions, csv) = regions_figure(&stiffened(1.0));
     making.keep("regions", csv);
     let growth = growth(making, &mut meter);
@@ -65,11 +61,11 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     Section {
         findings: findings(&lines),
         verdicts: verdicts(&lines, &map, &periods, &growth),
-        glance: vec![Block::Table(edges(&lines)), Block::Figure(regions)],
         blocks: vec![
-            Block::Figure(radius),
-            Block::Figure(growth.figure()),
+            Block::Table(edges(&lines)),
             Block::Figure(map.figure()),
+            Block::Figure(regions),
+            Block::Figure(growth.figure()),
             Block::Table(table(&lines)),
             Block::Table(period_table(&periods)),
         ],
