@@ -294,9 +294,9 @@ export async function reset() {
   return answer;
 }
 
-/** Puts the arm into another pose [rad], at rest, running or paused. It is no setting, so there is nothing to undo. */
-export async function setPose(position) {
-  const answer = await bridge.call("/arm_sim/set_state", { position, velocity: position.map(() => 0) });
+/** Puts the arm into another pose [rad] with these rates [rad/s], running or paused. It is no setting, so there is nothing to undo. */
+export async function setPose(position, velocity = position.map(() => 0)) {
+  const answer = await bridge.call("/arm_sim/set_state", { position, velocity });
   if (answer.result) {
     touch();
     state.pushed = false; // energy is counted anew

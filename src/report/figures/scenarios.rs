@@ -107,6 +107,9 @@ const JOINTS: [(&str, &str); 3] = [("j1", "joint 1"), ("j2", "joint 2"), ("j3", 
 /// The page that a picture's name opens.
 const PAGE: &str = "http://127.0.0.1:9095/#";
 
+/// Characters of a name that fit above a picture.
+const LONGEST_NAME: usize = 20;
+
 /// Half of a panel's paper.
 const SMALL_WIDTH: f64 = 0.5 * WIDTH;
 const SMALL_HEIGHT: f64 = 0.5 * HEIGHT;
@@ -126,7 +129,18 @@ fn picture(scene: &Scenario, holds: Option<bool>) -> String {
         None => ("soft", "not run"),
     };
     let bottom = SMALL_HEIGHT - 8.0;
-    let name = format!("<text class=\"title\" x=\"{LEFT}\" y=\"17\">{title}</text>");
+    let heading: String = match scene.name.char_indices().nth(LONGEST_NAME) {
+        Some((end, _)) => format!(
+            "{} {}…",
+            scene.id,
+            scene.name.get(..end).unwrap_or_default()
+        ),
+        None => format!("{} {}", scene.id, scene.name),
+    };
+    let name = format!(
+        "<text class=\"title\" x=\"{LEFT}\" y=\"17\">{}</text>",
+        escape(&heading)
+    );
     let verdict = format!(
         "<text class=\"note {class}\" x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">{verdict}</text>",
         SMALL_WIDTH - LEFT
@@ -181,7 +195,7 @@ fn curves(watched: &Watched) -> String {
         let (x, y) = (SMALL_WIDTH - LEFT - 4.0, middle);
         let _ = write!(
             out,
-            "<path class=\"lost\" d=\"M{:.1} {:.1}l8 8m0 -8l-8 8\"/>",
+            "<g class=\"series ink\"><path class=\"lost\" d=\"M{:.1} {:.1}l8 8m0 -8l-8 8\"/></g>",
             x - 4.0,
             y - 4.0
         );

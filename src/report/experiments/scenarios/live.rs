@@ -240,9 +240,9 @@ pub fn live(id: &str) -> Result<LiveScene, &'static str> {
             seconds: 2.0,
             ..PLAIN
         },
-        "S14" => return Err("its efforts are capped, which a live arm's are not"),
-        "S34" | "S35" => return Err("refused by name: there is no such arm"),
-        "S36" => return Err("one joint: no such arm is served"),
+        "S14" => return Err("needs capped efforts"),
+        "S34" | "S35" => return Err("refused by name"),
+        "S36" => return Err("has one joint"),
         _ => return Err("not in the list"),
     })
 }

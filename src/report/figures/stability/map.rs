@@ -72,7 +72,8 @@ impl Map {
         for (factor, growth) in factors.into_iter().zip(growth.chunks(timesteps.len())) {
             let limit = self.row(factor, method, sampling, growth);
             predicted.push((limit, factor));
-            measured.extend(edge(&self.timesteps, growth).map(|h| {
+            let edge = edge(&self.timesteps, growth).filter(|_| limit > 0.0);
+            measured.extend(edge.map(|h| {
                 let tooltip = format!(
                     "{method}, {}: unstable from {}, predicted {}",
                     sampling.name(),
