@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Builds the program with and without its features and prints the README's table: size, crates, processor time of a build.
+"""Builds the program with and without its features and prints the table of docs/development.md: size, crates, processor time of a build.
 
 Each build starts from nothing in a folder that is deleted after it. `library` or `program` picks those. `--crates` leaves the builds out. `--keep` writes the table into
-README.md, between its two marks.
+that paper, between its two marks.
 """
 
 import os
@@ -15,7 +15,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CARGO = os.environ.get("CARGO", "cargo")
-README = ROOT / "README.md"
+PAPER = ROOT / "docs" / "development.md"
 MARKS = re.compile(r"(<!-- scripts/features.py -->\n).*?(<!-- end -->)", re.DOTALL)
 BUILDS = (
     ("default", None, "program"),
@@ -70,7 +70,7 @@ def main():
     text = table("--crates" not in sys.argv)
     print(text, end="")
     if "--keep" in sys.argv:
-        README.write_text(MARKS.sub(lambda marks: marks[1] + text + marks[2], README.read_text()))
+        PAPER.write_text(MARKS.sub(lambda marks: marks[1] + text + marks[2], PAPER.read_text()))
 
 
 main()

@@ -32,23 +32,32 @@ def main():
     print(f"keep-report: {KEPT.relative_to(ROOT)}")
 
 
+# Pictures that the papers show.
+PICTURES = ["work-precision-time.svg", "stability-map.svg", "scenarios.svg"]
+
+
 def keep(report):
     shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(parents=True)
-    for kind in ("html", "json", "svg", "csv"):
-        for file in report.glob(f"*.{kind}"):
-            shutil.copy(file, KEPT)
+    for name in ["report.json", *PICTURES]:
+        shutil.copy(report / name, KEPT)
     summary = json.loads((KEPT / "report.json").read_text())
     facts = dict(summary["machine"]["facts"])
     load = facts["Load when started"].split(" (")[0]
     look = " It was a quick look, coarser than the report." if summary["quick"] else ""
-    figures = "\n".join(f"- [{figure.stem}]({figure.name})" for figure in sorted(KEPT.glob("*.svg")))
-    (KEPT / "README.md").write_text(
-        "# The report that is kept\n\n"
-        f"Made by `make report KEEP=1` on: {facts['Processor']}, {facts['Cores']} cores, load {load} at the start; "
-        f"commit {summary['machine']['commit']}.{look}\n"
-        "The page is [index.html](index.html), in a browser; its numbers are the `.csv` files, its sentences and tables [report.json](report.json).\n\n"
-        f"{figures}\n")
+    lines = [
+        "# The kept report",
+        "",
+        f"Made by `make report KEEP=1` with pendularm {summary['machine']['version']} on {facts['Processor']}, {facts['Cores']} cores, "
+        f"load {load} at the start.{look}",
+        "The page, all twelve figures and their numbers as CSV are made by the same command in `report/`. Kept here: "
+        "the sentences and tables as [report.json](report.json), and three pictures: "
+        + ", ".join(f"[{name.removesuffix('.svg')}]({name})" for name in PICTURES) + ".",
+    ]
+    for section in summary["sections"]:
+        lines += ["", f"## {section['title']}", "", *(f"- {finding}" for finding in section["findings"])]
+        lines += [line for table in section["tables"] if table["name"] == "left-out" for line in ["", *rows(table)]]
+    (KEPT / "README.md").write_text("\n".join(lines) + "\n")
 
 
 def filled(text, summary):

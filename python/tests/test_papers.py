@@ -1,4 +1,4 @@
-"""The lines of Python in the papers run as they stand there; only a long search is cut short."""
+"""The lines of Python in the papers run as they are printed there."""
 
 import os
 import subprocess
@@ -26,20 +26,9 @@ def run(code, folder):
 
 
 def test_the_readmes_plot_is_drawn(tmp_path):
-    plot, _ = blocks(README)
+    (plot,) = blocks(README)
     run(plot.replace("plt.show()", "plt.savefig('plot.png')"), tmp_path)
     assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_readmes_policy_learns(tmp_path):
-    _, policy = blocks(README)
-    bound = float(policy.split("# more than ")[-1])
-    # The same at each run on one processor, since it has a seed. So long a search is for those who wait for it.
-    short = policy.replace("14_000", "4_000, 'verbose': -9")
-    assert short != policy
-    said = run(short, tmp_path)
-    # An arm that hangs has 0, and a network drawn at random some 0.2. A long search has more than the bound.
-    assert float(said) > bound / 2
 
 
 def test_each_part_of_the_manual_runs_by_itself(tmp_path):
