@@ -31,6 +31,7 @@ mod planner;
 mod poses;
 mod properties;
 mod recomputed;
+mod readme;
 mod reference;
 mod report;
 mod review;
