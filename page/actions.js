@@ -48,7 +48,7 @@ export async function takeBack() {
 }
 
 /** Applies what is given, and gives the refusals. The servo comes last, so that it never acts on half of the settings. */
-export async function apply({ integrator, params, gains, period, servo, setpoint, start }) {
+export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, servo, setpoint, start }) {
   applying = true;
   const answers = [];
   if (servo === false) answers.push(await enable(false));

@@ -7,7 +7,10 @@ import { METHODS, significant } from "./format.js";
 /** Timesteps, from long to short, each half of the one before [s]. */
 export const TIMESTEPS = Array.from({ length: 8 }, (_, k) => 0.032 / 2 ** k);
 
-/** @typedef {{method: string, timestep: number, error: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */
+/**
+ * @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung
+ * `error` is the cost of the method, `sampling` that of a control law that runs once a step [rad]
+ */
 
 /** All runs, the cheapest first, so that the picture grows evenly. @returns {{method: string, timestep: number}[]} */
 export function rungs() {
@@ -16,19 +19,22 @@ export function rungs() {
 
 /**
  * @param {{method: string, timestep: number}} rung
- * @param {{times: number[], error: number | null, error_uncertainty?: number | null, wall_time: number, evaluations: number}} values
+ * @param {{times: number[], error: number | null, error_uncertainty?: number | null, sampling_error?: number | null, wall_time: number, evaluations: number}} values
  * @param {number} duration that was asked for [s]
  * @returns {Rung}
  */
 export function read({ method, timestep }, values, duration) {
+  const divergedAt = endOf(values.times, duration, timestep);
+  const finite = (/** @type {number | null | undefined} */ value) => (divergedAt === null && Number.isFinite(value) ? /** @type {number} */ (value) : null);
   return {
     method,
     timestep,
-    error: Number.isFinite(values.error) ? values.error : null,
+    error: finite(values.error),
+    sampling: finite(values.sampling_error),
     uncertainty: Number.isFinite(values.error_uncertainty) ? /** @type {number} */ (values.error_uncertainty) : null,
     wall: values.wall_time,
     evaluations: values.evaluations,
-    divergedAt: endOf(values.times, duration, timestep),
+    divergedAt,
   };
 }
 

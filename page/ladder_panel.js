@@ -1,6 +1,6 @@
 // @ts-check
-// Error against run time, live: all methods over a ladder of timesteps, from the present state of this arm.
-// Invariant: every point is a run of the runtime's own; what diverged or can't be judged is said, not drawn.
+// Error against run time, live: all methods over a ladder of timesteps, on a fixed move of this arm.
+// Invariant: every point is a run of the runtime's own, with the settings that are named beside it; a diverged run is a cross.
 
 import { announce } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
@@ -20,7 +20,9 @@ const TOP = 8;
 const BOTTOM = 32;
 const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
-const INVITATION = "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?";
+const INVITATION = "Runs one move of this arm with every method at eight timesteps, and compares each with the true motion: what does accuracy cost?";
+/** The move with the controller on, from rest at zero [rad]. */
+const REACH = [0.9, -1.3, 0.8];
 
 let surface;
 let said;
@@ -28,6 +30,7 @@ let go;
 let seconds;
 let servo;
 let found = [];
+let measured = ""; // the settings that the runs have
 let running = 0; // counts the measurements that were begun; only the newest goes on
 
 export function startLadder() {
@@ -40,17 +43,32 @@ export function startLadder() {
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, el("label", { class: "option" }, el("span", {}, "servo"), servo), go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
   setText(byId("ladder-text"), INVITATION);
-  watch("links", () => forget(INVITATION)); // what was measured is of another arm
+  for (const cause of ["links", "params", "gains"]) { // what was measured is of another arm
+    watch(cause, () => { if (cause === "links" || measured !== "" && measured !== settings()) forget(INVITATION); });
+  }
 }
 
 /** No figure is shown, and none that is on its way will be. @param {string} text what stands there instead */
 function forget(text) {
   running += 1;
   found = [];
+  measured = "";
   setText(go, "Measure");
   setText(byId("ladder-text"), text);
   byId("ladder-table").replaceChildren();
   draw();
+}
+
+/** The settings that a run depends on, as a text. */
+function settings() {
+  return JSON.stringify([state.links, state.params, servo.value === "on" ? state.gains : null]);
+}
+
+/** The move in words. */
+function moveText() {
+  const zero = `(${new Array(state.links).fill(0).join(", ")})`;
+  return servo.value === "on" ? `From rest at ${zero} to (${REACH.slice(0, state.links).join(", ")}) rad with the present gains, the law once a step`
+    : `A free swing from rest at ${zero}`;
 }
 
 async function measure() {
@@ -61,12 +79,13 @@ async function measure() {
   said.show("");
   forget("");
   const mine = running;
+  measured = settings();
   setText(go, "Measuring…");
   const n = state.links;
   const common = {
-    q0: Array.from(state.position.subarray(0, n)), qdot0: Array.from(state.velocity.subarray(0, n)),
+    q0: new Array(n).fill(0), qdot0: new Array(n).fill(0),
     duration: seconds.number() ?? 2, params: state.params, samples: SAMPLES, reference: true,
-    ...(servo.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
+    ...(servo.value === "on" ? { gains: state.gains, setpoint: REACH.slice(0, n), control_period: 0 } : {}),
   };
   for (const rung of rungs()) {
     const args = { ...common, integrator: rung.method, timestep: rung.timestep };
@@ -87,7 +106,7 @@ async function measure() {
 }
 
 function describe() {
-  const text = found.length > 0 ? inWords(cheapest(found, WANTED)) : INVITATION;
+  const text = found.length > 0 ? `${inWords(cheapest(found, WANTED))}${samplingText()} ${moveText()}.` : INVITATION;
   setText(byId("ladder-text"), text);
   if (found.length === 0) return;
   announce(text);
@@ -108,6 +127,13 @@ function inWords(best) {
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 
+/** What holding the effort costs, at the shortest timestep that was run; empty for a free arm. */
+function samplingText() {
+  const known = found.filter(({ sampling }) => sampling > 0);
+  const last = known.at(-1);
+  return last ? ` No method helps against the other error (dashed): a law that runs every ${duration(last.timestep)} moves the arm ${significant(last.sampling, 2)} rad from one that acts at every instant.` : "";
+}
+
 function cellOf(method, timestep) {
   const one = found.find((rung) => rung.method === method && rung.timestep === timestep);
   return one ? errorText(one) : "–";
@@ -122,7 +148,8 @@ function draw() {
   if (points.length === 0) return;
   const bounds = (values) => new LogScale(10 ** Math.floor(Math.log10(Math.min(...values))), 10 ** Math.ceil(Math.log10(Math.max(...values) * 1.01)));
   const across = bounds(points.map(({ wall }) => wall));
-  const up = bounds(points.map(({ error }) => error));
+  const sampled = found.filter(({ sampling, wall }) => sampling > 0 && wall > 0);
+  const up = bounds([...points.map(({ error }) => error), ...sampled.map(({ sampling }) => sampling)]);
   const x = (wall) => LEFT + across.place(wall) * (width - LEFT - RIGHT);
   const y = (error) => height - BOTTOM - up.place(error) * (height - TOP - BOTTOM);
   drawFrame(context, width, height, across, up, x, y);
@@ -138,6 +165,21 @@ function draw() {
       context.beginPath();
       context.arc(x(wall), y(error), 3.5, 0, 2 * Math.PI);
       context.fill();
+    }
+    context.setLineDash([4, 4]);
+    context.beginPath();
+    for (const { wall, sampling } of sampled.filter((one) => one.method === method)) context.lineTo(x(wall), y(sampling));
+    context.stroke();
+    context.setLineDash([]);
+    // A diverged run has no error: a cross at the upper edge.
+    for (const { wall } of found.filter((one) => one.method === method && one.divergedAt !== null && one.wall > 0)) {
+      const at = Math.min(Math.max(x(wall), LEFT), width - RIGHT);
+      context.beginPath();
+      context.moveTo(at - 4, TOP);
+      context.lineTo(at + 4, TOP + 8);
+      context.moveTo(at + 4, TOP);
+      context.lineTo(at - 4, TOP + 8);
+      context.stroke();
     }
     const last = own.at(-1);
     if (!last) return;
@@ -160,7 +202,7 @@ function drawFrame(context, width, height, across, up, x, y) {
     context.stroke();
     context.fillText(duration(tick), Math.min(x(tick), width - 22), height - 18);
   }
-  context.fillText("run time; error [rad] upwards", LEFT + (width - LEFT - RIGHT) / 2, height - 4);
+  context.fillText("run time of the computation (upwards: error [rad])", LEFT + (width - LEFT - RIGHT) / 2, height - 4);
   context.textAlign = "right";
   context.textBaseline = "middle";
   for (const tick of up.ticks(8)) {

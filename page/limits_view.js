@@ -1,35 +1,33 @@
 // @ts-check
 // The largest stable timestep of each method on its button, and in the Stability panel why it is that.
-// Invariant: nothing stale is shown: while limits are computed, one in each frame, there is none.
+// Invariant: a button has the limit that the verdict would have with its method; while an answer is on its way there is none.
 
 import { byId, el, setText } from "./dom.js";
 import { METHODS } from "./format.js";
-import { onFrame, wake } from "./frames.js";
 import { loopInForce } from "./growth.js";
-import { limitOf } from "./loop.js";
-import { limitText } from "./policy.js";
+import { limitText, question, smallest } from "./policy.js";
+import { stabilityOf } from "./runtime.js";
 import { state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
-import { limitsKey, whyText } from "./why.js";
+import { whyText } from "./why.js";
 
-/** A setpoint that is dragged changes many times a second; limits are computed once it rests [ms]. */
+/** A setpoint that is dragged changes many times a second; limits are asked for once it rests [ms]. */
 const REST_MS = 200;
 
 /** @type {Map<string, HTMLElement>} */
 const labels = new Map();
-/** @type {Record<string, number>} */
-let limits = {};
+/** The study's answer for each method. @type {Record<string, any>} */
+let answers = {};
 let key = "";
 let timer = 0;
-let computes = false;
 
 export function startLimits() {
-  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links"]) watch(cause, look);
+  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links", "period"]) watch(cause, look);
+  watch("diagnostics", show);
   byId("why").addEventListener("click", () => {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
   });
-  onFrame(compute);
 }
 
 /** Where the limit of `method` is shown. @param {string} method */
@@ -40,36 +38,41 @@ export function limitLabel(method) {
 }
 
 function look() {
-  const now = limitsKey(state);
+  // The answer for the method in force comes anew when the motion has changed: the others are asked for again then.
+  const { integrator: _, ...asked } = question(state) ?? {};
+  const now = state.stability ? JSON.stringify([asked, state.stability.timestep_limit_motion]) : "";
   if (now !== key) {
     key = now;
-    limits = {};
-    computes = false;
     clearTimeout(timer);
-    timer = setTimeout(() => { computes = true; wake(); }, REST_MS);
+    if (now === "") answers = {};
+    else timer = setTimeout(ask, REST_MS);
   }
   show();
 }
 
-/** One method in a frame: a limit takes some milliseconds. Gives whether more are to come. */
-function compute() {
-  if (!computes) return false;
-  const found = loopInForce(state);
-  const next = METHODS.find(([method]) => !(method in limits));
-  if (!found || !next) {
-    computes = false;
-    return false;
+async function ask() {
+  const mine = key;
+  /** @type {Record<string, any>} */
+  const found = {};
+  for (const [method] of METHODS) {
+    found[method] = await stabilityOf(method);
+    if (mine !== key) return;
   }
-  limits[next[0]] = limitOf(found.loop, next[0], true);
+  answers = found;
   show();
-  return true;
 }
 
 function show() {
-  for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
-  const known = METHODS.every(([method]) => method in limits);
-  const why = known ? whyText(state, limits) : "";
+  /** @param {string} method */
+  const of = (method) => (state.stability && method === state.integrator?.method ? state.stability : answers[method]);
+  for (const [method, label] of labels) {
+    const answer = of(method);
+    setText(label, limitText(answer ? smallest(state, answer).limit : NaN));
+  }
+  const known = METHODS.every(([method]) => of(method));
+  const held = Object.fromEntries(METHODS.map(([method]) => [method, known ? smallest(state, of(method)).held : NaN]));
+  const why = known ? whyText(state, held) : "";
   setText(byId("why-text"), why);
-  // It stays while limits are computed anew, so that a click on its way meets it.
+  // It stays while limits are asked for anew, so that a click on its way meets it.
   if (known || !loopInForce(state)) byId("why").hidden = why === "";
 }

@@ -54,6 +54,20 @@ function open(served) {
   return served ?? Infinity;
 }
 
+/**
+ * The smallest limit in an answer [s], and whether the motion sets it. After a divergence the motion before it counts: a diverged
+ * arm is fast because of that, and so is one that shakes beyond the limit where it rests.
+ * @param {any} answer of `/study/stability`, for the method in force or another one
+ */
+export function smallest(/** @type {any} */ state, answer) {
+  const held = open(answer.timestep_limit ?? answer.timestep_limit_held);
+  const diverged = state.diagnostics?.state === "diverged";
+  const motion = diverged ? state.motionAtStart ?? Infinity : open(answer.timestep_limit_motion);
+  const shakes = !diverged && answer === state.stability && state.integrator?.timestep > held;
+  const moving = motion < held && !shakes;
+  return { held, limit: moving ? motion : held, moving };
+}
+
 /** The limit of the loop in force [s], and what pose or speed it is about. */
 export function limitInForce(/** @type {any} */ state) {
   const answer = answerInForce(state);
@@ -64,20 +78,21 @@ export function limitInForce(/** @type {any} */ state) {
     const told = state.stabilityMissing ? state.diagnostics?.timestep_limit ?? NaN : NaN;
     return { limit: told, where: free ? "left to itself" : "at the setpoint", everyPose: NaN, advised: NaN };
   }
-  const held = open(answer.timestep_limit_held);
-  const motion = open(answer.timestep_limit_motion);
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
   const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: "hanging, small swings", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
   const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
-  // Who has diverged, or shakes beyond the limit where it rests, moves fast because of that: it is no cause.
-  const moving = motion < held && !(state.integrator?.timestep > held) && state.diagnostics?.state !== "diverged";
-  const inForce = moving ? motion : held;
+  const { held, limit: inForce, moving } = smallest(state, answer);
+  const diverged = state.diagnostics?.state === "diverged";
+  const speed = diverged ? "moving as it did before" : `moving at ${significant(answer.motion_speed ?? NaN, 3)} rad/s`;
+  const ofFree = moving ? (diverged ? SHARE * inForce : answer.advised_timestep ?? NaN) : SHARE * held;
+  const advised = free ? ofFree : Math.min(afterReset(answer), diverged && moving ? SHARE * inForce : Infinity);
   return {
     limit: inForce,
-    where: moving ? `moving at ${significant(answer.motion_speed ?? NaN, 3)} rad/s` : place,
+    where: moving ? speed : place,
     everyPose: free ? inForce : Math.min(inForce, open(answer.minimum_over_poses_held)),
-    advised: free ? (moving ? answer.advised_timestep ?? NaN : SHARE * held) : afterReset(answer),
+    // The arm has just diverged at this timestep: nothing as long is advised.
+    advised: diverged && !(advised < state.integrator?.timestep) ? NaN : advised,
   };
 }
 

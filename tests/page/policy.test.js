@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { adviceText, answerInForce, controlPeriodLimit, energyName, limitInForce, motionHasChanged, periodText, question, verdict, worstText } from "../../page/policy.js";
+import { adviceText, answerInForce, controlPeriodLimit, energyName, limitInForce, motionHasChanged, periodText, question, smallest, verdict, worstText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -66,12 +66,30 @@ test("what the gains bear is said of this pose, of every pose, and with what to 
 
 test("who shakes beyond the limit, or has diverged, is fast because of that: the pose decides", () => {
   const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
-  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { diagnostics: { state: "diverged" } }]) {
+  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { integrator: { method: "rk4", timestep: 0.02 }, diagnostics: { state: "diverged" } }]) {
     const found = limitInForce(arm({ stability: thrashing, ...changed }));
     assert.deepEqual([found.limit, found.everyPose], [VALUES.timestep_limit_held, VALUES.minimum_over_poses_held]);
     assert.match(found.where, /^at the setpoint/);
     assert.equal(found.advised, 0.8 * VALUES.minimum_over_poses_held);
   }
+});
+
+test("after a divergence the motion before it counts, and no timestep as long is advised", () => {
+  const answer = { ...VALUES, timestep_limit_held: 0.278, timestep_limit_motion: 1e-150, minimum_over_poses_held: 0.278, equilibrium: [-1.57, 0], equilibrium_kind: "hanging" };
+  const diverged = (timestep, motionAtStart) => arm({ enabled: false, stability: answer, motionAtStart, integrator: { method: "verlet", timestep }, diagnostics: { state: "diverged" } });
+  const found = limitInForce(diverged(0.1, 0.0488));
+  assert.equal(found.limit, 0.0488);
+  assert.ok(Math.abs(found.advised - 0.8 * 0.0488) < 1e-12, `${found.advised}`);
+  assert.match(verdict(diverged(0.1, 0.0488)).sentence, /^100 ms is above the limit 48\.8 ms, moving as it did before/);
+  // What was not known before advises nothing that the arm has just failed at.
+  assert.ok(Number.isNaN(limitInForce(diverged(0.1, null)).advised));
+  assert.doesNotMatch(adviceText(diverged(0.1, null)), /Advised/);
+});
+
+test("a method's button has the limit that the verdict would have with it", () => {
+  const other = { ...VALUES, timestep_limit_held: 0.393, timestep_limit_motion: 0.0762 };
+  assert.equal(smallest(arm({ enabled: false }), other).limit, 0.0762);
+  assert.equal(smallest(arm(), VALUES).limit, limitInForce(arm()).limit);
 });
 
 test("the study is asked again once the motion bears another timestep", () => {

@@ -5,14 +5,21 @@ import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { DEFAULTS } from "../../page/settings.js";
-import { limitsKey, methodLimits, whyText } from "../../page/why.js";
+import { METHODS } from "../../page/format.js";
+import { loopInForce } from "../../page/growth.js";
+import { limitOf } from "../../page/loop.js";
+import { whyText } from "../../page/why.js";
 
 function arm(changed = {}) {
   const { integrator, params, gains } = DEFAULTS[2];
   return { links: 2, enabled: true, setpoint: new Float64Array(3), setpointKnown: true, integrator, params, gains, ...changed };
 }
 
-const why = (state) => whyText(state, methodLimits(state));
+/** @param {any} state */
+function why(state) {
+  const found = loopInForce(state);
+  return whyText(state, found && Object.fromEntries(METHODS.map(([method]) => [method, limitOf(found.loop, method, true)])));
+}
 
 test("with efforts held over the step all methods bear about the same, and the reason is named", () => {
   const text = why(arm());
@@ -40,15 +47,6 @@ test("where the gains themselves are at fault no method is blamed", () => {
 
 test("nothing is said of a loop that is not known", () => {
   assert.equal(why(arm({ gains: null })), "");
-  assert.equal(limitsKey(arm({ gains: null })), "");
-});
-
-test("limits are computed anew when gains change, and not when the timestep does", () => {
-  const key = limitsKey(arm());
-  assert.equal(limitsKey(arm({ integrator: { method: "euler", timestep: 0.02 } })), key);
-  assert.notEqual(limitsKey(arm({ gains: { kp: [1, 1], ki: [0, 0], kd: [1, 1] } })), key);
-  const free = arm({ enabled: false });
-  assert.equal(limitsKey({ ...free, gains: { kp: [1, 1], ki: [0, 0], kd: [1, 1] } }), limitsKey(free));
 });
 
 test("every module of the page is checked for its types", () => {

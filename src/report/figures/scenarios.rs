@@ -65,15 +65,8 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         making.at(index + 1, all.len());
     }
     making.keep("scenarios", csv);
-    let held = run - short.len();
-    let mut finding = format!("**{held} of {run} stiff and extreme scenes do as theory says**");
-    if short.is_empty() {
-        finding.push('.');
-    } else {
-        finding.push_str(&format!("; short fall {}.", short.join(", ")));
-    }
     Section {
-        findings: vec![finding],
+        findings: vec![finding(run, &short)],
         verdicts: vec![Verdict {
             claim: format!("All {} named scenes do as expected", all.len()),
             seen: match (short.is_empty(), all.len() - run) {
@@ -85,6 +78,17 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         }],
         blocks: vec![Block::Figure(pictures(panels)), Block::Table(table)],
         ..Section::default()
+    }
+}
+
+/// What was seen of the scenes that were run; `short` names those that fall short.
+fn finding(run: usize, short: &[String]) -> String {
+    let held = run - short.len();
+    let finding = format!("**{held} of {run} stiff and extreme scenes do as theory says**");
+    if short.is_empty() {
+        finding + "."
+    } else {
+        finding + "; these fall short: " + &short.join(", ") + "."
     }
 }
 

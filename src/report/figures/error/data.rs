@@ -34,6 +34,9 @@ const FITTED: usize = 4;
 /// The fewest steps for an error are found to this part of them.
 const RESOLUTION: u64 = 256;
 
+/// No search tries more steps than this: a method that needs more is far from the cheapest.
+pub(super) const MOST_SEARCHED: u64 = 1 << 17;
+
 pub(super) const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
 impl Data {
@@ -46,7 +49,7 @@ impl Data {
             for target in TARGETS {
                 let enough = runs.iter().find(|run| {
                     let RunOutcome { error, .. } = run.outcome;
-                    run.method == method && error <= target
+                    run.method == method && error <= target && run.outcome.steps <= MOST_SEARCHED
                 });
                 let fewest = enough
                     .and_then(|run| fewest(&*scene, method, target, (least, run.outcome.steps)));
