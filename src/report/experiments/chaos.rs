@@ -134,10 +134,8 @@ impl<'a, const N: usize> Hamiltonian<'a, N> {
             let momentum = ahead(&self.momentum, &self.slope.1, 0.5 * h);
             let next = slope(self.arm, &angle, &momentum);
             let same = |one: &[f64; N], other: &[f64; N]| {
-                let both = one.iter().zip(other);
-                both.fold(true, |same, (one, other)| {
-                    same && (one - other).abs() <= 1e-13 * (1.0 + one.abs())
-                })
+                let mut both = one.iter().zip(other);
+                both.all(|(one, other)| (one - other).abs() <= 1e-13 * (1.0 + one.abs()))
             };
             let done = same(&next.0, &self.slope.0) && same(&next.1, &self.slope.1);
             self.slope = next;

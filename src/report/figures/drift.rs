@@ -193,7 +193,7 @@ fn verdicts(panels: &[DriftPanel]) -> Vec<Verdict> {
         let euler = end(Method::Euler);
         holds &= end(Method::Rk4) < order_two && (order_two < euler || !euler.is_finite());
     }
-    // After a tenth of the time the baseline has seen what it will see; the others go on.
+    // The error of a symplectic method is bounded. A tenth of the time is enough to reach the bound.
     let growth = |title| {
         let points = &of(panels, title, None)?.points;
         let end = points.last()?;
