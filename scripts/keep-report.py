@@ -21,6 +21,9 @@ PLACE = re.compile(r"(<!-- report: ([^>]*) -->\n)(.*?)(<!-- end -->)", re.DOTALL
 def main():
     if sys.argv[1] == "--check":
         summary = json.loads((KEPT / "report.json").read_text())
+        kept = {file.name for file in KEPT.iterdir()}
+        if kept != {"README.md", "report.json", *PICTURES}:
+            sys.exit(f"keep-report: {KEPT.relative_to(ROOT)} holds {sorted(kept)}")
         stale = [paper for paper in PAPERS if paper.read_text() != filled(paper.read_text(), summary)]
         for paper in stale:
             print(f"keep-report: {paper.relative_to(ROOT)} is not of the report that is kept: make report KEEP=1", file=sys.stderr)
@@ -34,9 +37,14 @@ def main():
 
 # Pictures that the papers show.
 PICTURES = ["work-precision-time.svg", "stability-map.svg", "scenarios.svg"]
+# Git keeps no more than this [bytes].
+MOST = 1_000_000
 
 
 def keep(report):
+    size = sum((report / name).stat().st_size for name in ["report.json", *PICTURES])
+    if size > MOST:
+        sys.exit(f"keep-report: {size} bytes, and docs/report/ has room for {MOST}")
     shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(parents=True)
     for name in ["report.json", *PICTURES]:

@@ -13,15 +13,15 @@ mod figures;
 mod html;
 mod machine;
 mod making;
-mod progress;
 mod section;
 mod svg;
 mod timing;
 
 use std::fs;
-use std::io;
+use std::io::{self, Write};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -29,7 +29,6 @@ use clap::builder::PossibleValuesParser;
 use figures::{Maker, SECTIONS};
 use machine::Machine;
 use making::Making;
-use progress::ProgressBar;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
@@ -108,15 +107,14 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     for maker in SECTIONS.iter().filter(|maker| !wanted(maker.name)) {
         others.extend(read(&kept.join(format!("{}.json", maker.name)))?);
     }
-    let weight = |maker: &Maker| if options.quick { 1.0 } else { maker.weight };
-    let makers = || SECTIONS.iter().filter(|maker| wanted(maker.name));
-    let progress = Mutex::new(ProgressBar::new(makers().map(weight).sum()));
-    let made = side_by_side(makers().collect(), |maker| {
-        lock(&progress).begin(maker.name, weight(maker));
-        let section = make(maker, options, &machine, &progress)?;
+    let makers: Vec<_> = SECTIONS.iter().filter(|maker| wanted(maker.name)).collect();
+    let (of, done) = (makers.len(), AtomicUsize::new(0));
+    let made = side_by_side(makers, |maker| {
+        let section = make(maker, options, &machine)?;
         let file = kept.join(format!("{}.json", maker.name));
         write(&file, &serde_json::to_string(&section).unwrap_or_default())?;
-        lock(&progress).end(maker.name);
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        say(&format!("report: {} ({done} of {of} sections)", maker.name));
         Ok(section)
     })?;
     let mut sections = Vec::new();
@@ -136,7 +134,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         .flat_map(|section| &section.verdicts)
         .filter(|verdict| !verdict.holds)
         .count();
-    lock(&progress).finish(&format!(
+    say(&format!(
         "report: {} ({short} verdicts fall short)",
         page.display()
     ));
@@ -180,18 +178,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn make(
-    maker: &Maker,
-    options: &ReportOptions,
-    machine: &Machine,
-    progress: &Mutex<ProgressBar>,
-) -> Result<Section, ReportError> {
+/// A line on standard error. One that is closed or full hinders nothing.
+fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+fn make(maker: &Maker, options: &ReportOptions, machine: &Machine) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut making = Making {
         quick: options.quick,
         out: &options.out,
-        section: maker.name,
-        progress,
         tables: Vec::new(),
     };
     let mut section = (maker.make)(&mut making);

@@ -243,7 +243,7 @@ impl<const N: usize> LimitSearch<N> {
         linear
     }
 
-    /// Compares the proven limit with that in the worst pose of the proof. If they agree there is nothing to search.
+    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree there is nothing to search.
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
         let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
@@ -331,7 +331,7 @@ impl<const N: usize> LimitSearch<N> {
     }
 }
 
-/// Whether a proven bound and the smallest limit found agree. The limit may fall short of the bound a little, since
+/// Whether a bound and the smallest limit found agree. The limit may fall short of the bound a little, since
 /// growth counts only from some size on.
 fn agree(bound: f64, least: f64) -> bool {
     (least / bound - 1.0).abs() <= AGREEMENT

@@ -1,4 +1,4 @@
-//! A timestep up to which a loop is proven to be stable in every pose.
+//! A bound: a timestep up to which a loop is stable in every pose. With Euler, and without gravity, it is proven.
 //!
 //! For a step with held effort, `z x = …` for an eigenvector x with eigenvalue z, put `z = (1 + w h/2) / (1 - w h/2)`:
 //! the unit circle becomes the left half plane of `w`. The arm under a constant effort moves on a parabola, which every
@@ -22,8 +22,8 @@
 //!
 //! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no
 //! longer symmetric. Where `P₃, P₂ > 0` that is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`; every coefficient
-//! must be good by twice that, and `ε` at most 0.01, or nothing is proven. (For these methods under gravity the bound
-//! so rests on an estimate of what is not symmetric; without gravity, and for Euler, it is exact.)
+//! must be good by twice that, and `ε` at most 0.01, or there is no bound. For these methods under gravity the bound so
+//! rests on an estimate of the part that is not symmetric. Without gravity, and for Euler, no estimate is inside.
 //!
 //! The bound is sharp where an arm is limited by its damping, as stiff controllers are. Where damping is weak the
 //! matrices mix (`P₂` loses its sign for one joint before the loop is unstable), and it is only safe.
@@ -31,7 +31,8 @@
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 7, on quadratic forms of a pencil; Lawler and
 //! Wood, *Branch-and-bound methods* (1966), on the search. Their combination is our own.
 //!
-//! **Invariant:** whenever the search ends, its bound holds; boxes are bounded.
+//! **Invariant:** whenever the search ends, its bound holds, under gravity as far as the estimate does; the number of
+//! boxes is bounded.
 
 #![allow(
     clippy::indexing_slicing,
@@ -58,13 +59,13 @@ const MAX_BOXES: u32 = 20_000;
 /// Halvings of an interval of timesteps.
 const HALVINGS: u32 = 60;
 
-/// Nothing is proven if gravity's part in a stage is larger than this.
+/// There is no bound if gravity's part in a stage is larger than this.
 const LARGEST_STAGE: f64 = 0.01;
 
 /// Parts of the timesteps in which two factors that both fall are bounded apart.
 const PARTS: u32 = 64;
 
-/// A timestep that is proven, and the pose in which it comes nearest to fail.
+/// A bound, and the pose in which it comes nearest to fail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Proven<const N: usize> {
     /// Held control is stable in every pose up to this timestep \[s\]; infinite where nothing limits.
@@ -92,7 +93,7 @@ pub(super) struct Proof<const N: usize> {
 /// A box of joint angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Angles<const N: usize> {
-    /// The timestep that is proven for every pose in it \[s\].
+    /// The bound for every pose in it \[s\].
     bound: f64,
     middle: [f64; N],
     half: [f64; N],
@@ -148,7 +149,7 @@ impl<const N: usize> Proof<N> {
         Some(proof)
     }
 
-    /// Cuts up to `boxes` boxes. Returns the proven timestep once it is as sharp as it can be.
+    /// Cuts up to `boxes` boxes. Returns the bound once it is as sharp as it can be.
     pub(super) fn advance(&mut self, boxes: u32) -> Option<Proven<N>> {
         for _ in 0..boxes {
             let Some(first) = self.boxes.peek().copied() else {

@@ -2,7 +2,7 @@
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{
-    coriolis, energy, forward_dynamics, gravity_load, inverse_dynamics, mass_matrix,
+    coriolis, energy, forward_dynamics, gravity_load, inverse_dynamics, mass_matrix, textbook,
     weightless_dynamics,
 };
 use proptest::array::uniform;
@@ -192,6 +192,28 @@ fn inverse_dynamics_give_back_the_effort_of_forward_dynamics() {
             // Two and a half digits of `qdd` may be gone (see above), which the largest inertia brings into the effort.
             let scale = largest(mass_matrix(&arm, &q).as_flattened()) * largest(&qdd) * N as f64;
             close(&back, &tau, scale + largest(&tau), 316.0 * ROUND_OFF)
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+/// Both ways to the accelerations belong to the same effort; apart they may be by what an ill-conditioned M hides.
+#[test]
+fn the_line_of_the_book_and_the_recursion_agree() {
+    fn check<const N: usize>() {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
+            let (m, book) = (mass_matrix(&arm, &q), textbook(&arm, &q, &qd, &tau));
+            let recursion = forward_dynamics(&arm, &q, &qd, &tau);
+            let effort =
+                |qdd: &[f64; N]| m.map(|row| row.iter().zip(qdd).map(|(m, a)| m * a).sum());
+            let (one, other): ([f64; N], [f64; N]) = (effort(&book), effort(&recursion));
+            let scale = largest(m.as_flattened()) * largest(&recursion).max(largest(&book));
+            close(
+                &one,
+                &other,
+                N as f64 * scale + largest(&tau),
+                316.0 * ROUND_OFF,
+            )
         });
     }
     for_one_to_six_links!(check);

@@ -3,7 +3,7 @@
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::report::experiments::budget::Budget;
-use pendularm::report::experiments::chaos::energy_drift;
+use pendularm::report::experiments::chaos::{energy_drift, symplectic_drift};
 use pendularm::report::experiments::error::{OUTPUTS, scenes};
 
 /// Halving the timestep divides the error by 2^p where truncation is all there is.
@@ -112,4 +112,29 @@ fn euler_gains_energy_a_thousand_times_faster_than_runge_kutta() {
             .1
     };
     assert!(end(Method::Euler) > 1e3 * end(Method::Rk4));
+}
+
+/// Halving the timestep of a method of order 2 divides its energy error by four, and a symplectic one's does not grow.
+#[test]
+fn the_symplectic_baseline_is_of_order_two_and_its_energy_error_does_not_grow() {
+    let arm = Arm::<2>::default();
+    let regular = State::at_rest([0.3 - std::f64::consts::FRAC_PI_2, 0.0]);
+    let end = |h, duration| {
+        symplectic_drift(&arm, &regular, h, duration)
+            .last()
+            .unwrap()
+            .1
+    };
+    let ratio = end(2e-3, 20.0) / end(1e-3, 20.0);
+    assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
+    let growth = end(1e-3, 100.0) / end(1e-3, 10.0);
+    assert!(growth < 1.2, "{growth}");
+    // Midpoint with the same order is not symplectic: its error goes on growing.
+    let midpoint = |duration| {
+        energy_drift(&arm, &regular, Method::Midpoint, 1e-3, duration)
+            .last()
+            .unwrap()
+            .1
+    };
+    assert!(midpoint(100.0) / midpoint(10.0) > 3.0);
 }

@@ -30,6 +30,7 @@ mod motion;
 mod planner;
 mod poses;
 mod properties;
+mod readme;
 mod recomputed;
 mod readme;
 mod reference;

@@ -8,6 +8,10 @@
 //! | M | mass matrix, symmetric, positive definite | n×n, kg m² | [`mass_matrix`] |
 //! | C q̇ | Coriolis and centrifugal effort | n, N m | [`coriolis`] |
 //! | G | gravity load, gradient of the potential energy | n, N m | [`gravity_load`] |
+//! | q̈ | joint accelerations | n, rad/s² | [`textbook`], [`forward_dynamics`] |
+//!
+//! [`textbook`] is this line as it stands. The arm itself steps with [`forward_dynamics`], a recursion along the links
+//! that needs no matrix and loses up to ten digits less on uneven arms; a test holds the two together.
 //!
 //! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i` with unit vectors `u_i = (cos φ_i, sin φ_i)`,
 //! the Lagrangian is
@@ -40,6 +44,63 @@ pub use one_arm::{forward_dynamics, weightless_dynamics};
 use super::arm::{Arm, State};
 use super::trig;
 use glam::DVec2;
+
+/// Joint accelerations `q̈ = M⁻¹ (τ - C q̇ - G)` \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the
+/// efforts `tau` \[N m\].
+///
+/// Not finite where rounding leaves `M` no longer positive definite, as on very uneven arms.
+///
+/// ```
+/// use pendularm::math::arm::Arm;
+/// use pendularm::math::dynamics::{coriolis, gravity_load, mass_matrix, textbook};
+///
+/// let arm = Arm::<2>::default(); // links of 1 m and 1 kg
+/// let (q, qd) = ([0.0, 0.0], [0.0, 0.0]);
+/// // Stretched along +x, at rest: M is that of the book, and nothing but gravity acts.
+/// let [[m11, m12], [_, m22]] = mass_matrix(&arm, &q);
+/// assert!((m11 - 8.0 / 3.0).abs() < 1e-15 && (m12 - 5.0 / 6.0).abs() < 1e-15 && (m22 - 1.0 / 3.0).abs() < 1e-15);
+/// assert_eq!(coriolis(&arm, &q, &qd), [0.0, 0.0]);
+/// // An effort that carries the gravity load holds the arm still.
+/// let tau = gravity_load(&arm, &q);
+/// assert_eq!(textbook(&arm, &q, &qd, &tau), [0.0, 0.0]);
+/// ```
+#[must_use]
+pub fn textbook<const N: usize>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    tau: &[f64; N],
+) -> [f64; N] {
+    let (m, c, g) = (
+        mass_matrix(arm, q),
+        coriolis(arm, q, qd),
+        gravity_load(arm, q),
+    );
+    solve(&m, std::array::from_fn(|i| tau[i] - c[i] - g[i]))
+}
+
+/// The `x` of `M x = y` for a symmetric positive definite `M`, by Cholesky's `M = L Lᵀ`.
+#[must_use]
+pub fn solve<const N: usize>(m: &[[f64; N]; N], y: [f64; N]) -> [f64; N] {
+    let mut l = [[0.0_f64; N]; N];
+    for i in 0..N {
+        for j in 0..=i {
+            let done: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let rest = m[i][j] - done;
+            l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
+        }
+    }
+    let mut x = y;
+    for i in 0..N {
+        let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+        x[i] = (x[i] - known) / l[i][i];
+    }
+    for i in (0..N).rev() {
+        let known: f64 = (i + 1..N).map(|k| l[k][i] * x[k]).sum();
+        x[i] = (x[i] - known) / l[i][i];
+    }
+    x
+}
 
 /// Mass matrix `M(q)` \[kg m²\] at joint positions `q` \[rad\].
 #[must_use]

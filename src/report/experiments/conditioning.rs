@@ -6,16 +6,11 @@
 //!
 //! **Invariant:** the same states for every way.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
-)]
-
 use std::f64::consts::PI;
 
 use super::reference::{DoubleDouble, exact_acceleration};
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::{coriolis, forward_dynamics, gravity_load, mass_matrix};
+use crate::math::dynamics::{forward_dynamics, textbook};
 
 /// Shape of the sampled poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +60,7 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
             &truth,
             &forward_dynamics(&arm, position, velocity, &tau),
         ));
-        dense.push(lost(&truth, &by_elimination(&arm, &state, &tau)));
+        dense.push(lost(&truth, &textbook(&arm, position, velocity, &tau)));
         // The worst of turning one joint alone, and all of them.
         let changes = (0..=3).map(|turned| {
             let nudged = State {
@@ -104,33 +99,4 @@ fn lost(truth: &[DoubleDouble; 3], values: &[f64; 3]) -> f64 {
 fn median_and_worst(mut values: Vec<f64>) -> Option<(f64, f64)> {
     values.sort_by(f64::total_cmp);
     Some((*values.get(values.len() / 2)?, *values.last()?))
-}
-
-/// `M q̈ = τ - C q̇ - G` by Cholesky's method on the joint-space matrix.
-fn by_elimination(arm: &Arm<3>, state: &State<3>, tau: &[f64; 3]) -> [f64; 3] {
-    let m = mass_matrix(arm, &state.position);
-    let c = coriolis(arm, &state.position, &state.velocity);
-    let g = gravity_load(arm, &state.position);
-    let mut l = [[0.0_f64; 3]; 3];
-    for i in 0..3 {
-        for j in 0..=i {
-            let done: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let sum = m[i][j] - done;
-            l[i][j] = if i == j { sum.sqrt() } else { sum / l[j][j] };
-        }
-    }
-    let mut x: [f64; 3] = std::array::from_fn(|i| tau[i] - c[i] - g[i]);
-    for i in 0..3 {
-        for k in 0..i {
-            x[i] -= l[i][k] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    for i in (0..3).rev() {
-        for k in i + 1..3 {
-            x[i] -= l[k][i] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    x
 }

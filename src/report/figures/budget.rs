@@ -8,7 +8,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::budget::{Budget, Parts};
 use crate::report::experiments::error::{OUTPUTS, REACH};
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{
     Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
 };
@@ -26,7 +26,6 @@ struct Panel {
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let halvings = making.choose(9, 5);
     let mut panels = Vec::new();
-    let mut done = 0;
     for control in [false, true] {
         let budget = Budget::new(control, DURATION);
         let mut columns: Vec<Panel> = METHODS
@@ -41,10 +40,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             for (panel, parts) in columns.iter_mut().zip(all) {
                 panel.parts.push(parts);
             }
-            // Each halving costs as much as all before it.
-            done += OUTPUTS << halving;
-            let of = 2 * ((OUTPUTS << (halvings + 1)) - OUTPUTS);
-            making.at(to_usize(done), to_usize(of));
         }
         panels.append(&mut columns);
     }
@@ -52,13 +47,9 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     Section {
         findings: findings(&panels),
         verdicts: verdicts(&panels),
-        blocks: vec![Block::Figure(figure(&panels)), Block::Table(hold(&panels))],
+        blocks: vec![Block::Figure(figure(&panels))],
         ..Section::default()
     }
-}
-
-fn to_usize(count: u64) -> usize {
-    usize::try_from(count).unwrap_or(usize::MAX)
 }
 
 fn rows(panels: &[Panel]) -> Csv {
@@ -165,55 +156,6 @@ fn figure(panels: &[Panel]) -> Figure {
         &legend,
         &plots,
     )
-}
-
-fn hold(panels: &[Panel]) -> Table {
-    let mut table = Table::new(
-        "hold",
-        "What holding the effort costs",
-        "PD reach, timestep = control period. Against the continuous law all methods of order 2 and more are alike; \
-         against the motion under their own held effort they differ by orders.",
-        &[
-            "Control period",
-            "Hold alone",
-            "euler, all",
-            "verlet, all",
-            "rk4, all",
-            "verlet, truncation",
-            "rk4, truncation",
-        ],
-    );
-    let reach = |method| {
-        panels
-            .iter()
-            .find(move |panel| panel.control && panel.method == method)
-    };
-    let (Some(euler), Some(verlet), Some(rk4)) = (
-        reach(Method::Euler),
-        reach(Method::Verlet),
-        reach(Method::Rk4),
-    ) else {
-        return table;
-    };
-    for ((euler, verlet), rk4) in euler.parts.iter().zip(&verlet.parts).zip(&rk4.parts) {
-        let cell = |value: f64| {
-            if value.is_finite() && value < 10.0 {
-                Cell::new(scientific(value))
-            } else {
-                Cell::new("diverged").class("bad")
-            }
-        };
-        table.rows.push(vec![
-            Cell::new(seconds(rk4.timestep)),
-            cell(rk4.hold),
-            cell(euler.total),
-            cell(verlet.total),
-            cell(rk4.total),
-            cell(verlet.truncation),
-            cell(rk4.truncation),
-        ]);
-    }
-    table
 }
 
 fn findings(panels: &[Panel]) -> Vec<String> {

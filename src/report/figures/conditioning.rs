@@ -46,7 +46,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             columns.push((ratio, lost));
         }
         panels.push((title, columns));
-        making.at(panels.len(), 3);
     }
     making.keep("conditioning", csv);
     let (folded, others): (Vec<_>, Vec<_>) = panels

@@ -46,7 +46,7 @@ impl MotionMap {
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let columns = making.choose(32, 12);
-    let (moves, swings) = (moves(making, columns), spins(making, columns));
+    let (moves, swings) = (moves(columns), spins(columns));
     let mut csv = Csv::new("kind,method,dt,amplitude_or_spin,holds,predicted_limit");
     for (kind, maps, steps, values) in [
         ("move", &moves, MOVE_STEPS, AMPLITUDES),
@@ -69,7 +69,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
     making.keep("nonlinear-map", csv);
     let floquet = Floquet::of_swings();
-    making.at(9, 9);
     let advised = within(&moves, MOVE_STEPS, columns, 0.8);
     let carried = within(&swings, SWING_STEPS, columns, 0.8);
     Section {
@@ -107,7 +106,7 @@ fn centres_between(ends: (f64, f64), count: usize) -> Vec<f64> {
 }
 
 /// Moves under the default gains: limited by the pose that bears least, and by their own speed.
-fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
+fn moves(columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {
         let poses = limits(&move_of(1.0, method, 1e-3))
@@ -127,14 +126,13 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let rows = amplitudes.iter().zip(verdicts.chunks(columns));
         let rows = rows.map(row).collect();
         maps.push(MotionMap { method, rows });
-        making.at(maps.len(), 9);
     }
     maps
 }
 
 /// Free swings: limited by the frequency of small ones, and by their speed. A method that lets small swings grow at
 /// every timestep is limited by the speed alone here, for in four seconds little comes of that.
-fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
+fn spins(columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {
         let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
@@ -155,7 +153,6 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let rows = speeds.iter().zip(verdicts.chunks(columns));
         let rows = rows.map(row).collect();
         maps.push(MotionMap { method, rows });
-        making.at(4 + maps.len(), 9);
     }
     maps
 }

@@ -20,7 +20,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     );
     let mut csv = Csv::new("id,name,parameters,expected,observed,holds");
     let (mut run, mut short, mut panels) = (0, Vec::new(), Vec::new());
-    for (index, scene) in all.iter().enumerate() {
+    for scene in &all {
         // Slow ones take seconds each, which a quick look does not have.
         let verdict = (!scene.slow || !making.quick).then(|| scene.run());
         let plainly = verdict.as_ref().map(|verdict| plain(&verdict.observed));
@@ -62,7 +62,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             scene,
             verdict.as_ref().map(|verdict| verdict.holds),
         ));
-        making.at(index + 1, all.len());
     }
     making.keep("scenarios", csv);
     Section {

@@ -7,7 +7,7 @@ use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{
     Axis, Curve, Key, Marker, Plot, Point, Unit, number, power, scientific, seconds,
 };
@@ -45,7 +45,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     };
     let mut costs = Vec::new();
     let mut uncertainty = 0.0_f64;
-    let of = FAMILIES.len() * exponents.len();
     for (by, _) in FAMILIES {
         for exponent in &exponents {
             let scene = StiffScene::new(by, 10_f64.powi(*exponent));
@@ -64,7 +63,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
                     fewest,
                 });
             }
-            making.at(costs.len() / Solver::ALL.len(), of);
         }
     }
     section(making, &costs, uncertainty)
@@ -116,7 +114,7 @@ fn section(making: &mut Making<'_>, costs: &[CheapestRun], uncertainty: f64) -> 
     Section {
         findings: finding(costs, ends).into_iter().collect(),
         verdicts: verdicts(costs, uncertainty),
-        blocks: vec![Block::Figure(figure(costs)), Block::Table(table(costs))],
+        blocks: vec![Block::Figure(figure(costs))],
         ..Section::default()
     }
 }
@@ -291,42 +289,4 @@ fn panels(costs: &[CheapestRun], (by, words): (By, &str)) -> [Plot; 2] {
         times.series.push(line(timed, false));
     }
     [evaluations, times]
-}
-
-fn table(costs: &[CheapestRun]) -> Table {
-    let mut head = vec!["Stiff by", "Ratio"];
-    head.extend(Solver::ALL.map(Solver::name));
-    let mut table = Table::new(
-        "stiff",
-        format!(
-            "Evaluations and run time for {} rad",
-            power(TARGET.log10().round())
-        ),
-        "The run within the error with the fewest steps: multiples of 8, above 2048 to a sixteenth.",
-        &head,
-    );
-    for (by, words) in FAMILIES {
-        let ratios: Vec<f64> = of(costs, by, Solver::Rodas3)
-            .map(|cost| cost.ratio)
-            .collect();
-        for ratio in ratios {
-            let mut row = vec![Cell::new(words), Cell::new(scientific(ratio))];
-            for cost in costs
-                .iter()
-                .filter(|cost| cost.by == by && cost.ratio.to_bits() == ratio.to_bits())
-            {
-                row.push(match (&cost.run, cost.fewest) {
-                    (Some((run, timing)), _) => {
-                        Cell::new(run.evaluations.to_string()).detail(seconds(timing.minimum))
-                    }
-                    (None, Some(fewest)) => Cell::new("not run")
-                        .detail(format!("{} steps to be stable", scientific(fewest)))
-                        .class("soft"),
-                    (None, None) => Cell::new("not reached").class("bad"),
-                });
-            }
-            table.rows.push(row);
-        }
-    }
-    table
 }

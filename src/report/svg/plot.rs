@@ -17,8 +17,8 @@ pub(crate) struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
-    /// A second scale above: `self / x`, as a label and the number divided.
-    pub(crate) above: Option<(&'static str, f64)>,
+    /// A second scale above: `x` in this unit.
+    pub(crate) above: Option<f64>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
     pub(crate) series: Vec<Curve>,
@@ -117,21 +117,16 @@ impl Plot {
     }
 
     fn above(&self, out: &mut String) -> std::fmt::Result {
-        let Some((label, factor)) = self.above else {
+        let Some(unit) = self.above else {
             return Ok(());
         };
-        let other = Axis::log_between(
-            label,
-            Unit::Number,
-            factor / self.x.max,
-            factor / self.x.min,
-        );
+        let other = Axis::log_between("", Unit::Number, self.x.min / unit, self.x.max / unit);
         for (value, label) in other.ticks(5.0) {
-            let x = self.across(factor / value);
+            let x = self.across(value * unit);
             write!(
                 out,
                 "<path class=\"frame\" d=\"M{x:.1} {TOP}v-4\"/>\
-                 <text class=\"note\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}×</text>",
+                 <text class=\"note\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
                 TOP - 7.0
             )?;
         }

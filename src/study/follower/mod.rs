@@ -10,13 +10,15 @@
     reason = "indices run over 0..N, and over the coefficients of a series"
 )]
 
-mod series;
+pub(crate) mod series;
 
 use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
+use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::two_sum;
-use series::{ORDER, PowerSeries};
+use crate::math::trig;
+use series::PowerSeries;
 
 /// The least tolerance that makes a difference: below it rounding is all that is left.
 pub const ROUNDING: f64 = 1e-16;
@@ -24,6 +26,9 @@ pub const ROUNDING: f64 = 1e-16;
 /// Coefficients after which a span is given up, since the motion is too wild to be followed. They make a thousand
 /// steps.
 const MAX_COEFFICIENTS: u64 = 20_000;
+
+/// Highest order of a series in doubles: beyond it rounding is all that a coefficient adds.
+const HIGHEST: usize = 22;
 
 /// Terms that have to be small before a series is believed to have come to its end. An arm that is let go at rest and
 /// stretched along the horizontal has three in a row that vanish between two that do not.
@@ -55,7 +60,7 @@ pub struct Follower<const N: usize> {
     /// The last length of a step that a series allowed \[s\].
     step: f64,
     ahead: Ahead,
-    series: PowerSeries<N>,
+    series: PowerSeries<f64, N>,
 }
 
 /// The rest of a span.
@@ -164,17 +169,20 @@ impl<const N: usize> Follower<N> {
     fn step(&mut self, arm: &Arm<N>, effort: &[f64; N]) {
         let Ahead { span, rest, .. } = self.ahead;
         let whole = (span / self.cuts).min(rest.0);
-        self.series.begin(arm, &self.state, effort);
+        let State { position, velocity } = &self.state;
+        let acceleration = forward_dynamics(arm, position, velocity, effort);
+        let directions = trig::sin_cos(position);
+        self.series.begin(arm, &directions, velocity, &acceleration);
         let mut small = 0;
         if whole > LONGER * LONGER * self.step {
             while self.series.order() < self.order {
-                self.series.extend();
+                self.series.extend(&[0.0; N]);
             }
         } else {
             // A short step needs no long series.
             let mut power = whole;
             while self.series.order() < self.order && small < LAST {
-                self.series.extend();
+                self.series.extend(&[0.0; N]);
                 power *= whole;
                 let term = self.excess(self.series.order(), whole, power);
                 small = if term <= 1.0 { small + 1 } else { 0 };
@@ -244,7 +252,7 @@ impl<const N: usize> Follower<N> {
     reason = "clamped to small whole numbers"
 )]
 fn order_for(tolerance: f64) -> usize {
-    ((3.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, ORDER)
+    ((3.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, HIGHEST)
 }
 
 fn power(base: f64, exponent: usize) -> f64 {

@@ -6,8 +6,11 @@
 //!
 //! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`, products of series are
 //! convolutions, and the accelerations' coefficients solve one linear system after the other, always with the same
-//! matrix. The first of them comes from the arm's own kernel, which loses fewer digits. Known limit: a last link of
-//! a billion times the mass of the two that it folds costs a digit or two beyond those that its start can't tell.
+//! matrix. The first of them is given, so that it can come from a kernel that loses fewer digits. Known limit: a last
+//! link of a billion times the mass of the two that it folds costs a digit or two beyond those that its start can't tell.
+//!
+//! The series is one for doubles, as the study follows an arm, and for numbers of twice the digits, as the report's
+//! references have them.
 //!
 //! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
 //! methods*, Experimental Mathematics 14 (2005).
@@ -20,20 +23,19 @@
     reason = "indices run over 0..N, and over the coefficients computed so far, as they do in the recurrences"
 )]
 
-use crate::math::arm::{Arm, State};
+use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
-use crate::math::dynamics::forward_dynamics;
-use crate::math::trig;
+use crate::math::number::Arithmetic;
 
 /// Highest order of the rates.
-pub(super) const ORDER: usize = 22;
+pub(crate) const ORDER: usize = 30;
 
 /// Coefficients of as many series as there are links.
-type PerLink<const N: usize> = [[f64; N]; ORDER + 1];
+type PerLink<T, const N: usize> = [[T; N]; ORDER + 1];
 
 /// Coefficients of a series for each two links: at `[d][i]` that of links `i` and `i - d`, or of link `i` alone for
 /// `d = 0`.
-type PerPair<const N: usize> = [[[f64; N]; N]; ORDER];
+type PerPair<T, const N: usize> = [[[T; N]; N]; ORDER];
 
 /// Where the coefficient of an order stands in a series that is kept backwards, so that both factors of a convolution
 /// are read forwards.
@@ -43,57 +45,63 @@ const fn backwards(order: usize) -> usize {
 
 /// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are computed from.
 #[derive(Debug, Clone)]
-pub(super) struct PowerSeries<const N: usize> {
+pub(crate) struct PowerSeries<T, const N: usize> {
     /// Order up to which rates are known.
     order: usize,
-    pub(super) angle: PerLink<N>,
-    pub(super) rate: PerLink<N>,
+    pub(crate) angle: PerLink<T, N>,
+    pub(crate) rate: PerLink<T, N>,
     /// Accelerations and squared rates, backwards.
-    acceleration: [[f64; N]; ORDER],
-    squared_rate: [[f64; N]; ORDER],
+    acceleration: [[T; N]; ORDER],
+    squared_rate: [[T; N]; ORDER],
     /// Sine and cosine of the angle from one link to the other, and its rate, backwards.
-    sin: PerPair<N>,
-    cos: PerPair<N>,
-    turning: PerPair<N>,
-    equation: Equation<N>,
+    sin: PerPair<T, N>,
+    cos: PerPair<T, N>,
+    turning: PerPair<T, N>,
+    equation: Equation<T, N>,
 }
 
 /// The constants of the equation of motion, and its matrix where the series begins.
 #[derive(Debug, Clone)]
-struct Equation<const N: usize> {
+struct Equation<T, const N: usize> {
     /// At `[d][i]` the `K_ij` of links `i` and `i - d` \[kg m²\]; `W_i` \[N m\] for `d = 0`.
-    factors: [[f64; N]; N],
+    factors: [[T; N]; N],
     /// The matrix where the series begins, eliminated: inverse pivots on the diagonal, multipliers above it.
-    eliminated: [[f64; N]; N],
+    eliminated: [[T; N]; N],
 }
 
-impl<const N: usize> PowerSeries<N> {
-    pub(super) fn new() -> Self {
+impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
+    pub(crate) fn new() -> Self {
+        let zeros = [T::default(); N];
         Self {
             order: 0,
-            angle: [[0.0; N]; ORDER + 1],
-            rate: [[0.0; N]; ORDER + 1],
-            acceleration: [[0.0; N]; ORDER],
-            squared_rate: [[0.0; N]; ORDER],
-            sin: [[[0.0; N]; N]; ORDER],
-            cos: [[[0.0; N]; N]; ORDER],
-            turning: [[[0.0; N]; N]; ORDER],
+            angle: [zeros; ORDER + 1],
+            rate: [zeros; ORDER + 1],
+            acceleration: [zeros; ORDER],
+            squared_rate: [zeros; ORDER],
+            sin: [[zeros; N]; ORDER],
+            cos: [[zeros; N]; ORDER],
+            turning: [[zeros; N]; ORDER],
             equation: Equation {
-                factors: [[0.0; N]; N],
-                eliminated: [[0.0; N]; N],
+                factors: [zeros; N],
+                eliminated: [zeros; N],
             },
         }
     }
 
     /// Order up to which rates are known.
-    pub(super) fn order(&self) -> usize {
+    pub(crate) fn order(&self) -> usize {
         self.order
     }
 
-    /// The series about a state under constant efforts \[N m\]: rates up to order 1, angles of order 0 left out.
-    pub(super) fn begin(&mut self, arm: &Arm<N>, state: &State<N>, effort: &[f64; N]) {
-        let State { position, velocity } = state;
-        let (sin, cos) = trig::sin_cos(position);
+    /// The series about a state, by sine and cosine of the joint angles and the joints' rates and accelerations there:
+    /// rates up to order 1, angles of order 0 left out.
+    pub(crate) fn begin(
+        &mut self,
+        arm: &Arm<N>,
+        (sin, cos): &([T; N], [T; N]),
+        velocity: &[T; N],
+        acceleration: &[T; N],
+    ) {
         for i in 0..N {
             // The joints between two links turn one into the other: no angle is summed, and none loses digits.
             let (mut s, mut c) = (sin[i], cos[i]);
@@ -107,17 +115,16 @@ impl<const N: usize> PowerSeries<N> {
         self.equation.set(arm, &self.cos[0]);
         self.rate[0] = sums(velocity);
         self.squared_rate[backwards(0)] = self.rate[0].map(|rate| rate * rate);
-        let acceleration = forward_dynamics(arm, position, velocity, effort);
-        self.close(0, sums(&acceleration));
+        self.close(0, sums(acceleration));
     }
 
-    /// Computes the rates of the next order.
+    /// Computes the rates of the next order, with the coefficient of that order of the efforts about the links.
     #[inline]
-    pub(super) fn extend(&mut self) {
+    pub(crate) fn extend(&mut self, effort: &[T; N]) {
         let k = self.order;
-        let zero = [[0.0; N]; N];
+        let zero = [[T::default(); N]; N];
         // Sums for sines, cosines and squares, and for what a link does to one farther out, and to one farther in.
-        let (mut sine, mut cosine, mut square) = (zero, zero, [0.0; N]);
+        let (mut sine, mut cosine, mut square) = (zero, zero, [T::default(); N]);
         let (mut pull, mut push) = ((zero, zero), (zero, zero));
         {
             let (sin, cos, rate) = (&self.sin[..k], &self.cos[..k], &self.rate[1..=k]);
@@ -127,33 +134,33 @@ impl<const N: usize> PowerSeries<N> {
             for m in 0..k {
                 for d in 0..N {
                     for i in d..N {
-                        sine[d][i] += turning[m][d][i] * cos[m][d][i];
-                        cosine[d][i] += turning[m][d][i] * sin[m][d][i];
+                        sine[d][i] = sine[d][i] + turning[m][d][i] * cos[m][d][i];
+                        cosine[d][i] = cosine[d][i] + turning[m][d][i] * sin[m][d][i];
                     }
                 }
                 for i in 0..N {
-                    square[i] += turning[m][0][i] * rate[m][i];
+                    square[i] = square[i] + turning[m][0][i] * rate[m][i];
                 }
                 if m > 0 {
                     for d in 1..N {
                         for i in d..N {
-                            pull.0[d][i] += sin[m][d][i] * squared[m][i - d];
-                            pull.1[d][i] += cos[m][d][i] * acceleration[m][i - d];
-                            push.0[d][i] += sin[m][d][i] * squared[m][i];
-                            push.1[d][i] += cos[m][d][i] * acceleration[m][i];
+                            pull.0[d][i] = pull.0[d][i] + sin[m][d][i] * squared[m][i - d];
+                            pull.1[d][i] = pull.1[d][i] + cos[m][d][i] * acceleration[m][i - d];
+                            push.0[d][i] = push.0[d][i] + sin[m][d][i] * squared[m][i];
+                            push.1[d][i] = push.1[d][i] + cos[m][d][i] * acceleration[m][i];
                         }
                     }
                 }
             }
         }
-        let per_k = 1.0 / length_in_f64(k);
+        let per_k = reciprocal::<T>(k);
         let (first_square, first) = (
             self.squared_rate[backwards(0)],
             self.acceleration[backwards(0)],
         );
-        let mut right = [0.0; N];
+        let mut right = *effort;
         for i in 0..N {
-            square[i] += self.rate[0][i] * self.rate[k][i];
+            square[i] = square[i] + self.rate[0][i] * self.rate[k][i];
         }
         self.squared_rate[backwards(k)] = square;
         for d in 0..N {
@@ -162,13 +169,13 @@ impl<const N: usize> PowerSeries<N> {
                 (self.sin[k][d][i], self.cos[k][d][i]) = (sin, cos);
                 let factor = self.equation.factors[d][i];
                 if d == 0 {
-                    right[i] -= factor * cos;
+                    right[i] = right[i] - factor * cos;
                 } else {
                     let (j, at_start) = (i - d, self.sin[0][d][i]);
                     let across = pull.0[d][i] + (at_start * square[j] + sin * first_square[j]);
-                    right[i] -= factor * (across + (pull.1[d][i] + cos * first[j]));
+                    right[i] = right[i] - factor * (across + (pull.1[d][i] + cos * first[j]));
                     let across = push.0[d][i] + (at_start * square[i] + sin * first_square[i]);
-                    right[j] -= factor * ((push.1[d][i] + cos * first[i]) - across);
+                    right[j] = right[j] - factor * ((push.1[d][i] + cos * first[i]) - across);
                 }
             }
         }
@@ -178,9 +185,9 @@ impl<const N: usize> PowerSeries<N> {
 
     /// Keeps the accelerations of order `k`, and what follows from them.
     #[inline(always)]
-    fn close(&mut self, k: usize, acceleration: [f64; N]) {
+    fn close(&mut self, k: usize, acceleration: [T; N]) {
         self.acceleration[backwards(k)] = acceleration;
-        let next = 1.0 / length_in_f64(k + 1);
+        let next = reciprocal::<T>(k + 1);
         let rate = self.rate[k];
         self.angle[k + 1] = rate.map(|rate| rate * next);
         self.rate[k + 1] = acceleration.map(|acceleration| acceleration * next);
@@ -198,8 +205,8 @@ impl<const N: usize> PowerSeries<N> {
     }
 
     /// By how much positions and velocities of the joints change in a time \[s\].
-    pub(super) fn change(&self, time: f64) -> ([f64; N], [f64; N]) {
-        let change = |series: &PerLink<N>, order: usize| {
+    pub(crate) fn change(&self, time: T) -> ([T; N], [T; N]) {
+        let change = |series: &PerLink<T, N>, order: usize| {
             let mut value = series[order];
             for coefficient in series[1..order].iter().rev() {
                 for i in 0..N {
@@ -215,64 +222,70 @@ impl<const N: usize> PowerSeries<N> {
     }
 }
 
-impl<const N: usize> Equation<N> {
-    fn set(&mut self, arm: &Arm<N>, cos: &[[f64; N]; N]) {
-        let (l, m) = (arm.lengths(), arm.masses());
-        let mut beyond = 0.0;
+impl<T: Arithmetic + Default, const N: usize> Equation<T, N> {
+    fn set(&mut self, arm: &Arm<N>, cos: &[[T; N]; N]) {
+        let real = |value| T::default().like(value);
+        let (l, m) = (arm.lengths().map(real), arm.masses().map(real));
+        let mut beyond = T::default();
         let matrix = &mut self.eliminated;
         for i in (0..N).rev() {
-            let (first, second) = (m[i] / 2.0 + beyond, m[i] / 3.0 + beyond);
+            let (first, second) = (m[i] / real(2.0) + beyond, m[i] / real(3.0) + beyond);
             for j in 0..i {
                 let coupling = first * l[i] * l[j];
                 self.factors[i - j][i] = coupling;
                 matrix[i][j] = coupling * cos[i - j][i];
             }
-            self.factors[0][i] = arm.gravity() * first * l[i];
+            self.factors[0][i] = real(arm.gravity()) * first * l[i];
             matrix[i][i] = second * l[i] * l[i];
-            beyond += m[i];
+            beyond = beyond + m[i];
         }
         for pivot in 0..N {
-            matrix[pivot][pivot] = 1.0 / matrix[pivot][pivot];
+            matrix[pivot][pivot] = real(1.0) / matrix[pivot][pivot];
             for row in pivot + 1..N {
                 let factor = matrix[row][pivot] * matrix[pivot][pivot];
                 for column in row..N {
                     // The matrix is symmetric, and the part below the diagonal is still whole.
                     let lost = factor * matrix[column][pivot];
-                    matrix[column][row] -= lost;
+                    matrix[column][row] = matrix[column][row] - lost;
                 }
                 matrix[pivot][row] = factor;
             }
         }
     }
 
-    fn solve(&self, mut right: [f64; N]) -> [f64; N] {
+    fn solve(&self, mut right: [T; N]) -> [T; N] {
         let matrix = &self.eliminated;
         for row in 1..N {
             for column in 0..row {
-                right[row] -= matrix[column][row] * right[column];
+                right[row] = right[row] - matrix[column][row] * right[column];
             }
         }
         for row in (0..N).rev() {
-            right[row] *= matrix[row][row];
+            right[row] = right[row] * matrix[row][row];
             for column in row + 1..N {
-                right[row] -= matrix[row][column] * right[column];
+                right[row] = right[row] - matrix[row][column] * right[column];
             }
         }
         right
     }
 }
 
+fn reciprocal<T: Arithmetic + Default>(count: usize) -> T {
+    let real = |value| T::default().like(value);
+    real(1.0) / real(length_in_f64(count))
+}
+
 /// Rates of the links from those of the joints.
-fn sums<const N: usize>(joints: &[f64; N]) -> [f64; N] {
-    let mut sum = 0.0;
+pub(crate) fn sums<T: Arithmetic + Default, const N: usize>(joints: &[T; N]) -> [T; N] {
+    let mut sum = T::default();
     joints.map(|joint| {
-        sum += joint;
+        sum = sum + joint;
         sum
     })
 }
 
 /// Rates of the joints from those of the links.
-fn differences<const N: usize>(links: &[f64; N]) -> [f64; N] {
+pub(crate) fn differences<T: Arithmetic, const N: usize>(links: &[T; N]) -> [T; N] {
     std::array::from_fn(|i| {
         if i == 0 {
             links[i]

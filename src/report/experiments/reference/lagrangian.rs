@@ -17,6 +17,7 @@
 
 use super::double_double::DoubleDouble as Real;
 use crate::math::arm::Arm;
+use crate::study::follower::series::{differences, sums};
 
 /// Constants of the equations of motion.
 #[derive(Debug, Clone)]
@@ -103,26 +104,6 @@ impl<const N: usize> Factors<N> {
         }
         right
     }
-}
-
-/// Angles or rates of the links from those of the joints.
-pub(super) fn sums<const N: usize>(joints: &[Real; N]) -> [Real; N] {
-    let mut sum = Real::ZERO;
-    joints.map(|joint| {
-        sum += joint;
-        sum
-    })
-}
-
-/// Angles or rates of the joints from those of the links.
-pub(super) fn differences<const N: usize>(links: &[Real; N]) -> [Real; N] {
-    std::array::from_fn(|i| {
-        if i == 0 {
-            links[i]
-        } else {
-            links[i] - links[i - 1]
-        }
-    })
 }
 
 /// Effort about each link's angle from the efforts of the joints at both its ends.

@@ -3,8 +3,7 @@
 //! **Invariant:** an instant beyond the end is answered with the end.
 
 use super::double_double::DoubleDouble as Real;
-use super::lagrangian::differences;
-use super::taylor::{AngleSeries, Taylor, evaluate};
+use super::taylor::{Piece, Taylor, evaluate};
 use super::{COARSE, FINE, Law, continuous_drive, exact};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
@@ -15,7 +14,7 @@ const COMPARED: u64 = 64;
 /// A motion from a start on, for some time.
 #[derive(Debug, Clone)]
 pub struct ReferencePath<const N: usize> {
-    pieces: Vec<AngleSeries<N>>,
+    pieces: Vec<Piece<N>>,
     uncertainty: f64,
 }
 
@@ -62,11 +61,12 @@ impl<const N: usize> ReferencePath<N> {
 }
 
 /// The joint angles at `time` \[s\].
-fn position<const N: usize>(pieces: &[AngleSeries<N>], time: Real) -> [Real; N] {
+fn position<const N: usize>(pieces: &[Piece<N>], time: Real) -> [Real; N] {
     let after = pieces.partition_point(|piece| (piece.begins - time).to_f64() <= 0.0);
     let Some(piece) = pieces.get(after.saturating_sub(1)) else {
         return [Real::from(f64::NAN); N];
     };
-    let order = piece.angle.len().saturating_sub(1);
-    differences(&evaluate(&piece.angle, order, time - piece.begins))
+    let after = time - piece.begins;
+    let change = evaluate(&piece.angle, after);
+    std::array::from_fn(|i| piece.position[i] + change[i] * after)
 }

@@ -1,11 +1,8 @@
-//! Taylor series of the arm's motion, coefficient by coefficient, in double-double arithmetic.
+//! Taylor series of the arm's motion in double-double arithmetic, under constant efforts or under the law at every
+//! instant. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
 //!
-//! Every unknown is a power series in time. With `s' = c φ'` and `c' = -s φ'` sine and cosine cost one recurrence each,
-//! products of series are convolutions, and the equations of motion give one linear system per coefficient, always with
-//! the same matrix. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
-//!
-//! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
-//! methods*, Experimental Mathematics 14 (2005).
+//! The series is the study's (`study::follower::series`, after Jorba and Zou), begun with the acceleration of the
+//! Lagrangian in twice the digits.
 //!
 //! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two
 //! settings.
@@ -16,9 +13,10 @@
 )]
 
 use super::double_double::DoubleDouble as Real;
-use super::lagrangian::{Factors, Lagrangian, differences, link_efforts, sums};
+use super::lagrangian::{Lagrangian, link_efforts};
 use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
+use crate::study::follower::series::{PowerSeries, differences, sums};
 
 /// How far a series is taken, and how much it may leave out.
 #[derive(Debug, Clone, Copy)]
@@ -55,53 +53,40 @@ pub(super) enum JointDrive<const N: usize> {
 /// Coefficients of one series per link or joint.
 type Coefficients<const N: usize> = Vec<[Real; N]>;
 
-/// The link angles of one step of a motion, as a series in the time from its beginning.
+/// One step of a motion, as a series in the time from its beginning.
 #[derive(Debug, Clone)]
-pub(super) struct AngleSeries<const N: usize> {
-    /// When it begins \[s\].
+pub(super) struct Piece<const N: usize> {
+    /// When it begins \[s\], and where the joints are then \[rad\].
     pub(super) begins: Real,
+    pub(super) position: [Real; N],
+    /// Coefficients of the joint angles, from that of order 1 on.
     pub(super) angle: Coefficients<N>,
 }
 
-/// The series of one motion. Kept between steps, so that a step allocates nothing.
+/// The series of one motion. Kept between steps.
 #[derive(Debug, Clone)]
 pub(super) struct Taylor<const N: usize> {
+    arm: Arm<N>,
     lagrangian: Lagrangian<N>,
     setting: Setting,
-    angle: Coefficients<N>,
-    rate: Coefficients<N>,
-    acceleration: Coefficients<N>,
-    squared_rate: Coefficients<N>,
+    series: PowerSeries<Real, N>,
     integral: Coefficients<N>,
-    sin: Coefficients<N>,
-    cos: Coefficients<N>,
-    /// `cos(φ_i - φ_j)` and `sin(φ_i - φ_j)`.
-    along: Vec<[[Real; N]; N]>,
-    across: Vec<[[Real; N]; N]>,
 }
 
 impl<const N: usize> Taylor<N> {
     pub(super) fn new(arm: &Arm<N>, setting: Setting) -> Self {
-        let zeros = || vec![[Real::ZERO; N]; setting.order + 2];
-        let tables = || vec![[[Real::ZERO; N]; N]; setting.order + 2];
         Self {
+            arm: *arm,
             lagrangian: Lagrangian::new(arm),
             setting,
-            angle: zeros(),
-            rate: zeros(),
-            acceleration: zeros(),
-            squared_rate: zeros(),
-            integral: zeros(),
-            sin: zeros(),
-            cos: zeros(),
-            along: tables(),
-            across: tables(),
+            series: PowerSeries::new(),
+            integral: vec![[Real::ZERO; N]; setting.order + 1],
         }
     }
 
     /// Moves `state` and `drive` on by `time` \[s\], in as many steps as the tolerance asks for.
     pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &JointDrive<N>, time: f64) {
-        self.go(state, drive, time, |_, _| ());
+        self.go(state, drive, time, |_, _, _| ());
     }
 
     /// As [`Taylor::advance`], and keeps the series of every step.
@@ -110,12 +95,14 @@ impl<const N: usize> Taylor<N> {
         state: &mut Exact<N>,
         drive: &JointDrive<N>,
         time: f64,
-    ) -> Vec<AngleSeries<N>> {
+    ) -> Vec<Piece<N>> {
         let mut pieces = Vec::new();
-        self.go(state, drive, time, |taylor, rest| {
-            pieces.push(AngleSeries {
+        self.go(state, drive, time, |taylor, state, rest| {
+            let angle = &taylor.series.angle[1..=taylor.setting.order];
+            pieces.push(Piece {
                 begins: Real::from(time) - rest,
-                angle: taylor.angle[..=taylor.setting.order].to_vec(),
+                position: state.position,
+                angle: angle.iter().map(differences).collect(),
             });
         });
         pieces
@@ -126,19 +113,20 @@ impl<const N: usize> Taylor<N> {
         state: &mut Exact<N>,
         drive: &JointDrive<N>,
         time: f64,
-        mut keep: impl FnMut(&Self, Real),
+        mut keep: impl FnMut(&Self, &Exact<N>, Real),
     ) {
         let mut rest = Real::from(time);
         while rest.to_f64() > 0.0 {
             self.expand(state, drive);
-            keep(self, rest);
-            let allowed = self.allowed_step();
+            keep(self, state, rest);
+            let allowed = self.allowed_step(state);
             let last = allowed >= rest.to_f64();
             let step = if last { rest } else { Real::from(allowed) };
+            let (dq, dv) = self.series.change(step);
             *state = Exact {
-                position: differences(&evaluate(&self.angle, self.setting.order, step)),
-                velocity: differences(&evaluate(&self.rate, self.setting.order, step)),
-                integral: evaluate(&self.integral, self.setting.order, step),
+                position: std::array::from_fn(|i| state.position[i] + dq[i]),
+                velocity: std::array::from_fn(|i| state.velocity[i] + dv[i]),
+                integral: evaluate(&self.integral, step),
             };
             if last {
                 break;
@@ -149,94 +137,37 @@ impl<const N: usize> Taylor<N> {
 
     /// The series about `state`.
     fn expand(&mut self, state: &Exact<N>, drive: &JointDrive<N>) {
-        self.angle[0] = sums(&state.position);
-        self.rate[0] = sums(&state.velocity);
+        let Exact {
+            position, velocity, ..
+        } = state;
         self.integral[0] = state.integral;
-        self.trigonometry(0);
-        let factors = self.factors();
-        for k in 0..=self.setting.order {
-            if k > 0 {
-                self.trigonometry(k);
-            }
-            let effort = link_efforts(&self.effort(drive, k));
-            let right = std::array::from_fn(|i| self.right_side(i, k, effort[i]));
-            self.acceleration[k] = factors.solve(right);
+        let effort = self.effort(drive, 0, position, velocity);
+        let acceleration = self.lagrangian.acceleration(position, velocity, &effort);
+        let directions = position.map(Real::sin_cos);
+        let directions = (directions.map(|one| one.0), directions.map(|one| one.1));
+        self.series
+            .begin(&self.arm, &directions, velocity, &acceleration);
+        self.integral[1] = error(drive, 0, position);
+        for k in 1..self.setting.order {
+            let angle = differences(&self.series.angle[k]);
+            let rate = differences(&self.series.rate[k]);
+            let effort = link_efforts(&self.effort(drive, k, &angle, &rate));
+            self.series.extend(&effort);
             let next = Real::ONE / Real::from(length_in_f64(k + 1));
-            for i in 0..N {
-                self.rate[k + 1][i] = self.acceleration[k][i] * next;
-                self.angle[k + 1][i] = self.rate[k][i] * next;
-            }
-            self.integral[k + 1] = self.error(drive, k).map(|error| error * next);
+            self.integral[k + 1] = error(drive, k, &angle).map(|error| error * next);
         }
     }
 
-    /// The mass matrix at the start of the step, which every coefficient is solved with.
-    fn factors(&self) -> Factors<N> {
-        let coupling = &self.lagrangian.coupling;
-        Factors::of(std::array::from_fn(|i| {
-            std::array::from_fn(|j| coupling[i][j] * self.along[0][i][j])
-        }))
-    }
-
-    /// Coefficient `k` of sine and cosine of every angle, of their differences, and of the squared rates.
-    fn trigonometry(&mut self, k: usize) {
-        for i in 0..N {
-            if k == 0 {
-                (self.sin[0][i], self.cos[0][i]) = self.angle[0][i].sin_cos();
-            } else {
-                let (mut sin, mut cos) = (Real::ZERO, Real::ZERO);
-                for j in 1..=k {
-                    let slope = Real::from(length_in_f64(j)) * self.angle[j][i];
-                    sin += slope * self.cos[k - j][i];
-                    cos += slope * self.sin[k - j][i];
-                }
-                let per_k = Real::ONE / Real::from(length_in_f64(k));
-                self.sin[k][i] = sin * per_k;
-                self.cos[k][i] = -(cos * per_k);
-            }
-            self.squared_rate[k][i] = (0..=k).fold(Real::ZERO, |sum, m| {
-                sum + self.rate[m][i] * self.rate[k - m][i]
-            });
-        }
-        for i in 0..N {
-            self.along[k][i][i] = if k == 0 { Real::ONE } else { Real::ZERO };
-            for j in 0..i {
-                let (mut along, mut across) = (Real::ZERO, Real::ZERO);
-                for m in 0..=k {
-                    let (sin_i, cos_i) = (self.sin[m][i], self.cos[m][i]);
-                    let (sin_j, cos_j) = (self.sin[k - m][j], self.cos[k - m][j]);
-                    along += cos_i * cos_j + sin_i * sin_j;
-                    across += sin_i * cos_j - cos_i * sin_j;
-                }
-                self.along[k][i][j] = along;
-                self.along[k][j][i] = along;
-                self.across[k][i][j] = across;
-                self.across[k][j][i] = -across;
-            }
-        }
-    }
-
-    /// Coefficient `k` of what the accelerations of link `i`'s equation have to balance.
-    fn right_side(&self, i: usize, k: usize, effort: Real) -> Real {
-        let mut right = effort - self.lagrangian.weight[i] * self.cos[k][i];
-        for j in (0..N).filter(|&j| j != i) {
-            let mut sum = Real::ZERO;
-            for m in 0..=k {
-                sum += self.across[m][i][j] * self.squared_rate[k - m][j];
-            }
-            for m in 1..=k {
-                sum += self.along[m][i][j] * self.acceleration[k - m][j];
-            }
-            right += -(self.lagrangian.coupling[i][j] * sum);
-        }
-        right
-    }
-
-    /// Coefficient `k` of the joint efforts.
-    fn effort(&self, drive: &JointDrive<N>, k: usize) -> [Real; N] {
+    /// Coefficient `k` of the joint efforts, by those of the joints' angles and rates.
+    fn effort(
+        &self,
+        drive: &JointDrive<N>,
+        k: usize,
+        angle: &[Real; N],
+        rate: &[Real; N],
+    ) -> [Real; N] {
         match drive {
-            JointDrive::Constant(_) if k > 0 => [Real::ZERO; N],
-            JointDrive::Constant(effort) => *effort,
+            JointDrive::Constant(effort) => effort.map(|effort| coefficient(effort, k)),
             JointDrive::Law {
                 kp,
                 ki,
@@ -244,8 +175,7 @@ impl<const N: usize> Taylor<N> {
                 velocity,
                 ..
             } => {
-                let error = self.error(drive, k);
-                let rate = differences(&self.rate[k]);
+                let error = error(drive, k, angle);
                 std::array::from_fn(|i| {
                     let wanted = coefficient(velocity[i], k);
                     kp[i] * error[i] + ki[i] * self.integral[k][i] + kd[i] * (wanted - rate[i])
@@ -254,27 +184,21 @@ impl<const N: usize> Taylor<N> {
         }
     }
 
-    /// Coefficient `k` of the position error; zeros where nothing is asked for.
-    fn error(&self, drive: &JointDrive<N>, k: usize) -> [Real; N] {
-        let JointDrive::Law { position, .. } = drive else {
-            return [Real::ZERO; N];
-        };
-        let angle = differences(&self.angle[k]);
-        std::array::from_fn(|i| coefficient(position[i], k) - angle[i])
-    }
-
     /// The longest step whose last two terms stay below the tolerance, relative to the state where that is above 1.
-    fn allowed_step(&self) -> f64 {
+    fn allowed_step(&self, state: &Exact<N>) -> f64 {
         let largest = |coefficients: &[Real; N]| {
             coefficients
                 .iter()
                 .map(|value| value.abs().to_f64())
                 .fold(0.0, f64::max)
         };
-        let scale = largest(&self.angle[0]).max(largest(&self.rate[0])).max(1.0);
+        let PowerSeries { angle, rate, .. } = &self.series;
+        let scale = largest(&sums(&state.position))
+            .max(largest(&rate[0]))
+            .max(1.0);
         let allowed = |order: usize| {
-            let size = largest(&self.angle[order])
-                .max(largest(&self.rate[order]))
+            let size = largest(&angle[order])
+                .max(largest(&rate[order]))
                 .max(largest(&self.integral[order]));
             (self.setting.tolerance * scale / size).powf(1.0 / length_in_f64(order))
         };
@@ -291,14 +215,18 @@ fn coefficient(value: Real, k: usize) -> Real {
     if k == 0 { value } else { Real::ZERO }
 }
 
-pub(super) fn evaluate<const N: usize>(
-    series: &[[Real; N]],
-    order: usize,
-    step: Real,
-) -> [Real; N] {
-    let mut value = series[order];
-    for coefficient in series[..order].iter().rev() {
-        value = std::array::from_fn(|i| value[i] * step + coefficient[i]);
-    }
-    value
+/// Coefficient `k` of the position error; zeros where nothing is asked for.
+fn error<const N: usize>(drive: &JointDrive<N>, k: usize, angle: &[Real; N]) -> [Real; N] {
+    let JointDrive::Law { position, .. } = drive else {
+        return [Real::ZERO; N];
+    };
+    std::array::from_fn(|i| coefficient(position[i], k) - angle[i])
+}
+
+/// The sum of a series after a time \[s\].
+pub(super) fn evaluate<const N: usize>(series: &[[Real; N]], time: Real) -> [Real; N] {
+    let sum = |sum: [Real; N], coefficient: &[Real; N]| {
+        std::array::from_fn(|i| sum[i] * time + coefficient[i])
+    };
+    series.iter().rev().fold([Real::ZERO; N], sum)
 }

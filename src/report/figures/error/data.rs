@@ -101,6 +101,16 @@ impl Data {
             .min_by(f64::total_cmp)
     }
 
+    /// Median time of an evaluation \[s\] in the runs of a thousand steps and more.
+    pub(super) fn evaluation_time(&self) -> Option<f64> {
+        let long = self.runs.iter().filter(|run| run.outcome.steps >= 1000);
+        let mut times: Vec<f64> = long
+            .map(|run| run.timing.minimum / in_f64(run.outcome.evaluations))
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied()
+    }
+
     pub(super) fn unit(&self) -> &'static str {
         if self.scene.links() == 0 { "m" } else { "rad" }
     }

@@ -9,7 +9,7 @@ mod words;
 
 use data::{Data, Run};
 use plots::{against_time, against_timestep};
-use tables::{cheapest, orders, real_time, scene_list, table_of_runs};
+use tables::{cheapest, orders, scene_list, table_of_runs};
 use words::{findings, verdicts};
 
 use crate::math::integrator::Method;
@@ -30,7 +30,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             Block::Figure(against_time(&data)),
             Block::Figure(against_timestep(&data)),
             Block::Table(orders(&data)),
-            Block::Table(real_time(&data)),
             Block::Table(scene_list(&data)),
         ],
         ..Section::default()
@@ -51,11 +50,8 @@ fn compute(making: &mut Making<'_>) -> Vec<Data> {
             seconds: 0.01,
         },
     );
-    let scenes = scenes();
-    let of = scenes.len() * Method::ALL.len() * (halvings + 1);
-    let mut done = 0;
     let mut data = Vec::new();
-    for scene in scenes {
+    for scene in scenes() {
         let mut runs = Vec::new();
         for halving in 0..=halvings {
             let steps = OUTPUTS << halving;
@@ -68,8 +64,6 @@ fn compute(making: &mut Making<'_>) -> Vec<Data> {
                     outcome: scene.run(method, steps),
                     timing: time(effort, || scene.replay(method, steps)),
                 });
-                done += 1;
-                making.at(done, of);
             }
         }
         data.push(Data::new(scene, runs, effort));

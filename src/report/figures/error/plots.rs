@@ -72,7 +72,7 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
     );
     let mut plots = panels(data, &x, |run| run.timing.minimum);
     for (plot, data) in plots.iter_mut().zip(data) {
-        plot.above = Some(("real-time factor", data.scene.duration()));
+        plot.above = data.evaluation_time();
         let points = plot.series.iter_mut().flat_map(|series| &mut series.points);
         let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
         for (point, run) in points.zip(runs) {
@@ -84,9 +84,10 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
         "work-precision-time",
         headline_time(data),
         "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is the \
-         minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: real-time factor. A \
-         cross at the top edge is a run that diverged. Dotted line: one unit in the last place of 1 rad. The error of \
-         a reach is the distance from a law that acts at every instant. Each mark's tooltip has the evaluations.",
+         minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
+         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. Dotted line: \
+         one unit in the last place of 1 rad. The error of a reach is the distance from a law that acts at every instant; that from the loop whose law runs once a period \
+         is the truncation in the figure of the error's parts. Each mark's tooltip has its own evaluations.",
         &Key::methods(),
         &plots,
     )

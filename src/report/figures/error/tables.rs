@@ -1,4 +1,4 @@
-//! The tables: cheapest methods, orders, real-time factors, scenes, and every run in numbers.
+//! The tables: cheapest methods, orders, scenes, and every run in numbers.
 //!
 //! **Invariant:** what no run reached is called not reached.
 
@@ -73,49 +73,6 @@ pub(super) fn orders(data: &[Data]) -> Table {
             row.push(Cell::new(order).detail(least));
         }
         table.rows.push(row);
-    }
-    table
-}
-
-/// Scenes whose speed is listed: one of each kind.
-const SHOWN: [&str; 3] = ["swing-2", "swing-3", "reach-held"];
-
-pub(super) fn real_time(data: &[Data]) -> Table {
-    let mut table = Table::new(
-        "real-time",
-        "Faster than the clock",
-        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three \
-         timesteps; and what share of a 1 kHz loop (1 ms per cycle, one step each) the step itself takes. Stepping \
-         only: no messages.",
-        &[
-            "Scene",
-            "Method",
-            "One step",
-            "dt 1 ms",
-            "dt 100 µs",
-            "dt 10 µs",
-            "Share of a 1 kHz loop",
-        ],
-    );
-    for data in data
-        .iter()
-        .filter(|data| SHOWN.contains(&data.scene.name()))
-    {
-        for method in Method::ALL {
-            let Some(step) = data.step_time(method) else {
-                continue;
-            };
-            let factor = |timestep: f64| format!("{}×", number(timestep / step));
-            table.rows.push(vec![
-                Cell::new(data.scene.title()),
-                Cell::method(method),
-                Cell::new(seconds(step)),
-                Cell::new(factor(1e-3)),
-                Cell::new(factor(1e-4)),
-                Cell::new(factor(1e-5)),
-                Cell::new(format!("{} %", number(100.0 * step / 1e-3))),
-            ]);
-        }
     }
     table
 }

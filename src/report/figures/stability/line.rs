@@ -3,7 +3,6 @@
 //! **Invariant:** a limit that was not measured is said to be none, not guessed.
 
 use crate::math::integrator::Method;
-use crate::report::making::Making;
 use crate::study::stability::Sampling;
 
 /// Measured and predicted limits may differ by this part.
@@ -24,19 +23,6 @@ pub(super) struct LimitRow {
 impl LimitRow {
     pub(super) fn ratio(&self) -> Option<f64> {
         Some(self.measured? / self.predicted)
-    }
-}
-
-/// How much of the section is done.
-pub(super) struct Meter {
-    pub(super) done: usize,
-    pub(super) of: usize,
-}
-
-impl Meter {
-    pub(super) fn add(&mut self, making: &mut Making<'_>, work: usize) {
-        self.done += work;
-        making.at(self.done, self.of);
     }
 }
 

@@ -2,13 +2,11 @@
 //!
 //! **Invariant:** every mark is measured, and shares nothing with the line of the prediction.
 
-use super::line::Meter;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::measure::{STEPS, growths, stiffened};
 use crate::report::figures::cells::{centres, edges};
-use crate::report::making::Making;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, seconds};
 use crate::study::linear::Linear;
@@ -35,7 +33,7 @@ pub(super) struct Map {
 }
 
 /// Measures `columns` timesteps at three quarters as many stiffnesses, for every method and kind of control.
-pub(super) fn map(making: &mut Making<'_>, meter: &mut Meter, columns: usize) -> Map {
+pub(super) fn map(columns: usize) -> Map {
     let mut map = Map {
         csv: Csv::new("control,method,dt,gain_factor,growth,predicted_limit"),
         cells: 0,
@@ -47,20 +45,14 @@ pub(super) fn map(making: &mut Making<'_>, meter: &mut Meter, columns: usize) ->
     };
     for sampling in Sampling::ALL {
         for method in Method::ALL {
-            map.measure(making, meter, method, sampling);
+            map.measure(method, sampling);
         }
     }
     map
 }
 
 impl Map {
-    fn measure(
-        &mut self,
-        making: &mut Making<'_>,
-        meter: &mut Meter,
-        method: Method,
-        sampling: Sampling,
-    ) {
+    fn measure(&mut self, method: Method, sampling: Sampling) {
         let (factors, timesteps) = (centres(&self.factors), centres(&self.timesteps));
         let cells = factors.iter().flat_map(|factor| {
             let control = stiffened(*factor).with_method(method);
@@ -82,7 +74,6 @@ impl Map {
                 );
                 Point::new(h, factor, tooltip)
             }));
-            meter.add(making, 1);
         }
         let line = Curve::line(method.name(), predicted);
         self.curves.push(Curve {

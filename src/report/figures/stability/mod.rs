@@ -9,7 +9,7 @@ mod regions;
 mod tables;
 mod words;
 
-use line::{LimitRow, Meter};
+use line::LimitRow;
 use map::map;
 use period::{growth, period_table, periods};
 use regions::regions_figure;
@@ -27,16 +27,9 @@ use crate::study::stability::{Sampling, limits};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let cells = making.choose(48, 16);
-    // Lines of the table count 3 each beside the rows of the maps.
-    let mut meter = Meter {
-        done: 0,
-        of: 3 * 56 + 3 * 12 + 3 * 4 + 8 * cells,
-    };
     let mut lines = Vec::new();
     for (name, gains) in gains_two() {
         lines_of(
-            making,
-            &mut meter,
             &mut lines,
             name,
             &ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8])),
@@ -44,19 +37,17 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
     for (name, gains) in gains_three() {
         lines_of(
-            making,
-            &mut meter,
             &mut lines,
             name,
             &ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8, -0.5])),
         );
     }
-    let map = map(making, &mut meter, cells);
+    let map = map(cells);
     making.keep("stability-map", map.csv.clone());
-    let periods = periods(making, &mut meter);
+    let periods = periods(making);
     let (regions, csv) = regions_figure(&stiffened(1.0));
     making.keep("regions", csv);
-    let growth = growth(making, &mut meter);
+    let growth = growth(making);
     making.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
@@ -99,8 +90,6 @@ fn gains_three() -> [(&'static str, Gains<3>); 3] {
 }
 
 fn lines_of<const N: usize>(
-    making: &mut Making<'_>,
-    meter: &mut Meter,
     lines: &mut Vec<LimitRow>,
     name: &'static str,
     control: &ControlLoop<N>,
@@ -113,7 +102,6 @@ fn lines_of<const N: usize>(
                 Sampling::Held => (limits.held, limits.minimum_held),
                 Sampling::Continuous => (limits.continuous, limits.minimum_continuous),
             };
-            meter.add(making, 3);
             let Some(predicted) = predicted.filter(|limit| *limit > 0.0) else {
                 continue;
             };

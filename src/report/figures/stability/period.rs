@@ -2,7 +2,6 @@
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
-use super::line::Meter;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::growth::growth_per_period;
@@ -23,7 +22,7 @@ const SUBSTEPS: [u32; 3] = [1, 10, 100];
 /// Method, steps per control period, largest stable control period as predicted and as measured.
 pub(super) type Period = (Method, u32, Option<f64>, Option<f64>);
 
-pub(super) fn periods(making: &mut Making<'_>, meter: &mut Meter) -> Vec<Period> {
+pub(super) fn periods(making: &Making<'_>) -> Vec<Period> {
     let linear = Linear::at_setpoint(&stiffened(1.0));
     let mut periods = Vec::new();
     for method in Method::ALL {
@@ -35,7 +34,6 @@ pub(super) fn periods(making: &mut Making<'_>, meter: &mut Meter) -> Vec<Period>
                 .filter(|_| substeps <= making.choose(100, 10))
                 .and_then(|guess| measured_period(&control, guess, substeps, false));
             periods.push((method, substeps, predicted, measured));
-            meter.add(making, 3);
         }
     }
     periods
@@ -78,7 +76,7 @@ pub(super) struct Growth {
 }
 
 /// Curves and dots for every method and number of steps per period.
-pub(super) fn growth(making: &mut Making<'_>, meter: &mut Meter) -> Growth {
+pub(super) fn growth(making: &Making<'_>) -> Growth {
     let mut growth = Growth {
         csv: Csv::new("method,substeps,period,growth_predicted,growth_measured"),
         dots: 0,
@@ -89,7 +87,6 @@ pub(super) fn growth(making: &mut Making<'_>, meter: &mut Meter) -> Growth {
     let dots = making.choose(12, 4);
     for method in Method::ALL {
         growth.panel(method, dots);
-        meter.add(making, 3);
     }
     growth
 }

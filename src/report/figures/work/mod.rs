@@ -14,7 +14,7 @@ mod tables;
 use std::hint::black_box;
 
 use counts::{Counts, Kind, STEPS, read};
-use tables::{steps_table, table};
+use tables::table;
 
 use crate::math::arm::State;
 use crate::math::count::in_f64;
@@ -54,16 +54,12 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     Section {
         findings: findings(&counts),
         verdicts: verdicts(&counts, same_bits),
-        blocks: vec![
-            Block::Figure(figure(&kinds, &counts)),
-            Block::Table(table),
-            Block::Table(steps_table(&kinds, &counts)),
-        ],
+        blocks: vec![Block::Figure(figure(&kinds, &counts)), Block::Table(table)],
         ..Section::default()
     }
 }
 
-fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
+fn time_kinds(making: &Making<'_>) -> Vec<Kind> {
     let effort = making.choose(
         Effort {
             least: 15,
@@ -82,7 +78,6 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
             name,
             timing: time(effort, work),
         });
-        making.at(kinds.len(), 14);
     };
     let two = |gravity, integral, control, method| {
         let ready = ready::<2>(gravity, integral, control, method);

@@ -3,9 +3,8 @@
 //! **Invariant:** what was not counted for this report is called not measured.
 
 use super::cells::{UNMEASURED, percent_saved, unmeasured};
-use super::counts::{Counts, Kind, STEPS};
+use super::counts::{Counts, Kind};
 use super::server;
-use crate::math::count::in_f64;
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, seconds};
 
@@ -175,27 +174,4 @@ fn allocation_row(counts: &Counts) -> Vec<Cell> {
         }),
         Cell::default(),
     ]
-}
-
-pub(super) fn steps_table(kinds: &[Kind], counts: &Counts) -> Table {
-    let mut table = Table::new(
-        "steps",
-        "One step",
-        "Instructions and time of one step of the live arm's simulation, and of the 1-DOF service.",
-        &["Step", "Instructions", "Time", "Middle half of repeats"],
-    );
-    for kind in kinds {
-        let per_step = |time: f64| seconds(time / in_f64(STEPS));
-        let (low, high) = kind.timing.quartiles;
-        table.rows.push(vec![
-            Cell::new(kind.name),
-            counts.get(kind.name).map_or_else(
-                || Cell::new(UNMEASURED).class("soft"),
-                |count| Cell::new(number(count.round())),
-            ),
-            Cell::new(per_step(kind.timing.minimum)),
-            Cell::new(format!("{} to {}", per_step(low), per_step(high))),
-        ]);
-    }
-    table
 }
