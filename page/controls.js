@@ -107,6 +107,8 @@ function startServo() {
   watch("enabled", (on) => {
     button.setAttribute("aria-checked", String(on));
     setText(byId("servo-text"), on ? "Servo on" : "Servo off");
+    byId("gains-off").hidden = on;
+    for (const key of ["kp", "ki", "kd"]) byId(`${key}-fields`).classList.toggle("off", !on);
   });
 }
 

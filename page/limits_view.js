@@ -1,35 +1,30 @@
 // @ts-check
 // The largest stable timestep of each method on its button, and in the Stability panel why it is that.
-// Invariant: nothing stale is shown: while limits are computed, one in each frame, there is none.
+// Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown.
 
 import { byId, el, setText } from "./dom.js";
 import { METHODS } from "./format.js";
-import { onFrame, wake } from "./frames.js";
-import { loopInForce } from "./growth.js";
-import { limitOf } from "./loop.js";
-import { limitText } from "./policy.js";
+import { answerInForce, limitText, limitsOf, question } from "./policy.js";
+import { stability } from "./runtime.js";
 import { state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
-import { limitsKey, whyText } from "./why.js";
-
-/** A setpoint that is dragged changes many times a second; limits are computed once it rests [ms]. */
-const REST_MS = 200;
+import { loopInForce } from "./growth.js";
+import { whyText } from "./why.js";
 
 /** @type {Map<string, HTMLElement>} */
 const labels = new Map();
-/** @type {Record<string, number>} */
-let limits = {};
-let key = "";
-let timer = 0;
-let computes = false;
+/** Answers by method. @type {Record<string, any>} */
+let answers = {};
+let loop = ""; // the question that they answer, without its method
+let busy = false;
+let again = false;
 
 export function startLimits() {
-  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links"]) watch(cause, look);
+  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links", "period", "diagnostics"]) watch(cause, look);
   byId("why").addEventListener("click", () => {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
   });
-  onFrame(compute);
 }
 
 /** Where the limit of `method` is shown. @param {string} method */
@@ -39,36 +34,52 @@ export function limitLabel(method) {
   return label;
 }
 
+/** The limits that are known, by method [s]. @returns {Record<string, number>} */
+export function methodLimits() {
+  return limitsOf(state, answers);
+}
+
 function look() {
-  const now = limitsKey(state);
-  if (now !== key) {
-    key = now;
-    limits = {};
-    computes = false;
-    clearTimeout(timer);
-    timer = setTimeout(() => { computes = true; wake(); }, REST_MS);
+  const asked = question(state);
+  const now = asked ? JSON.stringify({ ...asked, integrator: "" }) : "";
+  if (now !== loop) {
+    loop = now;
+    answers = {};
+  }
+  const own = answerInForce(state);
+  const method = state.integrator?.method;
+  if (own && answers[method] !== own) {
+    answers[method] = own;
+    again = true;
+    askOthers();
   }
   show();
 }
 
-/** One method in a frame: a limit takes some milliseconds. Gives whether more are to come. */
-function compute() {
-  if (!computes) return false;
-  const found = loopInForce(state);
-  const next = METHODS.find(([method]) => !(method in limits));
-  if (!found || !next) {
-    computes = false;
-    return false;
+/** Asks about the other methods, one at a time, each time the study has answered about the present one. */
+async function askOthers() {
+  if (busy) return;
+  busy = true;
+  while (again) {
+    again = false;
+    const mine = loop;
+    for (const [method] of METHODS) {
+      if (method === state.integrator?.method || again || mine !== loop) continue;
+      const answer = await stability({ ...JSON.parse(mine), integrator: method });
+      if (mine !== loop || !answer.result) continue;
+      answers[method] = answer.values;
+      show();
+    }
   }
-  limits[next[0]] = limitOf(found.loop, next[0], true);
-  show();
-  return true;
+  busy = false;
 }
 
 function show() {
+  const limits = methodLimits();
   for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
   const known = METHODS.every(([method]) => method in limits);
-  const why = known ? whyText(state, limits) : "";
+  const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
+  const why = known ? whyText(state, held) : "";
   setText(byId("why-text"), why);
   // It stays while limits are computed anew, so that a click on its way meets it.
   if (known || !loopInForce(state)) byId("why").hidden = why === "";

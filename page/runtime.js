@@ -101,6 +101,8 @@ function connection(now) {
     // It may be another runtime, or the same one started anew: nothing of the old one holds.
     state.setpointKnown = false;
     set("stability", null);
+    state.motion = null;
+    set("lesson", null);
     set("stabilityMissing", false);
     set("goal", null);
     set("trial", null);
@@ -132,6 +134,8 @@ function jointStates(msg) {
     const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
     if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
+    state.motion = null;
+    if (state.stability) askNow(question(state));
     set("goal", null);
     onReset();
   }
@@ -333,8 +337,18 @@ const askNow = latestOnly(async (asked) => {
   const missing = nobodyProvides(answer);
   if (missing !== state.stabilityMissing) set("stabilityMissing", missing);
   state.stabilityAsked = answer.result ? JSON.stringify(asked) : "";
+  keepMotion(answer.result ? answer.values : null);
   set("stability", answer.result ? answer.values : null);
 }, STABILITY_MS);
+
+/** A simulation that runs away is fast because of that: the motion's limit is the one from before. */
+function keepMotion(answer) {
+  if (!answer || state.diagnostics?.state === "diverged" || state.motion?.asked === state.stabilityAsked) return;
+  state.motion = { asked: state.stabilityAsked, limit: answer.timestep_limit_motion ?? Infinity, speed: answer.motion_speed };
+}
+
+/** The study's answer to a question of the page. */
+export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
 
 function askStability() {
   const asked = question(state);

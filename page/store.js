@@ -27,6 +27,7 @@ export const state = {
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   stabilityMissing: false,
+  motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
   estimate: null, // message of /arm_sim/error_estimate
   pushed: false, // whether an effort has acted with the servo off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }

@@ -5,7 +5,7 @@
 import { eigenvalues } from "./eigen.js";
 import { METHODS, duration, fixed, methodName, significant } from "./format.js";
 import { loopInForce } from "./growth.js";
-import { flow, limitOf, multipliers } from "./loop.js";
+import { flow, multipliers } from "./loop.js";
 
 /** @typedef {import("./eigen.js").Complex} Complex */
 /** @typedef {import("./loop.js").Loop} Loop */
@@ -17,18 +17,6 @@ const ALIKE = 1.15;
 const BEYOND = 1.02;
 /** Parts of a half turn beyond which a mode changes its sign at every step. */
 const NEARLY = 0.999;
-
-/** Control held over each step, as it acts on the live arm; null while the loop is not known. @returns {Limits | null} */
-export function methodLimits(/** @type {any} */ state) {
-  const found = loopInForce(state);
-  return found && Object.fromEntries(METHODS.map(([method]) => [method, limitOf(found.loop, method, true)]));
-}
-
-/** All that moves the limits, as a text; equal texts have equal limits. */
-export function limitsKey(/** @type {any} */ state) {
-  const found = loopInForce(state);
-  return found ? JSON.stringify([found.pose, found.free, state.params, found.free ? null : state.gains]) : "";
-}
 
 /** Why the present method bears the timestep that it bears; empty while the loop is not known. */
 export function whyText(/** @type {any} */ state, /** @type {Limits | null} */ limits) {

@@ -116,7 +116,7 @@ class BlowUp(Lesson):
             ratio = number(cells[3][column]) / number(cells[4][column])
             self.assertTrue(factor / 2 < ratio < 2 * factor, f"{ratio} for {factor}")
         for method in range(1, 5):
-            self.assertGreater(self.image("#ladder").count(self.color(f"run{method}")), 40)
+            self.assertGreater(self.image("#ladder").count(self.color(f"method{method}")), 40)
         self.assertIn("costs least", self.page.text("#ladder-text"))
         self.keep("error")
 
