@@ -7,6 +7,7 @@ import { startAim } from "./aim.js";
 import { hasMoved, redrawTrail, startArmView } from "./arm_view.js";
 import { startCompare } from "./compare.js";
 import { startControls } from "./controls.js";
+import { moveCourse, startCourse } from "./course_view.js";
 import { byId } from "./dom.js";
 import { wake } from "./frames.js";
 import { startGoalPanel } from "./goal_panel.js";
@@ -29,6 +30,7 @@ import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
 import { startTrialPanel } from "./trial_panel.js";
+import { startViews } from "./views.js";
 
 /** Plots and the trail change this often [ms], all in one frame; the arm itself moves in every frame. */
 const BEAT_MS = 100;
@@ -64,6 +66,8 @@ startSave();
 startKeyboard();
 startShare();
 startAim(byId("arm"));
+startCourse();
+startViews();
 
 // On a small screen what is not needed at once is folded away.
 if (matchMedia("(max-width: 779px)").matches) {
@@ -105,6 +109,7 @@ function beat() {
     describeArm();
   }
   movePlots();
+  moveCourse();
   redrawTrail();
 }
 

@@ -32,6 +32,7 @@ export const state = {
   pushed: false, // whether an effort has acted with the servo off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
+  view: "course", // or "workbench"
   tab: "plots", // the panel that is shown
   joint: 0, // the joint that keys and the phase plot are about
   lesson: null, // the lesson that was chosen; see `lessons.js`
