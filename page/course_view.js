@@ -45,7 +45,8 @@ const CAPTIONS = {
 };
 
 let at = 0; // the step that is shown
-let began = false; // whether its scene is set
+let began = false; // whether it was started
+let ready = false; // whether its scene is set: what is seen before is of another one
 let guessed = -1;
 let answered = -1;
 let ticked = false;
@@ -102,6 +103,7 @@ function redraw() {
 function rest() {
   turn += 1;
   began = false;
+  ready = false;
   guessed = -1;
   answered = -1;
   ticked = false;
@@ -134,6 +136,9 @@ async function begin() {
   if (mine !== turn) return;
   if (offset) await setState(offset.slice(0, state.links), new Array(state.links).fill(0));
   setText(byId("course-status"), refusals.join(" "));
+  if (mine !== turn) return;
+  ready = true;
+  look();
   announce(`Step ${at + 1}: ${STEPS[at].title}. ${STEPS[at].text}`);
   if (paused) slowMotion(mine);
 }
@@ -319,7 +324,7 @@ function look() {
   if (dial) dial.show();
   for (const button of byId("course-extra").querySelectorAll("[data-method]")) button.setAttribute("aria-pressed", String(button.dataset.method === state.integrator.method));
   showBig();
-  if (!began) return;
+  if (!ready) return;
   const { kind } = verdict(state);
   seen.methods.add(state.integrator.method);
   seen.reached ||= state.goal?.outcome === "reached";

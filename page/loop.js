@@ -110,6 +110,18 @@ export function scaled(gains, factor) {
   return { kp: times(gains.kp), ki: times(gains.ki), kd: times(gains.kd) };
 }
 
+/** Gains are sent with three digits. */
+const ROUNDED = 0.02;
+
+/** By what `gains` are a multiple of `base`; NaN if they are none. @param {Gains | null} gains @param {Gains | null} base */
+export function factorOf(gains, base) {
+  if (!gains || !base || gains.kp.length !== base.kp.length) return NaN;
+  const pairs = /** @type {const} */ (["kp", "ki", "kd"]).flatMap((key) => gains[key].map((one, i) => [one, base[key][i]]));
+  const found = pairs.filter(([, one]) => one > 0).map(([a, b]) => a / b);
+  const isMultiple = found.length > 0 && pairs.every(([a, b]) => (b > 0 ? Math.abs(a / b / found[0] - 1) < ROUNDED : a === 0));
+  return isMultiple ? found[0] : NaN;
+}
+
 /** Where the arm rests: hanging if left to itself, else the setpoint; sagging joints are left to the runtime to say. */
 export function restPose(/** @type {Arm} */ arm, /** @type {Gains} */ gains, /** @type {number[]} */ setpoint) {
   if (!isFree(gains)) return setpoint;

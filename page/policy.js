@@ -77,7 +77,7 @@ export function limitInForce(/** @type {any} */ state) {
   const speed = fast ? before?.speed : answer.motion_speed;
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
-  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: "hanging, small swings", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
+  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
   const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
   const moving = motion < held;
   const inForce = Math.min(held, motion);

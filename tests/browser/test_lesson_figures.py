@@ -88,7 +88,7 @@ class Right(Lesson):
 
         def advised():
             milliseconds = 800 * self.values("/study/stability")["minimum_over_poses_held"]
-            return f"Reset with {float(format(milliseconds, '.3g')):g} ms"
+            return f"Restart at {float(format(milliseconds, '.3g')):g} ms"
 
         self.wait(lambda: offered() == advised(), "the first")
         first = offered()

@@ -48,7 +48,7 @@ class BlowUp(Lesson):
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
         self.runtime.call("/arm_sim/set_integrator", timestep=0.02)
         self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
-        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Begin anew')"
+        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Restart')"
         self.page.until(begin_anew)
         box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
         # 0.2 ms at the present gains.
@@ -60,8 +60,8 @@ class BlowUp(Lesson):
 
     def test_one_button_recovers(self):
         self.diverge()
-        button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Reset with'))?.textContent")
-        self.assertRegex(button, r"^Reset with [\d.]+ ms$")
+        button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Restart at'))?.textContent")
+        self.assertRegex(button, r"^Restart at [\d.]+ ms$")
         self.page.click("#notice button")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")

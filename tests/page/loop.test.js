@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { amplification, limitOf, loopAt, massMatrix, multipliers, noGains, restPose, scaled } from "../../page/loop.js";
+import { amplification, factorOf, limitOf, loopAt, massMatrix, multipliers, noGains, restPose, scaled } from "../../page/loop.js";
 
 const TWO = { gravity: 9.81, masses: [1, 1], lengths: [1, 1] };
 const THREE = { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] };
@@ -71,4 +71,10 @@ test("regions of stability end where the textbooks say", () => {
   }
   assert.ok(amplification("verlet", 0, 1.99) < 1 + 1e-12);
   assert.ok(amplification("verlet", 0, 2.01) > 1.05);
+});
+
+test("gains that are a multiple of others are told, so that the map stays and the dot moves", () => {
+  const base = { kp: [1000, 250], ki: [3000, 0], kd: [110, 22] };
+  assert.ok(Math.abs(factorOf(scaled(base, 2.5), base) - 2.5) < 1e-12);
+  for (const other of [{ ...base, kd: [110, 44] }, { ...base, ki: [3000, 1] }, null]) assert.ok(Number.isNaN(factorOf(other, base)));
 });
