@@ -112,14 +112,14 @@ function modeOf(event) {
   return event.shiftKey ? "setpoint" : /** @type {Mode} */ (chosen.value);
 }
 
-/** Whether a touch is on the tip of the arm. */
-function isOnTip(canvas, { clientX, clientY }) {
+/** Whether a touch is on the end effector. */
+function isOnEnd(canvas, { clientX, clientY }) {
   if (state.links === 0) return false;
   const box = canvas.getBoundingClientRect();
   const { x, y } = toWorld(clientX - box.left, clientY - box.top);
-  const tip = endEffector();
+  const end = endEffector();
   const edge = toWorld(clientX - box.left + FINGER_PX, clientY - box.top).x - x; // the same way in metres
-  return Math.hypot(x - tip.x, y - tip.y) < edge;
+  return Math.hypot(x - end.x, y - end.y) < edge;
 }
 
 export function startAim(canvas) {
@@ -127,13 +127,13 @@ export function startAim(canvas) {
     const box = canvas.getBoundingClientRect();
     return toWorld(event.clientX - box.left, event.clientY - box.top);
   };
-  // A finger that begins on the tip drags it; anywhere else it scrolls the page, and a tap chooses the place.
+  // A finger that begins on the end effector drags it; anywhere else it scrolls the page, and a tap chooses the place.
   let tap = null;
-  canvas.addEventListener("touchstart", (event) => { if (isOnTip(canvas, event.touches[0])) event.preventDefault(); }, { passive: false });
+  canvas.addEventListener("touchstart", (event) => { if (isOnEnd(canvas, event.touches[0])) event.preventDefault(); }, { passive: false });
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || state.links === 0) return;
     tap = null;
-    if (event.pointerType === "touch" && !isOnTip(canvas, event)) {
+    if (event.pointerType === "touch" && !isOnEnd(canvas, event)) {
       tap = event;
       return;
     }

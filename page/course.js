@@ -56,10 +56,10 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the tip of the arm, and the controller takes it there.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, and the controller takes it there.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
-    task: { text: "Drag the tip to a new place, and wait until it arrives.", done: ({ reached }) => reached },
+    task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
     question: {
       text: "What does the controller do between two measurements?", answers: ["It keeps the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
       because: "A computer looks only now and then. In between it cannot know better.",
@@ -149,12 +149,12 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light tips, strong gains, wild numbers. Each picture starts one. Its sentence says what a correct simulation does.",
+    text: "Thirty-nine arms that are hard to simulate: light links, strong gains, wild numbers. Each picture starts one. Its sentence says what a correct simulation does.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes >= SOME_SCENES },
     question: {
-      text: "A tip of one milligram: why are short steps needed?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
+      text: "A last link of one milligram: why are short steps needed?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
       because: "The same gain moves less mass faster, and a fast motion needs a short step.",
     },
   },

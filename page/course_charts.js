@@ -8,7 +8,7 @@ import { colors } from "./theme.js";
 
 /** @typedef {import("./surface.js").Surface} Surface */
 
-const LEFT = 62;
+const LEFT = 78;
 const RIGHT = 16;
 const TOP = 16;
 const BOTTOM = 40;
@@ -21,7 +21,7 @@ export const FACTORS = new LogScale(0.25, 4);
 const ERRORS = new LogScale(1e-10, 1);
 
 /** A bar for each control step; those that point down are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
-export function drawBars(surface, bars) {
+export function drawBars(surface, bars, across = "look of the controller") {
   const { context, width, height } = surface;
   surface.clear();
   const largest = Math.max(...bars.map(Math.abs));
@@ -45,7 +45,7 @@ export function drawBars(surface, bars) {
     context.textAlign = "center";
     if (k % 2 === 0) context.fillText(String(k + 1), LEFT + (k + 0.5) * room, height - BOTTOM + 12);
   });
-  axisTitles(context, width, height, "look of the controller", "speed of the last joint [rad/s]");
+  axisTitles(context, width, height, across, "speed of the last joint [rad/s]");
 }
 
 /** What the method costs and what waiting costs, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */

@@ -8,7 +8,6 @@ import { answerInForce, limitText, limitsOf, question } from "./policy.js";
 import { stability } from "./runtime.js";
 import { state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
-import { loopInForce } from "./growth.js";
 import { whyText } from "./why.js";
 
 /** @type {Map<string, HTMLElement>} */
@@ -79,8 +78,8 @@ function show() {
   for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
   const known = METHODS.every(([method]) => method in limits);
   const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
-  const why = known ? whyText(state, held) : "";
+  const why = known ? whyText(state, answerInForce(state), held) : "";
   setText(byId("why-text"), why);
   // It stays while limits are computed anew, so that a click on its way meets it.
-  if (known || !loopInForce(state)) byId("why").hidden = why === "";
+  if (known || !question(state)) byId("why").hidden = why === "";
 }

@@ -8,14 +8,14 @@ import { byId, setText } from "./dom.js";
 import { duration, methodName } from "./format.js";
 import { onFrame, wake } from "./frames.js";
 import { answerInForce } from "./policy.js";
-import { factorOf, limitOf, loopAt, scaled } from "./loop.js";
-import { setGains, setIntegrator } from "./runtime.js";
+import { factorOf, scaled } from "./gains.js";
+import { setGains, setIntegrator, stability } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
-const ROWS = 33; // gains whose limits are found, the present ones in the middle
+const ROWS = 17; // gains whose limits are found, the present ones in the middle
 const LEFT = 46;
 const RIGHT = 10;
 const TOP = 8;
@@ -30,7 +30,6 @@ const timesteps = new LogScale(1e-4, 0.1);
 let surface;
 let asked = ""; // the settings that `rows` are about
 let rows = []; // { held, continuous } [s] for each factor, as far as they are known
-let loops = null;
 /** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
 let anchor = null;
 let stale = true;
@@ -59,39 +58,39 @@ function settings() {
   return { method: integrator.method, gains: anchor, params, pose };
 }
 
-/** One more row of limits at a time, so that no frame takes long; gives whether rows are missing. */
-function goOn() {
+/** Asks the study for the border, a row at a time; a new question ends the old one. */
+async function ask() {
   const present = settings();
-  if (!present) return false;
+  if (!present) return;
   const key = JSON.stringify(present);
-  if (key !== asked) {
-    asked = key;
-    rows = [];
-    loops = present;
-  }
-  if (rows.length >= ROWS) return false;
-  const began = performance.now();
-  do {
+  if (key === asked) return;
+  asked = key;
+  rows = [];
+  const { params, method: integrator, pose: setpoint } = present;
+  while (rows.length < ROWS) {
     const factor = factors.value(rows.length / (ROWS - 1));
-    const loop = loopAt(loops.params, scaled(loops.gains, factor), loops.pose);
-    rows.push({ factor, held: limitOf(loop, loops.method, true), continuous: limitOf(loop, loops.method, false) });
-  } while (rows.length < ROWS && performance.now() - began < 8);
-  stale = true;
-  return rows.length < ROWS;
+    const { result, values } = await stability({ params, integrator, setpoint, gains: scaled(present.gains, factor), control_period: 0 });
+    if (asked !== key) return;
+    if (!result) {
+      asked = ""; // asked again at the next news
+      return;
+    }
+    rows.push({ factor, held: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
+    redraw();
+  }
 }
 
 function draw() {
   if (!stale || state.tab !== "stability" || surface.width === 0) return false;
   stale = false;
-  const more = goOn();
+  ask();
   const { context, width, height } = surface;
   surface.clear();
   drawFrame(context, width, height);
   if (rows.length > 1) drawBoundaries(context, width, height);
   drawPoint(context);
   describe();
-  stale = more;
-  return more;
+  return false;
 }
 
 function x(timestep) {

@@ -3,9 +3,9 @@
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 
 import { duration, fixed, significant } from "./format.js";
-import { isFree, noGains } from "./loop.js";
+import { isFree, noGains } from "./gains.js";
 
-/** @typedef {import("./loop.js").Gains} Gains */
+/** @typedef {import("./gains.js").Gains} Gains */
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
 /**
  * @typedef {object} Verdict
