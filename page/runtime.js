@@ -351,6 +351,8 @@ const askNow = latestOnly(async (asked) => {
 /** A simulation that runs away is fast because of that: the motion's limit is the one from before. */
 function keepMotion(answer) {
   if (!answer || state.diagnostics?.state === "diverged" || state.motion?.asked === state.stabilityAsked) return;
+  // Under a controller that shakes, the motion is the shaking's from the first answer on.
+  if (state.enabled && state.integrator.timestep > (answer.timestep_limit_held ?? Infinity)) return;
   state.motion = { asked: state.stabilityAsked, limit: answer.timestep_limit_motion ?? Infinity, speed: answer.motion_speed };
 }
 
