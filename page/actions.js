@@ -72,15 +72,20 @@ export async function startLesson(lesson) {
 }
 
 async function begin(lesson) {
+  const refusals = await setScene(lesson.settings(state.links), false);
+  announce(`${lesson.name}. ${lesson.text}`);
+  return refusals;
+}
+
+/** Sets all of the settings, from the starting pose, then running or paused; gives the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
+export async function setScene({ servo, setpoint, ...rest }, paused) {
   goLive();
-  const { servo, setpoint, ...rest } = lesson.settings(state.links);
   await enable(false);
   const refusals = await apply({ ...rest, servo: null, setpoint: null });
   const answer = await reset();
   // A reset takes the setpoint to the starting pose, so it is sent after it.
   refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, servo, setpoint }));
-  if (state.paused) await pause(false);
-  announce(`${lesson.name}. ${lesson.text}`);
+  if (state.paused !== paused) await pause(paused);
   return answer.result ? refusals : [...refusals, answer.status];
 }
 

@@ -16,6 +16,10 @@ const INTERVAL_MS = 100;
 /** Between two requests a lifted arm falls: in so short a time by a few millimetres [ms]. */
 const LIFT_MS = 20;
 const ARROW_M = 0.05;
+/** A finger covers this much around its middle. */
+const FINGER_PX = 36;
+/** A finger that moved less has tapped. */
+const TAP_PX = 10;
 /** After the last arrow key the place counts as chosen. */
 const SETTLE_MS = 600;
 
@@ -108,19 +112,45 @@ function modeOf(event) {
   return event.shiftKey ? "setpoint" : /** @type {Mode} */ (chosen.value);
 }
 
+/** Whether a touch is on the end effector. */
+function isOnEnd(canvas, { clientX, clientY }) {
+  if (state.links === 0) return false;
+  const box = canvas.getBoundingClientRect();
+  const { x, y } = toWorld(clientX - box.left, clientY - box.top);
+  const end = endEffector();
+  const edge = toWorld(clientX - box.left + FINGER_PX, clientY - box.top).x - x; // the same way in metres
+  return Math.hypot(x - end.x, y - end.y) < edge;
+}
+
 export function startAim(canvas) {
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
     return toWorld(event.clientX - box.left, event.clientY - box.top);
   };
+  // A finger that begins on the end effector drags it; anywhere else it scrolls the page, and a tap chooses the place.
+  let tap = null;
+  canvas.addEventListener("touchstart", (event) => { if (isOnEnd(canvas, event.touches[0])) event.preventDefault(); }, { passive: false });
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || state.links === 0) return;
+    tap = null;
+    if (event.pointerType === "touch" && !isOnEnd(canvas, event)) {
+      tap = event;
+      return;
+    }
     pointer = event.pointerId;
     canvas.setPointerCapture(pointer);
     moveTo(place(event), modeOf(event));
   });
   canvas.addEventListener("pointermove", (event) => {
     if (event.pointerId === pointer) moveTo(place(event), event.shiftKey ? "setpoint" : aim.mode);
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    if (!tap || tap.pointerId !== event.pointerId) return;
+    const still = Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX;
+    tap = null;
+    if (!still) return;
+    moveTo(place(event), modeOf(event));
+    end();
   });
   canvas.addEventListener("pointerup", (event) => { if (event.pointerId === pointer) end(); });
   canvas.addEventListener("pointercancel", (event) => { if (event.pointerId === pointer) end(); });

@@ -107,6 +107,8 @@ function startServo() {
   watch("enabled", (on) => {
     button.setAttribute("aria-checked", String(on));
     setText(byId("servo-text"), on ? "Servo on" : "Servo off");
+    byId("gains-off").hidden = on;
+    for (const key of ["kp", "ki", "kd"]) byId(`${key}-fields`).classList.toggle("off", !on);
   });
 }
 
@@ -193,8 +195,8 @@ function makeJointFields(links) {
   const gain = (key, unit, high, name) => ({ key, unit, low: high / 1e4, high, log: true, zero: true, name });
   fill("masses-fields", links, masses, "params", setParams);
   fill("lengths-fields", links, lengths, "params", setParams);
-  fill("kp-fields", links, gain("kp", "N m/rad", 10000, "proportional gain"), "gains", setGains);
-  fill("ki-fields", links, gain("ki", "N m/(rad s)", 20000, "integral gain"), "gains", setGains);
+  fill("kp-fields", links, gain("kp", "N m/rad", 20000, "proportional gain"), "gains", setGains);
+  fill("ki-fields", links, gain("ki", "N m/(rad s)", 50000, "integral gain"), "gains", setGains);
   fill("kd-fields", links, gain("kd", "N m s/rad", 1000, "derivative gain"), "gains", setGains);
   fillSetpoint(links);
   makeJointChoice(links);

@@ -2,15 +2,12 @@
 // Error against run time: which runs to ask for, and what their answers say.
 // Invariant: a run without an error is told apart from one that diverged; neither becomes a number.
 
-import { METHODS, significant } from "./format.js";
+import { METHODS, duration, significant } from "./format.js";
 
 /** Timesteps, from long to short, each half of the one before [s]. */
 export const TIMESTEPS = Array.from({ length: 8 }, (_, k) => 0.032 / 2 ** k);
 
-/**
- * @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung
- * `error` is the cost of the method, `sampling` that of a control law that runs once a step [rad]
- */
+/** @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */
 
 /** All runs, the cheapest first, so that the picture grows evenly. @returns {{method: string, timestep: number}[]} */
 export function rungs() {
@@ -19,18 +16,18 @@ export function rungs() {
 
 /**
  * @param {{method: string, timestep: number}} rung
- * @param {{times: number[], error: number | null, error_uncertainty?: number | null, sampling_error?: number | null, wall_time: number, evaluations: number}} values
- * @param {number} duration that was asked for [s]
+ * @param {{times: number[], error: number | null, sampling_error?: number | null, error_uncertainty?: number | null, wall_time: number, evaluations: number}} values
+ * @param {number} seconds that were asked for
  * @returns {Rung}
  */
-export function read({ method, timestep }, values, duration) {
-  const divergedAt = endOf(values.times, duration, timestep);
-  const finite = (/** @type {number | null | undefined} */ value) => (divergedAt === null && Number.isFinite(value) ? /** @type {number} */ (value) : null);
+export function read({ method, timestep }, values, seconds) {
+  const divergedAt = endOf(values.times, seconds, timestep);
+  const isWhole = divergedAt === null;
   return {
     method,
     timestep,
-    error: finite(values.error),
-    sampling: finite(values.sampling_error),
+    error: isWhole && Number.isFinite(values.error) ? values.error : null,
+    sampling: isWhole && Number.isFinite(values.sampling_error) ? /** @type {number} */ (values.sampling_error) : null,
     uncertainty: Number.isFinite(values.error_uncertainty) ? /** @type {number} */ (values.error_uncertainty) : null,
     wall: values.wall_time,
     evaluations: values.evaluations,
@@ -43,12 +40,30 @@ const CLEAR = 4;
 /** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
 const FOLLOWED = 1e-3;
 
-/** A run's row in the table. @param {Rung} rung */
-export function errorText({ error, uncertainty, divergedAt }) {
+/** A run's cell in the table: what the method costs, and with a controller what its waiting costs. @param {Rung} rung */
+export function errorText({ error, sampling, uncertainty, divergedAt }) {
   if (divergedAt !== null) return `diverged at ${significant(divergedAt, 3)} s`;
-  if (error !== null) return significant(error, 2);
+  if (error !== null) return `${significant(error, 2)}${sampling === null ? "" : ` + ${significant(sampling, 2)}`}`;
   if (uncertainty === null) return "no figure";
   return uncertainty < FOLLOWED ? `< ${significant(CLEAR * uncertainty, 1)}` : "too wild to follow";
+}
+
+/** What the whole run costs: of the two errors that are known, the larger [rad]; null if none is. @param {Rung} rung */
+export function total({ error, sampling }) {
+  return error == null && sampling == null ? null : Math.max(error ?? 0, sampling ?? 0);
+}
+
+/** The one move that is measured, so that two measurements compare: out of rest, stretched out. @type {Record<number, number[]>} */
+export const MOVE_TO = { 2: [0.9, -1.3], 3: [0.9, -1.3, 0.8] };
+
+/** The move in words, with the settings that its result depends on. */
+export function stamp(/** @type {any} */ { links, enabled, params, gains, period }, /** @type {number} */ seconds) {
+  const list = (/** @type {number[]} */ values) => values.map((one) => significant(one, 3)).join(", ");
+  const arm = `masses ${list(params.masses)} kg, lengths ${list(params.lengths)} m, gravity ${significant(params.gravity, 3)} m/s²`;
+  const start = `${seconds} s from rest, stretched out`;
+  if (!enabled) return `Free swing, ${start}; ${arm}.`;
+  const clock = period?.period > 0 ? `every ${duration(period.period)}` : "at every step";
+  return `Move to (${list(MOVE_TO[links])}) rad, ${start}; controller ${clock}, kp ${list(gains.kp)}, ki ${list(gains.ki)}, kd ${list(gains.kd)}; ${arm}.`;
 }
 
 /** How far the reference itself may be off [rad]; null if no run says. @param {Rung[]} rungs */
@@ -65,7 +80,7 @@ export function endOf(times, duration, timestep) {
 
 /** For each method the cheapest run that is as good as `wanted` [rad]. @param {Rung[]} rungs @param {number} wanted */
 export function cheapest(rungs, wanted) {
-  const good = rungs.filter(({ error }) => error !== null && error <= wanted);
+  const good = rungs.filter((one) => (total(one) ?? Infinity) <= wanted);
   return METHODS.flatMap(([method]) => {
     const own = good.filter((one) => one.method === method).sort((a, b) => a.wall - b.wall);
     return own.length > 0 ? [own[0]] : [];

@@ -3,7 +3,7 @@
 // Invariant: a lesson is data; whoever starts it applies its settings, resets the arm, and shows its panel.
 
 import { DEFAULTS } from "./settings.js";
-import { scaled } from "./loop.js";
+import { scaled } from "./gains.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
 /**

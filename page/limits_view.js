@@ -1,29 +1,25 @@
 // @ts-check
 // The largest stable timestep of each method on its button, and in the Stability panel why it is that.
-// Invariant: a button has the limit that the verdict would have with its method; while an answer is on its way there is none.
+// Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown.
 
 import { byId, el, setText } from "./dom.js";
 import { METHODS } from "./format.js";
-import { loopInForce } from "./growth.js";
-import { limitText, question, smallest } from "./policy.js";
-import { stabilityOf } from "./runtime.js";
+import { answerInForce, limitText, limitsOf, question } from "./policy.js";
+import { stability } from "./runtime.js";
 import { state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
 import { whyText } from "./why.js";
 
-/** A setpoint that is dragged changes many times a second; limits are asked for once it rests [ms]. */
-const REST_MS = 200;
-
 /** @type {Map<string, HTMLElement>} */
 const labels = new Map();
-/** The study's answer for each method. @type {Record<string, any>} */
+/** Answers by method. @type {Record<string, any>} */
 let answers = {};
-let key = "";
-let timer = 0;
+let loop = ""; // the question that they answer, without its method
+let busy = false;
+let again = false;
 
 export function startLimits() {
-  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links", "period"]) watch(cause, look);
-  watch("diagnostics", show);
+  for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links", "period", "diagnostics"]) watch(cause, look);
   byId("why").addEventListener("click", () => {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
@@ -37,42 +33,53 @@ export function limitLabel(method) {
   return label;
 }
 
+/** The limits that are known, by method [s]. @returns {Record<string, number>} */
+export function methodLimits() {
+  return limitsOf(state, answers);
+}
+
 function look() {
-  // The answer for the method in force comes anew when the motion has changed: the others are asked for again then.
-  const { integrator: _, ...asked } = question(state) ?? {};
-  const now = state.stability ? JSON.stringify([asked, state.stability.timestep_limit_motion]) : "";
-  if (now !== key) {
-    key = now;
-    clearTimeout(timer);
-    if (now === "") answers = {};
-    else timer = setTimeout(ask, REST_MS);
+  const asked = question(state);
+  const now = asked ? JSON.stringify({ ...asked, integrator: "" }) : "";
+  if (now !== loop) {
+    loop = now;
+    answers = {};
+  }
+  const own = answerInForce(state);
+  const method = state.integrator?.method;
+  if (own && answers[method] !== own) {
+    answers[method] = own;
+    again = true;
+    askOthers();
   }
   show();
 }
 
-async function ask() {
-  const mine = key;
-  /** @type {Record<string, any>} */
-  const found = {};
-  for (const [method] of METHODS) {
-    found[method] = await stabilityOf(method);
-    if (mine !== key) return;
+/** Asks about the other methods, one at a time, each time the study has answered about the present one. */
+async function askOthers() {
+  if (busy) return;
+  busy = true;
+  while (again) {
+    again = false;
+    const mine = loop;
+    for (const [method] of METHODS) {
+      if (method === state.integrator?.method || again || mine !== loop) continue;
+      const answer = await stability({ ...JSON.parse(mine), integrator: method });
+      if (mine !== loop || !answer.result) continue;
+      answers[method] = answer.values;
+      show();
+    }
   }
-  answers = found;
-  show();
+  busy = false;
 }
 
 function show() {
-  /** @param {string} method */
-  const of = (method) => (state.stability && method === state.integrator?.method ? state.stability : answers[method]);
-  for (const [method, label] of labels) {
-    const answer = of(method);
-    setText(label, limitText(answer ? smallest(state, answer).limit : NaN));
-  }
-  const known = METHODS.every(([method]) => of(method));
-  const held = Object.fromEntries(METHODS.map(([method]) => [method, known ? smallest(state, of(method)).held : NaN]));
-  const why = known ? whyText(state, held) : "";
+  const limits = methodLimits();
+  for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
+  const known = METHODS.every(([method]) => method in limits);
+  const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
+  const why = known ? whyText(state, answerInForce(state), held) : "";
   setText(byId("why-text"), why);
-  // It stays while limits are asked for anew, so that a click on its way meets it.
-  if (known || !loopInForce(state)) byId("why").hidden = why === "";
+  // It stays while limits are computed anew, so that a click on its way meets it.
+  if (known || !question(state)) byId("why").hidden = why === "";
 }

@@ -7,6 +7,7 @@ import { startAim } from "./aim.js";
 import { hasMoved, redrawTrail, startArmView } from "./arm_view.js";
 import { startCompare } from "./compare.js";
 import { startControls } from "./controls.js";
+import { moveCourse, startCourse } from "./course_view.js";
 import { byId } from "./dom.js";
 import { wake } from "./frames.js";
 import { startGoalPanel } from "./goal_panel.js";
@@ -16,7 +17,6 @@ import { startLadder } from "./ladder_panel.js";
 import { startLessons } from "./lessons_panel.js";
 import { startLimits } from "./limits_view.js";
 import { startMap } from "./map_view.js";
-import { startModes } from "./modes_view.js";
 import { follow, goLive } from "./playback.js";
 import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
@@ -24,11 +24,13 @@ import { record, take } from "./history.js";
 import { start } from "./runtime.js";
 import { startSave } from "./save.js";
 import { startShare } from "./share.js";
+import { startSteps } from "./steps_view.js";
 import { watch, watchAll } from "./store.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
 import { startTrialPanel } from "./trial_panel.js";
+import { startViews } from "./views.js";
 
 /** Plots and the trail change this often [ms], all in one frame; the arm itself moves in every frame. */
 const BEAT_MS = 100;
@@ -54,7 +56,7 @@ startGoalPanel();
 startTrialPanel();
 startMap();
 startLimits();
-startModes();
+startSteps();
 startLadder();
 startCompare();
 startHistory();
@@ -64,6 +66,8 @@ startSave();
 startKeyboard();
 startShare();
 startAim(byId("arm"));
+startCourse();
+startViews();
 
 // On a small screen what is not needed at once is folded away.
 if (matchMedia("(max-width: 779px)").matches) {
@@ -105,6 +109,7 @@ function beat() {
     describeArm();
   }
   movePlots();
+  moveCourse();
   redrawTrail();
 }
 

@@ -8,14 +8,14 @@ import { byId, setText } from "./dom.js";
 import { duration, methodName } from "./format.js";
 import { onFrame, wake } from "./frames.js";
 import { answerInForce } from "./policy.js";
-import { limitOf, loopAt, scaled } from "./loop.js";
-import { setGains, setIntegrator } from "./runtime.js";
+import { factorOf, scaled } from "./gains.js";
+import { setGains, setIntegrator, stability } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
-const ROWS = 33; // gains whose limits are found, the present ones in the middle
+const ROWS = 17; // gains whose limits are found, the present ones in the middle
 const LEFT = 46;
 const RIGHT = 10;
 const TOP = 8;
@@ -30,7 +30,8 @@ const timesteps = new LogScale(1e-4, 0.1);
 let surface;
 let asked = ""; // the settings that `rows` are about
 let rows = []; // { held, continuous } [s] for each factor, as far as they are known
-let loops = null;
+/** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
+let anchor = null;
 let stale = true;
 
 export function startMap() {
@@ -53,42 +54,43 @@ function settings() {
   const { integrator, gains, params, setpoint, links } = state;
   if (!integrator || !gains || !params || gains.kp.length !== links || params.masses.length !== links) return null;
   const pose = (state.enabled && answerInForce(state)?.equilibrium) || Array.from(setpoint.subarray(0, links));
-  return { method: integrator.method, gains, params, pose };
+  if (!(factorOf(gains, anchor) > 0)) anchor = gains;
+  return { method: integrator.method, gains: anchor, params, pose };
 }
 
-/** One more row of limits at a time, so that no frame takes long; gives whether rows are missing. */
-function goOn() {
+/** Asks the study for the border, a row at a time; a new question ends the old one. */
+async function ask() {
   const present = settings();
-  if (!present) return false;
+  if (!present) return;
   const key = JSON.stringify(present);
-  if (key !== asked) {
-    asked = key;
-    rows = [];
-    loops = present;
-  }
-  if (rows.length >= ROWS) return false;
-  const began = performance.now();
-  do {
+  if (key === asked) return;
+  asked = key;
+  rows = [];
+  const { params, method: integrator, pose: setpoint } = present;
+  while (rows.length < ROWS) {
     const factor = factors.value(rows.length / (ROWS - 1));
-    const loop = loopAt(loops.params, scaled(loops.gains, factor), loops.pose);
-    rows.push({ factor, held: limitOf(loop, loops.method, true), continuous: limitOf(loop, loops.method, false) });
-  } while (rows.length < ROWS && performance.now() - began < 8);
-  stale = true;
-  return rows.length < ROWS;
+    const { result, values } = await stability({ params, integrator, setpoint, gains: scaled(present.gains, factor), control_period: 0 });
+    if (asked !== key) return;
+    if (!result) {
+      asked = ""; // asked again at the next news
+      return;
+    }
+    rows.push({ factor, held: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
+    redraw();
+  }
 }
 
 function draw() {
   if (!stale || state.tab !== "stability" || surface.width === 0) return false;
   stale = false;
-  const more = goOn();
+  ask();
   const { context, width, height } = surface;
   surface.clear();
   drawFrame(context, width, height);
   if (rows.length > 1) drawBoundaries(context, width, height);
   drawPoint(context);
   describe();
-  stale = more;
-  return more;
+  return false;
 }
 
 function x(timestep) {
@@ -148,19 +150,20 @@ function drawBoundaries(context, width, height) {
 }
 
 function drawPoint(context) {
-  if (!state.integrator) return;
+  if (!state.integrator || !state.gains) return;
   const { timestep } = state.integrator;
+  const factor = factorOf(state.gains, anchor);
   context.fillStyle = colors.accent;
   context.strokeStyle = colors.panel;
   context.lineWidth = 2;
   context.beginPath();
-  context.arc(x(within(timestep)), y(1), 6, 0, 2 * Math.PI);
+  context.arc(x(within(timestep)), y(factor > 0 ? factor : 1), 6, 0, 2 * Math.PI);
   context.fill();
   context.stroke();
 }
 
 function describe() {
-  const row = rows[(ROWS - 1) / 2];
+  const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
   if (!row || !state.integrator) return;
   const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
@@ -169,7 +172,7 @@ function describe() {
 }
 
 function goTo(left, top) {
-  if (!state.integrator || !state.gains) return;
+  if (!state.integrator || !state.gains || !anchor) return;
   const place = (left - LEFT) / (surface.width - LEFT - RIGHT);
   const rise = (surface.height - BOTTOM - top) / (surface.height - TOP - BOTTOM);
   if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
@@ -179,9 +182,9 @@ function goTo(left, top) {
 /** An arm that has diverged begins anew there: it could not be seen otherwise whether the place is a better one. */
 async function move(timestep, factor) {
   const short = (value) => Number(value.toPrecision(3));
-  const gains = scaled(state.gains, factor);
+  const gains = scaled(anchor, factor);
   const changes = [];
-  if (Math.abs(Math.log(factor)) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
+  if (Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
   if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
   await Promise.all(changes);
   if (state.diagnostics?.state === "diverged") beginAnew();
@@ -189,7 +192,8 @@ async function move(timestep, factor) {
 
 function arrows(event) {
   const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
-  if (!step || !state.integrator || !state.gains) return;
+  if (!step || !state.integrator || !state.gains || !anchor) return;
   event.preventDefault();
-  move(within(state.integrator.timestep * step[0]), step[1]);
+  const factor = factorOf(state.gains, anchor) * step[1];
+  move(within(state.integrator.timestep * step[0]), Math.min(WIDEST, Math.max(1 / WIDEST, factor)));
 }

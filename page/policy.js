@@ -3,9 +3,9 @@
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 
 import { duration, fixed, significant } from "./format.js";
-import { isFree, noGains } from "./loop.js";
+import { isFree, noGains } from "./gains.js";
 
-/** @typedef {import("./loop.js").Gains} Gains */
+/** @typedef {import("./gains.js").Gains} Gains */
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
 /**
  * @typedef {object} Verdict
@@ -20,6 +20,10 @@ import { isFree, noGains } from "./loop.js";
 
 /** Share of a limit that is advised, as the runtime does. */
 const SHARE = 0.8;
+/** Share of a timestep that is advised where the arm diverged below every limit that is known. */
+const AFTER_DIVERGENCE = 0.5;
+/** A free swing that takes longer to double its energy loses its sense for other reasons first [s]. */
+const SLOW_GROWTH = 600;
 
 /** The question whose answer is about the loop in force: with the servo off that is the arm left to itself. */
 export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
@@ -78,22 +82,54 @@ export function limitInForce(/** @type {any} */ state) {
     const told = state.stabilityMissing ? state.diagnostics?.timestep_limit ?? NaN : NaN;
     return { limit: told, where: free ? "left to itself" : "at the setpoint", everyPose: NaN, advised: NaN };
   }
+  const diverged = state.diagnostics?.state === "diverged";
+  const held = free && doublingTime(state, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
+  const fast = diverged || state.integrator?.timestep > held;
+  const before = state.motion?.asked === state.stabilityAsked ? state.motion : null;
+  // An arm that has diverged, or shakes, is fast because of that: its motion before that counts.
+  const motion = fast ? before?.limit ?? Infinity : open(answer.timestep_limit_motion);
+  const speed = fast ? before?.speed : answer.motion_speed;
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
-  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: "hanging, small swings", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
+  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
   const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
-  const { held, limit: inForce, moving } = smallest(state, answer);
-  const diverged = state.diagnostics?.state === "diverged";
-  const speed = diverged ? "moving as it did before" : `moving at ${significant(answer.motion_speed ?? NaN, 3)} rad/s`;
-  const ofFree = moving ? (diverged ? SHARE * inForce : answer.advised_timestep ?? NaN) : SHARE * held;
-  const advised = free ? ofFree : Math.min(afterReset(answer), diverged && moving ? SHARE * inForce : Infinity);
+  const moving = motion < held;
+  const inForce = Math.min(held, motion);
+  const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
   return {
     limit: inForce,
-    where: moving ? speed : place,
+    where: moving ? `moving at ${significant(speed ?? NaN, 3)} rad/s` : place,
     everyPose: free ? inForce : Math.min(inForce, open(answer.minimum_over_poses_held)),
-    // The arm has just diverged at this timestep: nothing as long is advised.
-    advised: diverged && !(advised < state.integrator?.timestep) ? NaN : advised,
+    // Never the timestep at which the arm has just diverged.
+    advised: diverged ? Math.min(usual, AFTER_DIVERGENCE * state.integrator.timestep) : usual,
   };
+}
+
+/** The timestep's limit at the control period in force. Where the period itself is too long no timestep helps, and the limit of a law at every step stays. */
+function heldLimit(/** @type {any} */ state, /** @type {any} */ answer) {
+  const own = open(answer.timestep_limit);
+  return state.period?.period > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
+}
+
+/** The limits of all methods for the loop in force, of answers by method: the smaller of pose and motion [s]. @param {any} state @param {Record<string, any>} answers */
+export function limitsOf(state, answers) {
+  return Object.fromEntries(Object.entries(answers).map(([method, answer]) => {
+    const integrator = { ...state.integrator, method };
+    const asked = JSON.stringify(question({ ...state, integrator }));
+    const motion = state.motion && state.motion.asked === state.stabilityAsked && method === state.integrator?.method ? { ...state.motion, asked } : null;
+    return [method, limitInForce({ ...state, integrator, stability: answer, stabilityAsked: asked, motion }).limit];
+  }));
+}
+
+/**
+ * By when Euler or midpoint double the energy of the fastest small free swing [s]; 0 for other methods and other loops.
+ * A step multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its angular frequency.
+ */
+export function doublingTime(/** @type {any} */ state, /** @type {any} */ answer) {
+  const { method, timestep } = state.integrator ?? {};
+  if (answer?.timestep_limit_held !== 0 || !answer.critical || !["euler", "midpoint"].includes(method)) return 0;
+  const z = timestep * 2 * Math.PI * answer.critical.frequency;
+  return (Math.LN2 * timestep) / Math.log1p(method === "euler" ? z * z : z ** 4 / 4);
 }
 
 /**
@@ -148,7 +184,8 @@ export function verdict(/** @type {any} */ state) {
   const above = excess(at, longest, limit, where);
   if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
   if (state.diagnostics?.state === "diverged") {
-    return { kind: "diverged", pill: "diverged", sentence: above, ...known };
+    const sentence = above || (limit > 0 ? `${at} was too long for this motion.` : "");
+    return { kind: "diverged", pill: "diverged", sentence, ...known };
   }
   if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
   if (longest > limit) {
@@ -177,6 +214,7 @@ export function adviceText(/** @type {any} */ state) {
   if (limit === 0) return `No timestep is stable, ${where}.`;
   const elsewhere = everyPose < limit ? `; in every pose ${everyPose > 0 ? `up to ${duration(everyPose)}` : "none is"}` : "";
   const advice = advised > 0 && advised < Infinity ? ` Advised: ${duration(advised)}.` : "";
+  if (state.diagnostics?.state === "diverged" && state.integrator.timestep <= limit) return `It diverged at ${duration(state.integrator.timestep)}.${advice}`;
   return `Stable up to ${limitText(limit)}, ${where}${elsewhere}.${advice}`;
 }
 

@@ -5,9 +5,8 @@
 import { byId, setAttribute, setText } from "./dom.js";
 import { duration, fixed, shortName, significant } from "./format.js";
 import { endEffector } from "./arm_view.js";
-import { growthOf } from "./growth.js";
 import { shown } from "./playback.js";
-import { adviceText, answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { adviceText, answerInForce, doublingTime, limitInForce, limitText, verdict, worstText } from "./policy.js";
 import { isStill } from "./runtime.js";
 import { Median } from "./smooth.js";
 import { state, watch } from "./store.js";
@@ -76,7 +75,7 @@ function showLimit() {
     || (said.kind === "unknown" && !state.stabilityMissing); // the answer is on its way
   pill.className = `state ${said.kind}`;
   setText(pill, said.pill);
-  setText(byId("verdict"), said.kind === "never" ? `${said.sentence} ${growthOf(state)}` : said.sentence);
+  setText(byId("verdict"), said.kind === "never" ? `${said.sentence} ${growthText()}` : said.sentence);
   const bad = said.kind === "beyond" || said.kind === "never" || said.kind === "diverged";
   setText(byId("out-limit"), state.stabilityMissing && Number.isNaN(limit) ? "not offered" : limitText(limit));
   byId("out-limit").title = said.where;
@@ -87,6 +86,12 @@ function showLimit() {
   setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "proven" : "bounded" : "found");
   byId("out-every").classList.toggle("warn", said.kind === "here");
   setText(byId("limit-text"), adviceText(state));
+}
+
+/** How fast a small free swing gains energy. */
+function growthText() {
+  const seconds = doublingTime(state, answerInForce(state));
+  return seconds > 0 ? `The energy of a small swing doubles every ${significant(seconds, 2)} s.` : "";
 }
 
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */

@@ -104,6 +104,8 @@ function connection(now) {
     // It may be another runtime, or the same one started anew: nothing of the old one holds.
     state.setpointKnown = false;
     set("stability", null);
+    state.motion = null;
+    set("lesson", null);
     set("stabilityMissing", false);
     set("goal", null);
     set("trial", null);
@@ -136,6 +138,8 @@ function jointStates(msg) {
     const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
     if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
+    state.motion = null;
+    if (state.stability) askNow(question(state));
     set("goal", null);
     onReset();
   }
@@ -299,9 +303,16 @@ export async function reset() {
   return answer;
 }
 
-/** Puts the arm into another pose [rad] with these rates [rad/s], running or paused. It is no setting, so there is nothing to undo. */
-export async function setPose(position, velocity = position.map(() => 0)) {
+/** Puts the arm into another pose [rad], at these speeds [rad/s]. @param {number[]} position @param {number[]} velocity */
+export async function setState(position, velocity) {
   const answer = await bridge.call("/arm_sim/set_state", { position, velocity });
+  if (answer.result) touch();
+  return answer;
+}
+
+/** Puts the arm into another pose [rad], at rest, running or paused. It is no setting, so there is nothing to undo. */
+export async function setPose(position) {
+  const answer = await bridge.call("/arm_sim/set_state", { position, velocity: position.map(() => 0) });
   if (answer.result) {
     touch();
     state.pushed = false; // energy is counted anew
@@ -338,14 +349,20 @@ const askNow = latestOnly(async (asked) => {
   const missing = nobodyProvides(answer);
   if (missing !== state.stabilityMissing) set("stabilityMissing", missing);
   state.stabilityAsked = answer.result ? JSON.stringify(asked) : "";
+  keepMotion(answer.result ? answer.values : null);
   set("stability", answer.result ? answer.values : null);
 }, STABILITY_MS);
 
-/** The study's answer about the loop in force with another method; null if there is none. @param {string} method */
-export async function stabilityOf(method) {
-  const answer = await bridge.call("/study/stability", { ...question(state), integrator: method });
-  return answer.result ? answer.values : null;
+/** A simulation that runs away is fast because of that: the motion's limit is the one from before. */
+function keepMotion(answer) {
+  if (!answer || state.diagnostics?.state === "diverged" || state.motion?.asked === state.stabilityAsked) return;
+  // Under a controller that shakes, the motion is the shaking's from the first answer on.
+  if (state.enabled && state.integrator.timestep > (answer.timestep_limit_held ?? Infinity)) return;
+  state.motion = { asked: state.stabilityAsked, limit: answer.timestep_limit_motion ?? Infinity, speed: answer.motion_speed };
 }
+
+/** The study's answer to a question of the page. */
+export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
 
 function askStability() {
   const asked = question(state);

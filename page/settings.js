@@ -5,8 +5,8 @@
 
 import { METHODS, exact } from "./format.js";
 
-/** @typedef {import("./loop.js").Gains} Gains */
-/** @typedef {import("./loop.js").Arm} Arm */
+/** @typedef {import("./gains.js").Gains} Gains */
+/** @typedef {import("./gains.js").Arm} Arm */
 /**
  * @typedef {object} Settings
  * @property {{method?: string, timestep?: number} | null} integrator

@@ -6,6 +6,7 @@
 import { announce } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
 import { apply, remember } from "./actions.js";
+import { presentStep } from "./course_view.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { state, watch } from "./store.js";
 
@@ -20,7 +21,8 @@ export function startShare() {
 export function address() {
   const link = new URL(location.href);
   link.search = ""; // it may hold a token
-  link.hash = toFragment(presentSettings(state), state.links);
+  const step = state.view === "course" ? `step=${presentStep()}&` : "";
+  link.hash = step + toFragment(/** @type {any} */ (presentSettings(state)), state.links);
   return link.href;
 }
 
@@ -48,7 +50,7 @@ function offer() {
   if (!Object.values(settings).some((one) => one !== null)) return;
   const banner = byId("offer");
   const given = new URLSearchParams(location.hash.slice(1));
-  const text = [...given].filter(([name]) => name !== "links").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
+  const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
   const done = () => { banner.hidden = true; };
   const refused = el("p", { class: "refusal" });
   banner.replaceChildren(

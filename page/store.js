@@ -27,11 +27,12 @@ export const state = {
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   stabilityMissing: false,
-  motionAtStart: null, // the motion's limit that the runtime told first after a reset or a change of settings [s]
+  motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
   estimate: null, // message of /arm_sim/error_estimate
   pushed: false, // whether an effort has acted with the servo off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
+  view: "course", // or "workbench"
   tab: "plots", // the panel that is shown
   joint: 0, // the joint that keys and the phase plot are about
   lesson: null, // the lesson that was chosen; see `lessons.js`

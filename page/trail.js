@@ -14,6 +14,8 @@ const BRIGHTEST = 0.7;
 const TURN = 0.15;
 /** Places further apart are joined by straight lines: the velocity says nothing about so long a way [of the reach]. */
 const FAR = 0.75;
+/** Control points further out than this are of no motion within the reach: a true circle has them nearer [of the reach]. */
+const ROOM = 1.02;
 
 /** The trail that ends at `time`; `px` and `py` turn metres into pixels. */
 export function drawTrail(context, n, lengths, px, py, time) {
@@ -89,9 +91,11 @@ function extend(context, n, lengths, px, py, i, begins) {
   if (begins) context.moveTo(px(x), py(y));
   else if (!(way < FAR * reach(lengths))) context.lineTo(px(x), py(y));
   else {
-    context.bezierCurveTo(
-      px(before.x + third * before.vx), py(before.y + third * before.vy), px(x - third * vx), py(y - third * vy), px(x), py(y),
-    );
+    const [x1, y1, x2, y2] = [before.x + third * before.vx, before.y + third * before.vy, x - third * vx, y - third * vy];
+    // Where the arm shakes between two records the cubic would leave the reach, where no end effector has been.
+    const beyond = Math.max(Math.hypot(x1, y1), Math.hypot(x2, y2)) > reach(lengths) * ROOM;
+    if (beyond) context.lineTo(px(x), py(y));
+    else context.bezierCurveTo(px(x1), py(y1), px(x2), py(y2), px(x), py(y));
   }
   before.x = x;
   before.y = y;

@@ -3,7 +3,7 @@
 // Invariant: a notice offers what can be done about it, and goes when its cause is gone.
 
 import { beginAnew, recover, resetArm } from "./actions.js";
-import { announce } from "./announce.js";
+import { announce, warn } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
 import { switchServo, takeSuggestion } from "./controls.js";
 import { refusal } from "./field.js";
@@ -71,6 +71,7 @@ function showNotice() {
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
+  if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are said already
   if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
@@ -83,11 +84,11 @@ function choose() {
       : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
   }
   const smaller = slow ? [["Control at every step", () => report(setPeriod({ period: 0 }))]]
-    : advised > 0 ? [[`Reset with ${duration(advised)}`, () => report(recover(advised))]] : [];
+    : advised > 0 ? [[`Restart at ${duration(advised)}`, () => report(recover(advised))]] : [];
   // No timestep helps where the gains are at fault.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Begin anew", () => report(beginAnew())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {

@@ -29,11 +29,12 @@ def take():
     with Runtime() as runtime, Browser() as browser:
         page = browser.page(runtime.url)
         page.until("document.querySelector('#connection')?.className === 'pill open'", why="connected")
+        page.click("#view-switch")
         page.run(f"[...document.querySelectorAll('button')].find((one) => one.textContent === '{LESSON}').click(); 0")
         page.click("#tab-stability")
         page.until("/^stable$/m.test(document.body.innerText)", why="the limit is known")
         page.until("/The dot is the arm;/.test(document.querySelector('#stability').innerText)", why="the servo is on")
-        page.until("/largest 0\\.\\d+/.test(document.querySelector('#stability').innerText)", why="the modes")
+        page.until("document.querySelector('#push-text').textContent.includes('dies away')", why="the push")
         # The map is refined while one looks; it is whole once it has not changed for two seconds.
         page.run("""(() => { let last = '', since = 0; window.rests = () => {
             const now = [...document.querySelectorAll('#stability canvas')].map((one) => one.toDataURL()).join();

@@ -22,17 +22,17 @@ macro_rules! assets {
 
 /// Every file of the page.
 pub const ASSETS: &[Asset] = assets! {
-    "index.html" "icon.svg" "base.css" "colors.css" "frame.css" "panels.css" "settings.css"
-    "small.css" "style.css" "view.css" "actions.js" "aim.js" "announce.js" "arm_view.js"
-    "arrows.js" "axis.js" "backdrop.js" "compare.js" "compare_view.js" "controls.js" "csv.js"
-    "cursor.js" "dom.js" "eigen.js" "field.js" "format.js" "frames.js" "goal_panel.js"
-    "growth.js" "history.js" "history_panel.js" "keyboard.js" "ladder.js" "ladder_panel.js"
-    "latest.js" "lessons.js" "lessons_panel.js" "limits_view.js" "loop.js" "main.js"
-    "map_view.js" "mechanics.js" "modes_view.js" "pencil.js" "phase_plot.js" "playback.js"
-    "plots.js" "policy.js" "readouts.js" "resample.js" "ring.js" "rosbridge.js" "runs.js"
-    "runtime.js" "save.js" "scale.js" "settings.js" "share.js" "smooth.js" "store.js"
-    "strip_chart.js" "surface.js" "svg_context.js" "tabs.js" "theme.js" "trail.js"
-    "transport.js" "trial_panel.js" "why.js"
+    "index.html" "icon.svg" "base.css" "colors.css" "course.css" "frame.css" "panels.css"
+    "settings.css" "small.css" "style.css" "view.css" "actions.js" "aim.js" "announce.js"
+    "arm_view.js" "arrows.js" "axis.js" "backdrop.js" "compare.js" "compare_view.js" "controls.js"
+    "course.js" "course_charts.js" "course_view.js" "csv.js" "cursor.js" "dom.js" "field.js"
+    "format.js" "frames.js" "gains.js" "goal_panel.js" "history.js" "history_panel.js" "keyboard.js"
+    "ladder.js" "ladder_chart.js" "ladder_panel.js" "latest.js" "lessons.js" "lessons_panel.js"
+    "limits_view.js" "main.js" "map_view.js" "mechanics.js" "pencil.js" "phase_plot.js"
+    "playback.js" "plots.js" "policy.js" "readouts.js" "resample.js" "ring.js" "rosbridge.js"
+    "runs.js" "runtime.js" "save.js" "scale.js" "scenes.js" "settings.js" "share.js" "sheet.js"
+    "smooth.js" "steps_view.js" "store.js" "strip_chart.js" "surface.js" "svg_context.js" "tabs.js"
+    "theme.js" "trail.js" "transport.js" "trial_panel.js" "views.js" "why.js"
 };
 
 /// The file at `path`, if that is one of the page's.

@@ -37,6 +37,7 @@ class PageTest(unittest.TestCase):
 
     links = 2
     view = {}
+    course = False  # whether the test is of the course; else the workbench is opened
 
     def setUp(self):
         self.runtime = Runtime(links=self.links)
@@ -55,6 +56,8 @@ class PageTest(unittest.TestCase):
         page.until("document.querySelector('#connection')?.className === 'pill open'", why="connected")
         page.until(f"document.querySelectorAll('#kp-fields input[type=number]').length === {links or self.links}")
         page.until("document.querySelector('#kp-fields input[type=number]').value !== ''", why="gains shown")
+        if not self.course:
+            page.run("document.body.dataset.view === 'course' && document.querySelector('#view-switch').click()")
         # The page's own modules, those that run, by name.
         page.run("window.own = (name) => import('/' + name); 0")
 

@@ -215,7 +215,7 @@ class Controls(PageTest):
         self.assertGreater(self.image("#arm").count(self.color("bad")), 500)
         self.runtime.call("/arm_sim/set_integrator", method="rk4", timestep=0.001)
         # The first button was another, with a timestep to reset to; the page hears now and then what others have set.
-        self.page.until("document.querySelector('#notice button').textContent === 'Begin anew'")
+        self.page.until("document.querySelector('#notice button').textContent === 'Restart'")
         self.page.click("#notice button")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("!document.querySelector('#stage').classList.contains('diverged')")

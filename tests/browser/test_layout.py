@@ -61,7 +61,7 @@ class Desktop(Access, Steady, PageTest):
     def test_the_first_screen_holds_a_lesson(self):
         for selector in ("#lesson-text", "#arm", "#notice", "#transport", "#history", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
             self.assertLessEqual(self.box(selector)[3], 900, selector)
-        for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#region")):
+        for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#push-bars")):
             self.tab(panel)
             self.assertLessEqual(self.box(control)[3], 900, control)
 

@@ -48,7 +48,7 @@ class BlowUp(Lesson):
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
         self.runtime.call("/arm_sim/set_integrator", timestep=0.02)
         self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
-        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Begin anew')"
+        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Restart')"
         self.page.until(begin_anew)
         box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
         # 0.2 ms at the present gains.
@@ -60,8 +60,8 @@ class BlowUp(Lesson):
 
     def test_one_button_recovers(self):
         self.diverge()
-        button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Reset with'))?.textContent")
-        self.assertRegex(button, r"^Reset with [\d.]+ ms$")
+        button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Restart at'))?.textContent")
+        self.assertRegex(button, r"^Restart at [\d.]+ ms$")
         self.page.click("#notice button")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
@@ -69,17 +69,6 @@ class BlowUp(Lesson):
         while time.monotonic() < end:
             self.assertEqual(self.page.text("#run-state"), "running")
             time.sleep(0.1)
-
-    def test_the_pages_own_limits_are_those_of_the_study(self):
-        for links_pose in ([0.0, 0.0], [0.9, -1.3], [-1.2, 2.0]):
-            for method in ("euler", "midpoint", "verlet", "rk4"):
-                served = self.values("/study/stability", integrator=method, setpoint=links_pose)
-                held, continuous = self.page.run(f"""Promise.all([own('loop.js'), own('store.js')]).then(([loop, {{ state }}]) => {{
-                    const at = loop.loopAt(state.params, state.gains, {links_pose});
-                    return [loop.limitOf(at, '{method}', true), loop.limitOf(at, '{method}', false)];
-                }})""")
-                self.assertAlmostEqual(held, served["timestep_limit_held"], delta=1e-5 * held)
-                self.assertAlmostEqual(continuous, served["timestep_limit_continuous"], delta=1e-5 * continuous)
 
     def test_a_click_in_the_map_goes_there(self):
         self.tab("stability")
@@ -94,16 +83,16 @@ class BlowUp(Lesson):
         self.wait(lambda: abs(math.log(self.values("/arm_sim/set_integrator")["timestep"] / 0.01)) < 0.05, "timestep")
         self.wait(lambda: abs(math.log(self.values("/pid_controller/set_gains")["kp"][0] / 4000)) < 0.05, "gains")
 
-    def test_the_modes_move_with_the_timestep(self):
+    def test_a_push_dies_away_below_the_limit_and_flips_and_grows_beyond(self):
         self.page.click("#servo")
         self.tab("stability")
-        inside = self.page.until("document.querySelector('#circle-text').textContent.includes('within the circle') && document.querySelector('#circle-text').textContent")
-        self.assertIn("1 ms", inside)
-        before = self.image("#circle").count(self.color("bad"))
+        self.page.until("document.querySelector('#push-text').textContent.includes('at 1 ms: the push dies away')")
         self.page.fill(f"#timestep-field {NUMBER}", "6")
-        self.page.until("document.querySelector('#circle-text').textContent.includes('grows, flipping its sign at every step')")
-        self.assertGreater(self.image("#circle").count(self.color("bad")), before + 20)
-        self.keep("modes")
+        self.page.until("document.querySelector('#push-text').textContent.includes('at 6 ms: the push does not die away')")
+        picture = self.image("#push-bars")
+        self.assertGreater(picture.count(self.color("bad")), 200)
+        self.assertGreater(picture.count(self.color("accent")), 200)
+        self.keep("push")
 
     def test_error_against_run_time_is_measured_live(self):
         self.tab("error")
@@ -116,7 +105,7 @@ class BlowUp(Lesson):
             ratio = number(cells[3][column]) / number(cells[4][column])
             self.assertTrue(factor / 2 < ratio < 2 * factor, f"{ratio} for {factor}")
         for method in range(1, 5):
-            self.assertGreater(self.image("#ladder").count(self.color(f"run{method}")), 40)
+            self.assertGreater(self.image("#ladder").count(self.color(f"method{method}")), 40)
         self.assertIn("costs least", self.page.text("#ladder-text"))
         self.keep("error")
 

@@ -4,8 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { csvText } from "../../page/csv.js";
-import { growthOf, growthRate } from "../../page/growth.js";
-import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, uncertaintyOf } from "../../page/ladder.js";
+import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
 import { record, take } from "../../page/history.js";
 import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/runs.js";
 import { nearestInReach } from "../../page/mechanics.js";
@@ -79,15 +78,6 @@ function arm(method, timestep, enabled = false) {
   return { links: 2, params, gains, enabled, setpoint: Float64Array.of(0, 0, 0), integrator: { method, timestep } };
 }
 
-test("Euler's free swing doubles its energy in seconds, midpoint's hardly ever", () => {
-  // A swing of frequency ω grows by h ω² / 2 under Euler; the faster of the two modes has ω² near 3 g.
-  const rate = growthRate(arm("euler", 0.001));
-  assert.ok(rate > 0.005 && rate < 0.05, String(rate));
-  assert.match(growthOf(arm("euler", 0.001)), /doubles every [\d.]+ s/);
-  assert.match(growthOf(arm("midpoint", 0.001)), /nothing within an hour/);
-  assert.equal(growthOf(arm("rk4", 0.001)), "");
-});
-
 test("a place out of reach gives way to the nearest one within", () => {
   const near = (place, lengths, expected) => {
     const found = nearestInReach(place, lengths);
@@ -146,4 +136,20 @@ test("an error is told apart from one that the reference can't resolve, and from
   assert.equal(errorText(rung(1, 1e-13, 0.5)), "diverged at 0.5 s");
   assert.equal(uncertaintyOf([rung(1, 1e-13), rung(1, 3e-13), rung(1, null)]), 3e-13);
   assert.equal(uncertaintyOf([rung(1, undefined)]), null);
+});
+
+test("a closed loop has two errors, and a run that diverged has none", () => {
+  const values = { times: [0, 1, 2], error: 1e-8, sampling_error: 8e-3, error_uncertainty: 1e-15, wall_time: 1e-3, evaluations: 8 };
+  const whole = read({ method: "rk4", timestep: 0.004 }, values, 2);
+  assert.deepEqual([whole.error, whole.sampling, total(whole)], [1e-8, 8e-3, 8e-3]);
+  assert.equal(errorText(whole), "1e−8 + 0.008");
+  assert.deepEqual(cheapest([whole], 1e-3), [], "waiting counts: the method's own error is not all");
+  const broken = read({ method: "rk4", timestep: 0.004 }, { ...values, error: 1e136, sampling_error: 1e136 }, 5);
+  assert.deepEqual([broken.error, broken.sampling, broken.divergedAt], [null, null, 2]);
+});
+
+test("a measurement says its move and the settings that it is about", () => {
+  const { params, gains, period } = DEFAULTS[2];
+  assert.match(stamp({ links: 2, enabled: true, params, gains, period }, 2), /^Move to \(0\.9, −1\.3\) rad, 2 s from rest.*controller at every step, kp 1000, 250.*masses 1, 1 kg/);
+  assert.match(stamp({ links: 2, enabled: false, params, gains, period }, 2), /^Free swing, 2 s from rest, stretched out; masses 1, 1 kg/);
 });

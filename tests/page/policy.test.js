@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { adviceText, answerInForce, controlPeriodLimit, energyName, limitInForce, motionHasChanged, periodText, question, smallest, verdict, worstText } from "../../page/policy.js";
+import { adviceText, answerInForce, controlPeriodLimit, doublingTime, energyName, limitInForce, limitsOf, motionHasChanged, periodText, question, verdict, worstText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -187,4 +187,41 @@ test("where nothing limits no pose is named, nor where the service says nothing 
   for (const answer of [null, VALUES, { ...VALUES, worst_pose: null, critical: null }, { ...VALUES, minimum_over_poses_held: 0, worst_pose: [0, 0], critical: { joint: 0 } }]) {
     assert.equal(worstText(answer), "");
   }
+});
+
+const FREE = {
+  timestep_limit_held: 0.278, timestep_limit: 0.278, timestep_limit_continuous: 0.278, minimum_over_poses_held: 0.278, equilibrium: [-Math.PI / 2, 0],
+  equilibrium_kind: "hanging", critical: { growth_per_step: 2.4, frequency: 1.14, joint: 1 }, timestep_limit_motion: 0.0488, motion_speed: 16.4, advised_timestep: 0.039,
+};
+const swing = (method, timestep, changed = {}) => arm({ enabled: false, integrator: { method, timestep }, stability: FREE, ...changed });
+
+test("after a divergence the motion's limit from before counts, and the advice is never what diverged", () => {
+  const asked = swing("verlet", 0.1).stabilityAsked;
+  const wild = { ...FREE, timestep_limit_motion: 1e-150, motion_speed: 1e150 };
+  const diverged = { diagnostics: { state: "diverged", message: "" }, stability: wild };
+  const known = swing("verlet", 0.1, { ...diverged, motion: { asked, limit: 0.0488, speed: 16.4 } });
+  assert.deepEqual([limitInForce(known).limit, verdict(known).kind], [0.0488, "diverged"]);
+  assert.equal(verdict(known).advised, 0.8 * 0.0488);
+  assert.match(verdict(known).sentence, /100 ms is above the limit 48\.8 ms, moving at 16\.4 rad\/s/);
+  const unknown = swing("verlet", 0.1, { ...diverged, motion: null });
+  assert.equal(verdict(unknown).advised, 0.05);
+  assert.doesNotMatch(adviceText(unknown), /Stable up to/);
+});
+
+test("a button's limit counts the motion, whatever the method", () => {
+  const limits = limitsOf(swing("verlet", 0.001), { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } });
+  assert.deepEqual(limits, { verlet: 0.0488, rk4: 0.0762 });
+});
+
+test("Midpoint's free swing gains energy so slowly that the motion is the limit, Euler's does not", () => {
+  const grows = { ...FREE, timestep_limit_held: 0, timestep_limit: 0 };
+  assert.equal(limitInForce(swing("midpoint", 0.001, { stability: grows })).limit, 0.0488);
+  assert.equal(limitInForce(swing("euler", 0.001, { stability: grows })).limit, 0);
+  assert.ok(Math.abs(doublingTime(swing("euler", 0.001), grows) - 13.5) < 0.1);
+});
+
+test("with a control period of its own the timestep has its own limit", () => {
+  const twoClocks = { ...VALUES, timestep_limit: 0.002, control_period_limit: 0.0136 };
+  assert.equal(limitInForce(sampled(0.004, { stability: twoClocks })).limit, 0.002);
+  assert.equal(limitInForce(sampled(0.02, { stability: { ...twoClocks, timestep_limit: 0 } })).limit, VALUES.timestep_limit_held);
 });

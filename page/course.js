@@ -1,0 +1,201 @@
+// @ts-check
+// The course: ten steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
+// Invariant: a step is data. Its text has at most 40 words; whoever shows it sets the scene on a click only.
+
+import { DEFAULTS } from "./settings.js";
+
+/** @typedef {import("./settings.js").Settings} Settings */
+/** @typedef {{text: string, answers: string[], right: number, because: string}} Question */
+/**
+ * What the student has done in a step so far; a task looks at it.
+ * @typedef {object} Seen
+ * @property {Set<string>} methods that were in force
+ * @property {boolean} reached whether a goal was reached
+ * @property {boolean} shook whether the arm shook beyond the limit
+ * @property {boolean} shrinks whether the bars shrink
+ * @property {number} gain by what the method's error has fallen
+ * @property {boolean} stable whether the loop in force is stable
+ * @property {boolean} measured whether the ladder is complete
+ * @property {number} scenes that were run
+ * @property {boolean} sheet whether a sheet was made
+ */
+/**
+ * @typedef {object} Step
+ * @property {string} id
+ * @property {string} title
+ * @property {string} text
+ * @property {(links: number) => Settings} scene
+ * @property {number[]} [offset] pose at the start [rad], else stretched out
+ * @property {boolean} [paused] whether the arm takes two control steps a second
+ * @property {"velocity" | "bars" | "errors" | "map" | "energy" | "ladder" | "pictures" | "form"} chart
+ * @property {"period" | "timestep" | "damping" | null} dial
+ * @property {boolean} [methods] whether the methods can be chosen
+ * @property {Question} [guess] before the dial is shown
+ * @property {{text: string, done: (seen: Seen) => boolean}} task
+ * @property {Question} question
+ */
+
+/** A period that is a fifth to a quarter beyond the limit: the arm shakes, and stays finite [s]. @type {Record<number, number>} */
+export const BEYOND = { 2: 0.0055, 3: 0.0038 };
+/** A period that is well within it [s]. @type {Record<number, number>} */
+const WITHIN = { 2: 0.004, 3: 0.002 };
+/** Short enough that the simulation adds nothing to see [s]. */
+const FINE = 0.0001;
+/** Four methods. */
+const ALL = 4;
+/** By so much the method's own error has to fall. */
+const MUCH = 100;
+const SOME_SCENES = 3;
+
+/** @param {number} links @param {number} period @param {Partial<Settings>} [changed] @returns {Settings} */
+function controlled(links, period, changed = {}) {
+  return { ...structuredClone(DEFAULTS[links]), integrator: { method: "rk4", timestep: FINE }, period: { period, delay: false }, servo: true, ...changed };
+}
+
+/** @type {Step[]} */
+export const STEPS = [
+  {
+    id: "hold", title: "A controller holds the arm",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, and the controller takes it there.",
+    scene: (links) => controlled(links, 0.001),
+    chart: "velocity", dial: null,
+    task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
+    question: {
+      text: "What does the controller do between two measurements?", answers: ["It keeps the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
+      because: "A computer looks only now and then. In between it cannot know better.",
+    },
+  },
+  {
+    id: "slow", title: "Slow the controller down",
+    text: "Now the controller looks less often. The time between two looks is its period. Guess first: when does the arm begin to shake?",
+    scene: (links) => controlled(links, 0.001),
+    chart: "velocity", dial: "period",
+    guess: {
+      text: "At which period does it begin to shake?", answers: ["about 1 ms", "about 4 ms", "about 50 ms"], right: 1,
+      because: "The red mark shows the limit. For two links it is 4.3 ms.",
+    },
+    task: { text: "Make the period longer until the arm shakes.", done: ({ shook }) => shook },
+    question: {
+      text: "Just below the limit, what does the arm do?", answers: ["It shakes a little", "It comes to rest", "It falls"], right: 1,
+      because: "Below the limit every deviation dies away. Beyond the limit every deviation grows.",
+    },
+  },
+  {
+    id: "look", title: "Look closely",
+    text: "Each bar is the speed of the last joint at one look of the controller, after a push of a millionth of a radian. The arm takes two looks a second.",
+    scene: (links) => controlled(links, BEYOND[links]),
+    offset: [0, 0.02, 0], paused: true,
+    chart: "bars", dial: "period",
+    task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
+    question: {
+      text: "Why does each bar point the other way?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
+      because: "The torque is kept too long. It pushes past the target, each time further.",
+    },
+  },
+  {
+    id: "method", title: "A better method?",
+    text: "The method computes the motion between two looks. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of the period move?",
+    scene: (links) => controlled(links, BEYOND[links]),
+    chart: "velocity", dial: "period", methods: true,
+    task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
+    question: {
+      text: "Why does a better method not help?", answers: ["The controller still looks as rarely", "Euler is exact enough", "The gains are too low"], right: 0,
+      because: "The limit comes from the waiting. A real robot has the same limit, without any method.",
+    },
+  },
+  {
+    id: "timestep", title: "A finer timestep?",
+    text: "The simulation has a clock of its own, the timestep. A shorter one makes the computed motion more exact. The period stays the same.",
+    scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
+    chart: "errors", dial: "timestep",
+    task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
+    question: {
+      text: "Which error stayed?", answers: ["That of waiting", "That of the method", "None"], right: 0,
+      because: "A finer timestep improves the simulation. Only a shorter period improves the control.",
+    },
+  },
+  {
+    id: "limit", title: "What sets the limit",
+    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M).",
+    scene: (links) => controlled(links, BEYOND[links]),
+    chart: "map", dial: "damping",
+    task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
+    question: {
+      text: "You halve the damping. What does the limit do?", answers: ["It halves", "It doubles", "It stays"], right: 1,
+      because: "In the formula the damping is below the line: half of it gives twice the time.",
+    },
+  },
+  {
+    id: "energy", title: "Without a controller",
+    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the black line.",
+    scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, servo: false }),
+    chart: "energy", dial: "timestep", methods: true,
+    task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => methods.has("rk4") || methods.has("verlet") },
+    question: {
+      text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, it only gains it more slowly", "Yes, below 0.1 ms"], right: 1,
+      because: "Without damping every Euler step makes a swing a little wider, however short the step is.",
+    },
+  },
+  {
+    id: "price", title: "The price of accuracy",
+    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of waiting.",
+    scene: (links) => controlled(links, WITHIN[links]),
+    chart: "ladder", dial: null,
+    task: { text: "Measure, and find where more work buys nothing.", done: ({ measured }) => measured },
+    question: {
+      text: "Your controller looks every 4 ms. What does Runge–Kutta 4 buy at 0.25 ms?", answers: ["A better robot", "Nearly nothing", "A longer limit"], right: 1,
+      because: "The error of waiting is far larger than the error of the method. Work on the larger one.",
+    },
+  },
+  {
+    id: "extreme", title: "Stiff and extreme",
+    text: "Thirty-nine arms that are hard to simulate: light links, strong gains, wild numbers. Each picture starts one. Its sentence says what a correct simulation does.",
+    scene: (links) => structuredClone(DEFAULTS[links]),
+    chart: "pictures", dial: null,
+    task: { text: "Start three of them.", done: ({ scenes }) => scenes >= SOME_SCENES },
+    question: {
+      text: "A last link of one milligram: why are short steps needed?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
+      because: "The same gain moves less mass faster, and a fast motion needs a short step.",
+    },
+  },
+  {
+    id: "own", title: "Your own arm",
+    text: "Fill in your arm and your gains. The sheet says which period and which timestep they allow, why, and what a better method buys.",
+    scene: (links) => controlled(links, 0.001),
+    chart: "form", dial: null,
+    task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
+    question: {
+      text: "Your period is too long. What helps?", answers: ["A better method", "Less damping gain or a faster controller", "A shorter timestep"], right: 1,
+      because: "Only the controller’s clock and its gains set that limit.",
+    },
+  },
+];
+
+/** @returns {Seen} */
+export function nothingSeen() {
+  return { methods: new Set(), reached: false, shook: false, shrinks: false, gain: 1, stable: false, measured: false, scenes: 0, sheet: false };
+}
+
+/** Whether a deviation dies away: its last bars against its first ones. @param {number[]} bars */
+export function shrinks(bars) {
+  const largest = (/** @type {number[]} */ some) => Math.max(...some.map(Math.abs));
+  const third = Math.floor(bars.length / 3);
+  return third > 0 && largest(bars.slice(-third)) < largest(bars.slice(0, third));
+}
+
+/** "5.5 of 4.3 ms": a time and its limit, in one unit. @param {number} time [s] @param {number} limit [s] */
+export function ofLimit(time, limit) {
+  const short = (/** @type {number} */ seconds) => String(Number((1e3 * seconds).toPrecision(2)));
+  if (!(time >= 0)) return "–";
+  if (Number.isNaN(limit) || limit === Infinity) return `${short(time)} ms`;
+  return limit === 0 ? `${short(time)} ms, never stable` : `${short(time)} of ${short(limit)} ms`;
+}
+
+/** The step that a link names, from 0; -1 if it names none. @param {string} hash */
+export function stepIn(hash) {
+  const named = new URLSearchParams(hash.replace(/^#/, "")).get("step") ?? "";
+  const byName = STEPS.findIndex(({ id }) => id === named);
+  if (byName >= 0) return byName;
+  const number = Number(named);
+  return Number.isInteger(number) && number >= 1 && number <= STEPS.length ? number - 1 : -1;
+}

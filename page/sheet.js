@@ -1,0 +1,106 @@
+// @ts-check
+// A student's own arm: a form, and one sheet to print with its limits, the reason, what a better method buys, and a link.
+// Invariant: the sheet asks the study about the form's arm; the live arm stays as it is.
+
+import { byId, el } from "./dom.js";
+import { option, refusal } from "./field.js";
+import { METHODS, duration, methodName, significant } from "./format.js";
+import { limitText } from "./policy.js";
+import { stability } from "./runtime.js";
+import { DEFAULTS, toFragment } from "./settings.js";
+import { state } from "./store.js";
+
+/** @type {[string, string][]} */
+const LISTS = [["masses", "mass [kg]"], ["lengths", "length [m]"], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"], ["kd", "kd [N m s/rad]"]];
+/** Limits within this factor are said to be alike. */
+const ALIKE = 1.1;
+
+/** @type {Record<string, any[]>} */
+let fields = {};
+let gravity;
+let said;
+
+/** Puts the form into `place`, filled in with the arm as it is; `whenMade` is called once a sheet stands. @param {HTMLElement} place @param {() => void} whenMade */
+export function showForm(place, whenMade) {
+  const known = /** @type {any} */ ({ ...DEFAULTS[state.links].params, ...DEFAULTS[state.links].gains, ...state.params, ...state.gains });
+  gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
+  fields = Object.fromEntries(LISTS.map(([key, name]) => [key, known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
+  const go = el("button", { type: "submit", class: "primary" }, "Make my sheet");
+  said = refusal(go);
+  place.replaceChildren(el("form", { id: "own-form", novalidate: true, onsubmit: async (/** @type {Event} */ event) => {
+    event.preventDefault();
+    if (await make()) whenMade();
+  } }, ...LISTS.map(([key]) => el("div", { class: "own-row" }, ...fields[key].map((one) => one.element))),
+  el("div", { class: "own-row" }, gravity.element, go), said.element), el("div", { id: "sheet", role: "region", "aria-label": "The sheet of your arm", hidden: true }));
+}
+
+async function make() {
+  const list = (/** @type {string} */ key) => fields[key].map((one) => one.number() ?? NaN);
+  const params = { gravity: gravity.number() ?? 0, masses: list("masses"), lengths: list("lengths") };
+  const gains = { kp: list("kp"), ki: list("ki"), kd: list("kd") };
+  const setpoint = new Array(state.links).fill(0);
+  /** @type {Record<string, any>} */
+  const answers = {};
+  for (const [method] of METHODS) {
+    const answer = await stability({ params, gains, setpoint, integrator: method, control_period: 0 });
+    if (!answer.result) {
+      said.show(answer.status);
+      return false;
+    }
+    answers[method] = answer.values;
+  }
+  said.show("");
+  const link = new URL(location.href);
+  link.search = "";
+  link.hash = toFragment({ ...DEFAULTS[state.links], params, gains, servo: true, setpoint }, state.links);
+  byId("sheet").replaceChildren(...sheet(params, gains, answers, link.href));
+  byId("sheet").hidden = false;
+  byId("sheet").scrollIntoView({ block: "nearest" });
+  return true;
+}
+
+/** @param {any} params @param {any} gains @param {Record<string, any>} answers @param {string} link */
+function sheet(params, gains, answers, link) {
+  const text = (/** @type {number[]} */ values) => values.map((one) => significant(one, 4)).join(", ");
+  const row = (/** @type {string} */ name, /** @type {string} */ value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value));
+  const period = answers.rk4.control_period_limit ?? Infinity;
+  return [
+    el("h3", {}, "My arm and its two clocks"),
+    el("table", {}, el("tbody", {},
+      row("Masses", `${text(params.masses)} kg`), row("Lengths", `${text(params.lengths)} m`), row("Gravity", `${significant(params.gravity, 4)} m/s²`),
+      row("Gains kp", text(gains.kp)), row("Gains ki", text(gains.ki)), row("Gains kd", text(gains.kd)),
+      row("Longest control period, stretched out", limitText(period)),
+      ...METHODS.map(([method, name]) => row(`Longest timestep, ${name}`, limitText(least(answers[method])))),
+      row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
+    )),
+    el("p", {}, reason(answers.rk4, period)),
+    el("p", {}, gain(answers)),
+    el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
+    el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
+  ];
+}
+
+/** The smaller limit of pose and motion [s]. @param {any} answer */
+function least(answer) {
+  return Math.min(answer.timestep_limit_held ?? Infinity, answer.timestep_limit_motion ?? Infinity);
+}
+
+/** @param {any} answer @param {number} period */
+export function reason(answer, period) {
+  const { critical } = answer;
+  if (period === 0) return "Reason: these gains do not hold the arm, however often the controller looks. Raise the derivative gains or lower the integral gains.";
+  if (!critical || period === Infinity) return "Reason: nothing limits this arm.";
+  const flips = Math.abs(critical.frequency * 2.2 * (answer.minimum_over_poses_held ?? NaN) - 1) < 0.05;
+  return flips
+    ? `Reason: joint ${critical.joint + 1} is the fastest. A torque that is kept too long pushes it past the target; 10 % beyond the limit the deviation flips and grows ${significant(100 * (critical.growth_per_step - 1), 2)} % at each step.`
+    : `Reason: a swing of joint ${critical.joint + 1} at ${significant(critical.frequency, 3)} Hz. The torque comes too late and drives it.`;
+}
+
+/** @param {Record<string, any>} answers */
+export function gain(answers) {
+  const limits = METHODS.map(([method]) => /** @type {[string, number]} */ ([method, least(answers[method])]));
+  const best = limits.reduce((a, b) => (b[1] > a[1] ? b : a));
+  const worst = limits.reduce((a, b) => (b[1] < a[1] ? b : a));
+  if (!(best[1] > ALIKE * worst[1])) return "A better method does not allow a longer timestep: the controller’s waiting sets the limit. It only makes the simulated motion more exact.";
+  return `${methodName(best[0])} allows the longest timestep, ${limitText(best[1])}; ${methodName(worst[0])} allows ${worst[1] > 0 ? duration(worst[1]) : "none"}.`;
+}

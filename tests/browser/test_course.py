@@ -1,0 +1,178 @@
+"""The course: a step sets its scene on a click only, its task ticks itself, its answer is checked, and a link names it."""
+
+import time
+
+from stage import PageTest
+from test_layout import AXE, PHONE
+
+STEPS = 10
+DIAL = "#course-dial input[type=number]"
+RULES = "{ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }"
+
+
+class CourseTest(PageTest):
+    course = True
+
+    def step(self, number):
+        self.page.click(f"#course-steps button:nth-child({number})")
+        self.page.until(f"document.querySelector('#course-number').textContent === 'Step {number} of {STEPS}'")
+        self.page.until("!document.querySelector('#course-task').hidden")
+
+    def done(self, why):
+        self.page.until("document.querySelector('#course-task').className === 'done'", why=why)
+
+    def answer(self, text):
+        self.page.run(f"[...document.querySelectorAll('#course-question button')].find((one) => one.textContent === '{text}').click()")
+
+    def big(self):
+        return self.page.text("#course-figure")
+
+    def values(self, service, **args):
+        return self.runtime.call(service, **args)["values"]
+
+
+class Tasks(CourseTest):
+    def test_the_course_is_the_first_view_and_leaves_the_arm_alone(self):
+        self.assertTrue(self.page.run("document.querySelector('#course').checkVisibility() && !document.querySelector('#controls').checkVisibility()"))
+        before = self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")
+        page = self.open("#step=4")
+        page.until("document.querySelector('#course-title').textContent === 'A better method?'")
+        self.assertEqual(page.text("#course-start"), "Start")
+        time.sleep(0.5)
+        self.assertEqual(before, (self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")))
+
+    def test_holding_ticks_when_the_tip_arrives(self):
+        self.page.click("#course-start")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
+        self.page.drag(self.on_canvas((1.9, 0.1)), self.on_canvas((0.6, 1.2)))
+        self.done("the tip has arrived")
+        self.answer("It sets them to zero")
+        self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Not that one')")
+        self.answer("It keeps the torques as they are")
+        self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Right.')")
+
+    def test_the_mark_comes_after_the_guess_and_the_shaking(self):
+        self.step(2)
+        self.assertFalse(self.page.run(f"document.querySelector('{DIAL}')?.checkVisibility() ?? false"))
+        self.answer("about 50 ms")
+        self.page.until(f"document.querySelector('{DIAL}').checkVisibility()")
+        self.assertTrue(self.page.run("document.querySelector('#course-dial .mark').hidden"))
+        self.page.fill(DIAL, "5.5")
+        self.done("the arm shakes")
+        self.page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'")
+        self.assertFalse(self.page.run("document.querySelector('#course-dial .mark').hidden"))
+        self.assertIn("You guessed about 50 ms", self.page.text("#course-question"))
+        self.keep("course-slow")
+
+    def test_bars_flip_and_grow_beyond_the_limit_and_shrink_below(self):
+        self.step(3)
+        self.wait(lambda: self.image("#course-chart").count(self.color("bad")) > 500, "bars that point down")
+        self.assertGreater(self.image("#course-chart").count(self.color("accent")), 500)
+        self.assertNotEqual(self.page.run("document.querySelector('#course-task').className"), "done")
+        before = self.runtime.next("/diagnostics")
+        self.assertEqual(before["status"][0]["message"], "paused")
+        begun = self.page.run("own('store.js').then(({ state }) => state.time)")
+        self.wait(lambda: 0.005 < self.page.run("own('store.js').then(({ state }) => state.time)") - begun < 0.05, "slow motion, by control periods")
+        self.keep("course-look")
+        self.page.fill(DIAL, "3")
+        self.done("bars that shrink")
+
+    def test_all_methods_stop_at_one_period(self):
+        self.step(4)
+        for method in ("euler", "midpoint", "verlet", "rk4"):
+            self.page.click(f"#course-extra [data-method={method}]")
+            self.wait(lambda: self.values("/arm_sim/set_integrator")["method"] == method and self.big() == "5.5 of 4.3 ms", method)
+        self.done("all four methods")
+
+    def test_a_finer_timestep_helps_the_method_only(self):
+        self.step(5)
+        self.page.until("document.querySelector('#course-figure').textContent === '4 of 4.3 ms'")
+        time.sleep(0.5)  # the first errors are asked for
+        self.page.fill(DIAL, "0.2")
+        self.done("a hundred times smaller")
+        self.assertAlmostEqual(self.values("/pid_controller/set_period")["effective_period"], 0.004, delta=1e-9)
+        self.keep("course-timestep")
+
+    def test_less_damping_makes_the_period_stable(self):
+        self.step(6)
+        self.page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'")
+        self.page.fill(DIAL, "0.5")
+        self.done("stable")
+        self.assertRegex(self.big(), r"^5\.5 of (8\.\d|9) ms$")
+        self.keep("course-limit")
+
+    def test_the_energy_is_kept_by_another_method(self):
+        self.step(7)
+        self.page.click("#course-extra [data-method=rk4]")
+        self.done("a method that keeps it")
+        self.assertFalse(self.values("/pid_controller/enable")["data"])
+
+    def test_the_price_is_measured(self):
+        self.step(8)
+        self.page.click("#course-measure")
+        self.done("measured")
+        for method in range(1, 5):
+            self.assertGreater(self.image("#course-chart").count(self.color(f"method{method}")), 40)
+        self.keep("course-price")
+
+    def test_pictures_run_their_scenes(self):
+        self.step(9)
+        self.assertEqual(self.page.run("document.querySelectorAll('.picture').length"), 39)
+        self.page.click("#scene-S08")
+        self.wait(lambda: self.values("/pid_controller/set_gains")["kp"] == [1e6, 1e6], "stiff gains")
+        self.page.click("#scene-S35")
+        self.page.until("document.querySelector('#course-status').textContent.includes('masses[0]')", why="refused, with the reason")
+        self.page.click("#scene-S27")
+        self.done("three scenes")
+        self.wait(lambda: self.values("/arm_sim/set_params")["gravity"] == 981, "strong gravity")
+        self.keep("course-extreme")
+
+    def test_the_sheet_says_what_the_study_says_and_leaves_the_arm_alone(self):
+        self.step(10)
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the scene")
+        gains = self.values("/pid_controller/set_gains")
+        self.page.fill("#own-form .own-row:nth-child(5) label:nth-child(2) input", "44")
+        self.page.click("#own-form button")
+        self.done("a sheet")
+        limit = 1e3 * self.values("/study/stability", gains={**gains, "kd": [110, 44]}, setpoint=[0, 0], control_period=0)["control_period_limit"]
+        self.assertIn(f"stretched out{float(format(limit, '.3g')):g} ms", self.page.text("#sheet"))
+        self.assertIn("Reason:", self.page.text("#sheet"))
+        self.assertIn("kd=110,44", self.page.text("#sheet a"))
+        self.assertEqual(self.values("/pid_controller/set_gains"), gains)
+        self.keep("course-own")
+
+    def test_both_views_show_the_same_arm_and_a_link_names_the_step(self):
+        self.step(6)
+        self.wait(lambda: abs(self.values("/pid_controller/set_period")["period"] - 0.0055) < 1e-12, "the scene")
+        self.assertEqual(self.page.run("location.hash"), "#step=6")
+        link = self.page.run("own('share.js').then((share) => share.address())")
+        self.assertIn("#step=6&links=2", link)
+        self.page.click("#view-switch")
+        self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility()")
+        self.assertEqual(self.page.run("document.querySelector('#period-field input[type=number]').value"), "5.5")
+        self.page.click("#view-switch")
+        self.page.until("document.querySelector('#course').checkVisibility()")
+
+
+class Access(CourseTest):
+    def test_axe_finds_nothing_in_any_step(self):
+        self.page.send("Runtime.evaluate", {"expression": AXE.read_text()})
+        for number in range(1, STEPS + 1):
+            self.step(number)
+            time.sleep(0.3)
+            found = self.page.run(f"axe.run(document, {RULES}).then(({{ violations }}) => violations.map(({{ id, nodes }}) => [id, ...nodes.slice(0, 3).map((one) => one.html.slice(0, 120))]))")
+            self.assertEqual(found, [], f"step {number}")
+            wide = self.page.run("document.documentElement.scrollWidth - innerWidth")
+            self.assertLessEqual(wide, 0, f"step {number}")
+            self.keep(f"course-{type(self).__name__}-{number}")
+        self.page.run("new Promise(requestAnimationFrame)")
+        self.page.complaints.clear()  # those of the inspector itself, which may come late
+
+
+class AccessDark(Access):
+    view = {"dark": True, "width": 1920, "height": 1080}
+
+
+class AccessPhone(Access):
+    view = PHONE
+    links = 3

@@ -1,0 +1,104 @@
+// The course: short steps, tasks that tick themselves, and the scenes of the report.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+
+import { STEPS, nothingSeen, ofLimit, shrinks, stepIn } from "../../page/course.js";
+import { SCENES, settingsOf } from "../../page/scenes.js";
+
+const words = (text) => text.split(/\s+/).length;
+
+test("ten steps, each with at most 40 words and sentences of at most 25", () => {
+  assert.equal(STEPS.length, 10);
+  for (const { id, text } of STEPS) {
+    assert.ok(words(text) <= 40, `${id}: ${words(text)} words`);
+    for (const sentence of text.split(/[.?!](?=\s|$)/)) assert.ok(words(sentence) <= 25, `${id}: ${sentence}`);
+  }
+});
+
+test("every question has one right answer among its own, and says why", () => {
+  for (const { id, question, guess } of STEPS) {
+    for (const one of guess ? [question, guess] : [question]) {
+      assert.ok(one.right >= 0 && one.right < one.answers.length && one.because.length > 20, id);
+      assert.equal(new Set(one.answers).size, one.answers.length, id);
+    }
+  }
+});
+
+test("no task is done before anything is done, and each can be", () => {
+  const all = { methods: new Set(["euler", "midpoint", "verlet", "rk4"]), reached: true, shook: true, shrinks: true, gain: 100, stable: true, measured: true, scenes: 3, sheet: true };
+  for (const { id, task } of STEPS) {
+    assert.equal(task.done(nothingSeen()), false, id);
+    assert.equal(task.done(all), true, id);
+  }
+});
+
+test("every step has a scene for two and for three links", () => {
+  for (const { id, scene } of STEPS) for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
+});
+
+test("bars that flip and grow are told from bars that die away", () => {
+  assert.equal(shrinks([0.09, -0.16, 0.14, -0.4, 0.39, -0.9, 1.09, -2.06]), false);
+  assert.equal(shrinks([0.3, -0.2, 0.1, -0.05, 0.02, -0.01]), true);
+  assert.equal(shrinks([]), false);
+});
+
+test("a time stands beside its limit in one unit", () => {
+  assert.equal(ofLimit(0.0055, 0.004316), "5.5 of 4.3 ms");
+  assert.equal(ofLimit(0.001, NaN), "1 ms");
+  assert.equal(ofLimit(0.005, 0), "5 ms, never stable");
+});
+
+test("a link names a step by number or by name", () => {
+  assert.deepEqual(["#step=4", "#step=method&links=2", "#step=0", "#step=11", "#step=x", "#links=2", ""].map(stepIn), [3, 3, -1, -1, -1, -1, -1]);
+});
+
+// The scenes, held to the report's source
+
+const FILES = ["motion", "gains", "sampling", "inertia", "extreme", "methods"];
+const SOURCE = FILES.flatMap((name) => {
+  const text = readFileSync(new URL(`../../src/report/experiments/scenarios/${name}.rs`, import.meta.url), "utf8");
+  const scene = /id: "(S\d\d)",\s+name: "([^"]*)",\s+parameters: "((?:[^"\\]|\\[^])*)",/g;
+  return [...text.matchAll(scene)].map(([, id, title, parameters]) => ({ id, title, parameters: parameters.replace(/\\\n\s*/g, "") }));
+});
+
+test("the page has the report's 39 scenes under their names, in their order", () => {
+  assert.equal(SOURCE.length, 39);
+  assert.deepEqual(SCENES.map(({ id, name }) => [id, name]), SOURCE.map(({ id, title }) => [id, title.replace(/\btip\b/, "last link")]));
+});
+
+test("a scene's links, gains, masses, gravity and setpoint are those that the report names", () => {
+  let compared = 0;
+  SOURCE.forEach(({ id, parameters }, i) => {
+    const scene = SCENES[i];
+    const { settings } = scene;
+    const same = (found, named, what) => { compared += 1; assert.deepEqual(found, named, `${id} ${what}: ${parameters}`); };
+    const links = /(\d) links/.exec(parameters);
+    if (links && !/2 and 3 links/.test(parameters)) same(scene.links, Number(links[1]), "links");
+    for (const gain of ["kp", "ki", "kd"]) {
+      const named = new RegExp(`${gain} ([\\d.e]+)(?: and ([\\d.e]+))?`).exec(parameters);
+      if (named) same(settings.gains[gain], [Number(named[1]), Number(named[2] ?? named[1])], gain);
+    }
+    const mass = /outer mass (\S+) kg/.exec(parameters);
+    if (mass) same(settings.params.masses.at(-1), Number(mass[1]), "outer mass");
+    const inner = /inner mass (\S+)/.exec(parameters);
+    if (inner) same(settings.params.masses[0], Number(inner[1]), "inner mass");
+    if (/gravity 0|without gravity|no gravity/.test(parameters)) same(settings.params.gravity, 0, "gravity");
+    const setpoint = /setpoint \((\S+), (\S+)\)/.exec(parameters);
+    if (setpoint) same(settings.setpoint, [Number(setpoint[1]), Number(setpoint[2])], "setpoint");
+    const outer = /outer length (\S+) m/.exec(parameters);
+    if (outer) same(settings.params.lengths.at(-1), Number(outer[1]), "outer length");
+    const rate = /(\d+) rad\/s$/.exec(parameters);
+    if (rate && Number(rate[1]) > 2) same(scene.velocity[0], Number(rate[1]), "velocity");
+  });
+  assert.ok(compared > 60, `${compared} figures`);
+});
+
+test("every scene of an arm has all settings, of its own number of links", () => {
+  for (const scene of SCENES.filter(({ links }) => links > 0)) {
+    const { gains, params, integrator, period, setpoint } = settingsOf(scene);
+    for (const list of [gains.kp, params.masses, params.lengths, scene.start, setpoint]) assert.equal(list.length, scene.links, scene.id);
+    assert.ok(integrator.timestep > 0 && period.period >= 0, scene.id);
+  }
+});
