@@ -60,18 +60,6 @@ function forget(text) {
   draw();
 }
 
-/** The settings that a run depends on, as a text. */
-function settings() {
-  return JSON.stringify([state.links, state.params, servo.value === "on" ? state.gains : null]);
-}
-
-/** The move in words. */
-function moveText() {
-  const zero = `(${new Array(state.links).fill(0).join(", ")})`;
-  return servo.value === "on" ? `From rest at ${zero} to (${REACH.slice(0, state.links).join(", ")}) rad with the present gains, the law once a step`
-    : `A free swing from rest at ${zero}`;
-}
-
 async function measure() {
   if (state.links === 0 || !state.params) {
     said.show("There is no arm to measure: not connected.");
@@ -136,13 +124,6 @@ function inWords(best) {
   const uncertainty = uncertaintyOf(found);
   return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${truths}`
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
-}
-
-/** What holding the effort costs, at the shortest timestep that was run; empty for a free arm. */
-function samplingText() {
-  const known = found.filter(({ sampling }) => sampling > 0);
-  const last = known.at(-1);
-  return last ? ` No method helps against the other error (dashed): a law that runs every ${duration(last.timestep)} moves the arm ${significant(last.sampling, 2)} rad from one that acts at every instant.` : "";
 }
 
 function cellOf(method, timestep) {

@@ -58,20 +58,6 @@ function open(served) {
   return served ?? Infinity;
 }
 
-/**
- * The smallest limit in an answer [s], and whether the motion sets it. After a divergence the motion before it counts: a diverged
- * arm is fast because of that, and so is one that shakes beyond the limit where it rests.
- * @param {any} answer of `/study/stability`, for the method in force or another one
- */
-export function smallest(/** @type {any} */ state, answer) {
-  const held = open(answer.timestep_limit ?? answer.timestep_limit_held);
-  const diverged = state.diagnostics?.state === "diverged";
-  const motion = diverged ? state.motionAtStart ?? Infinity : open(answer.timestep_limit_motion);
-  const shakes = !diverged && answer === state.stability && state.integrator?.timestep > held;
-  const moving = motion < held && !shakes;
-  return { held, limit: moving ? motion : held, moving };
-}
-
 /** The limit of the loop in force [s], and what pose or speed it is about. */
 export function limitInForce(/** @type {any} */ state) {
   const answer = answerInForce(state);

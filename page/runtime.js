@@ -60,10 +60,7 @@ export function start(whenReset, whenChanging) {
   pace();
   setInterval(tick, POLL_MS);
   for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
-    watch(key, () => {
-      state.motionAtStart = null;
-      if (!state.stabilityMissing) askStability();
-    });
+    watch(key, () => { if (!state.stabilityMissing) askStability(); });
   }
   for (const key of ["params", "enabled"]) {
     watch(key, () => {
@@ -133,7 +130,6 @@ function jointStates(msg) {
   // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose. A trajectory may have come
   // since: after our own reset's answer, or, as far as the new clock tells, after somebody else's.
   if (time < state.time) {
-    state.motionAtStart = null;
     const now = performance.now();
     const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
     if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
@@ -192,7 +188,6 @@ function diagnostics(msg) {
     const values = Object.fromEntries(status.values.map(({ key, value }) => [key, value]));
     if (status.name === "arm_sim") {
       for (const key of Object.keys(values)) report[key] = key === "state" ? values[key] : told(values[key]);
-      if (report.state === "running" && !state.paused && report.timestep_limit_motion > 0) state.motionAtStart ??= report.timestep_limit_motion;
       const setpoint = values.setpoint ? JSON.parse(values.setpoint) : [];
       const late = performance.now() - lastTrajectory > TRAJECTORY_MS;
       if (late && setpoint.length === state.links && setpoint.every(Number.isFinite)) keepSetpoint(setpoint);

@@ -74,24 +74,6 @@ test("who shakes beyond the limit, or has diverged, is fast because of that: the
   }
 });
 
-test("after a divergence the motion before it counts, and no timestep as long is advised", () => {
-  const answer = { ...VALUES, timestep_limit_held: 0.278, timestep_limit_motion: 1e-150, minimum_over_poses_held: 0.278, equilibrium: [-1.57, 0], equilibrium_kind: "hanging" };
-  const diverged = (timestep, motionAtStart) => arm({ enabled: false, stability: answer, motionAtStart, integrator: { method: "verlet", timestep }, diagnostics: { state: "diverged" } });
-  const found = limitInForce(diverged(0.1, 0.0488));
-  assert.equal(found.limit, 0.0488);
-  assert.ok(Math.abs(found.advised - 0.8 * 0.0488) < 1e-12, `${found.advised}`);
-  assert.match(verdict(diverged(0.1, 0.0488)).sentence, /^100 ms is above the limit 48\.8 ms, moving as it did before/);
-  // What was not known before advises nothing that the arm has just failed at.
-  assert.ok(Number.isNaN(limitInForce(diverged(0.1, null)).advised));
-  assert.doesNotMatch(adviceText(diverged(0.1, null)), /Advised/);
-});
-
-test("a method's button has the limit that the verdict would have with it", () => {
-  const other = { ...VALUES, timestep_limit_held: 0.393, timestep_limit_motion: 0.0762 };
-  assert.equal(smallest(arm({ enabled: false }), other).limit, 0.0762);
-  assert.equal(smallest(arm(), VALUES).limit, limitInForce(arm()).limit);
-});
-
 test("the study is asked again once the motion bears another timestep", () => {
   const changed = (then, now) => motionHasChanged({ stability: { timestep_limit_motion: then }, diagnostics: { timestep_limit_motion: now } });
   assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));

@@ -30,7 +30,6 @@ mod motion;
 mod planner;
 mod poses;
 mod properties;
-mod readme;
 mod recomputed;
 mod readme;
 mod reference;
