@@ -6,7 +6,7 @@
 import { announce } from "./announce.js";
 import { byId } from "./dom.js";
 import { goLive } from "./playback.js";
-import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod } from "./runtime.js";
+import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { set, state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
@@ -48,7 +48,7 @@ export async function takeBack() {
 }
 
 /** Applies what is given, and gives the refusals. The servo comes last, so that it never acts on half of the settings. */
-export async function apply({ integrator, params, gains, period, servo, setpoint }) {
+export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, servo, setpoint, start }) {
   applying = true;
   const answers = [];
   if (servo === false) answers.push(await enable(false));
@@ -57,6 +57,8 @@ export async function apply({ integrator, params, gains, period, servo, setpoint
   if (integrator) answers.push(await setIntegrator(integrator));
   if (period) answers.push(await setPeriod(period));
   if (setpoint) sendSetpoint(setpoint);
+  const zeros = new Array(state.links).fill(0);
+  if (start) answers.push(await setState(start.position ?? zeros, start.velocity ?? zeros));
   if (servo) answers.push(await enable(true));
   applying = false;
   return answers.filter((answer) => !answer.result).map((answer) => answer.status);

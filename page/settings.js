@@ -15,6 +15,7 @@ import { METHODS, exact } from "./format.js";
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
  * @property {boolean | null} servo
  * @property {number[] | null} setpoint
+ * @property {{ position?: number[], velocity?: number[] } | null} [start] where the arm is let go [rad, rad/s]; in links only
  */
 
 /** Changes that can be undone. */
@@ -86,6 +87,7 @@ export function fromFragment(/** @type {string} */ hash) {
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
     servo: onOff("servo") ?? null,
     setpoint: numbers("setpoint") ?? null,
+    ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
   };
 }
 

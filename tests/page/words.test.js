@@ -92,6 +92,11 @@ test("a link may hold less, and what is none of ours is left out", () => {
   assert.equal(settings.integrator, null);
 });
 
+test("a link may say where the arm is let go", () => {
+  assert.deepEqual(fromFragment("#position=0.3,-1e-6&velocity=2,0").start, { position: [0.3, -1e-6], velocity: [2, 0] });
+  assert.equal(fromFragment("#kp=1,2").start, undefined);
+});
+
 test("settings are present once the runtime has said them all", () => {
   assert.equal(presentSettings({ links: 2, integrator: null }), null);
 });
