@@ -243,7 +243,7 @@ impl<const N: usize> LimitSearch<N> {
         linear
     }
 
-    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree there is nothing to search.
+    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree, no search follows.
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
         let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));

@@ -124,7 +124,7 @@ impl<'a, const N: usize> Hamiltonian<'a, N> {
         }
     }
 
-    /// `y' = y + h f((y + y') / 2)`, solved by iteration, which gains two digits or more a round at the steps used here.
+    /// `y' = y + h f((y + y') / 2)`, solved by iteration: two digits or more a round at the steps used here.
     fn step(&mut self, h: f64) {
         const ROUNDS: usize = 12;
         let ahead =

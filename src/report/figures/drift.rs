@@ -122,9 +122,9 @@ fn figure(panels: &[DriftPanel]) -> Figure {
     Figure::new(
         "energy-drift",
         headline(panels),
-        "Free swings at a timestep of 1 ms. Their energy should stay. The scale is the arm's largest change of potential \
-         energy plus its kinetic energy at the start. A line that ends early left the finite numbers. Implicit midpoint \
-         is a baseline of this report: it is symplectic, and its error does not grow with time.",
+        "Free swings at a timestep of 1 ms. Their energy should stay. The scale is the arm's largest change of \
+         potential energy plus its kinetic energy at the start. A line that ends early left the finite numbers. \
+         Implicit midpoint is a baseline of this report: it is symplectic, and its error does not grow with time.",
         &keys,
         &plots,
     )

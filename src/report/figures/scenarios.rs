@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 use crate::report::csv::Csv;
-use crate::report::experiments::scenarios::{self, Scenario, Watched, live};
+use crate::report::experiments::scenarios::{self, LiveRun, Scenario, live};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
 use crate::report::svg::{HEIGHT, Key, WIDTH, escape, number, plain, seconds};
@@ -96,8 +96,8 @@ fn pictures(panels: Vec<String>) -> Figure {
         "scenarios",
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps; the scale is that of the largest angle, which is \
-         written at the right. A cross ends a run that would have left the finite numbers. Below: the time watched, and \
-         whether the scene does as theory says; the table has what that is. A name opens the arm on the page of a \
+         written at the right. A cross ends a run that would have left the finite numbers. Below: the time watched, \
+         and whether the scene does as theory says; the table has the details. A name opens the arm on the page of a \
          running program at 127.0.0.1:9095, which applies the settings on a click.",
         &JOINTS.map(|(class, label)| Key::line(class, label)),
         panels,
@@ -171,7 +171,7 @@ fn picture(scene: &Scenario, holds: Option<bool>) -> String {
     out + &verdict + "</svg>"
 }
 
-fn curves(watched: &Watched) -> String {
+fn curves(watched: &LiveRun) -> String {
     let all = watched.samples.iter().flat_map(|(_, angles)| angles);
     let largest = all.fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
     let end = watched.samples.last().map_or(1.0, |(time, _)| *time);

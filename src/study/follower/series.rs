@@ -7,7 +7,7 @@
 //! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`, products of series are
 //! convolutions, and the accelerations' coefficients solve one linear system after the other, always with the same
 //! matrix. The first of them is given, so that it can come from a kernel that loses fewer digits. Known limit: a last
-//! link of a billion times the mass of the two that it folds costs a digit or two beyond those that its start can't tell.
+//! link of a billion times the mass of the two that it folds costs a digit or two beyond those that its start has lost.
 //!
 //! The series is one for doubles, as the study follows an arm, and for numbers of twice the digits, as the report's
 //! references have them.

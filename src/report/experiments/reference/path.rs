@@ -3,7 +3,7 @@
 //! **Invariant:** an instant beyond the end is answered with the end.
 
 use super::double_double::DoubleDouble as Real;
-use super::taylor::{Piece, Taylor, evaluate};
+use super::taylor::{Taylor, TaylorStep, evaluate};
 use super::{COARSE, FINE, Law, continuous_drive, exact};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
@@ -14,7 +14,7 @@ const COMPARED: u64 = 64;
 /// A motion from a start on, for some time.
 #[derive(Debug, Clone)]
 pub struct ReferencePath<const N: usize> {
-    pieces: Vec<Piece<N>>,
+    pieces: Vec<TaylorStep<N>>,
     uncertainty: f64,
 }
 
@@ -61,7 +61,7 @@ impl<const N: usize> ReferencePath<N> {
 }
 
 /// The joint angles at `time` \[s\].
-fn position<const N: usize>(pieces: &[Piece<N>], time: Real) -> [Real; N] {
+fn position<const N: usize>(pieces: &[TaylorStep<N>], time: Real) -> [Real; N] {
     let after = pieces.partition_point(|piece| (piece.begins - time).to_f64() <= 0.0);
     let Some(piece) = pieces.get(after.saturating_sub(1)) else {
         return [Real::from(f64::NAN); N];

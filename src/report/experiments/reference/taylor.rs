@@ -55,7 +55,7 @@ type Coefficients<const N: usize> = Vec<[Real; N]>;
 
 /// One step of a motion, as a series in the time from its beginning.
 #[derive(Debug, Clone)]
-pub(super) struct Piece<const N: usize> {
+pub(super) struct TaylorStep<const N: usize> {
     /// When it begins \[s\], and where the joints are then \[rad\].
     pub(super) begins: Real,
     pub(super) position: [Real; N],
@@ -95,11 +95,11 @@ impl<const N: usize> Taylor<N> {
         state: &mut Exact<N>,
         drive: &JointDrive<N>,
         time: f64,
-    ) -> Vec<Piece<N>> {
+    ) -> Vec<TaylorStep<N>> {
         let mut pieces = Vec::new();
         self.go(state, drive, time, |taylor, state, rest| {
             let angle = &taylor.series.angle[1..=taylor.setting.order];
-            pieces.push(Piece {
+            pieces.push(TaylorStep {
                 begins: Real::from(time) - rest,
                 position: state.position,
                 angle: angle.iter().map(differences).collect(),

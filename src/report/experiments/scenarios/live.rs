@@ -74,7 +74,7 @@ const HELD: LiveScene = LiveScene {
     ..PLAIN
 };
 
-const fn tip_of(mass: f64, timestep: f64, seconds: f64) -> LiveScene {
+const fn light_link(mass: f64, timestep: f64, seconds: f64) -> LiveScene {
     LiveScene {
         masses: [1.0, mass, 1.0],
         timestep,
@@ -168,9 +168,9 @@ pub fn live(id: &str) -> Result<LiveScene, &'static str> {
             gains: Some([[100.0, 100.0], [2000.0, 2000.0], [20.0, 20.0]]),
             ..HELD
         },
-        "S16" => tip_of(1e-3, 2e-5, 3.0),
-        "S17" => tip_of(1e-6, 2e-8, 2e-3),
-        "S18" => tip_of(1e-9, 2e-11, 2e-6),
+        "S16" => light_link(1e-3, 2e-5, 3.0),
+        "S17" => light_link(1e-6, 2e-8, 2e-3),
+        "S18" => light_link(1e-9, 2e-11, 2e-6),
         "S19" => heavy(1e3, 1e-3),
         "S20" => heavy(1e6, 1e-4),
         "S21" => heavy(1e9, 2e-6),
@@ -253,7 +253,7 @@ const SAMPLES: u64 = 120;
 
 /// Joint angles over time, from the live arm's own steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Watched {
+pub struct LiveRun {
     /// Time \[s\], and the angle of each joint from its start \[rad\].
     pub samples: Vec<(f64, Vec<f64>)>,
     /// Whether the next step would have left the finite numbers.
@@ -265,7 +265,7 @@ impl LiveScene {
     ///
     /// # Errors
     /// Masses, lengths or a gravity that no arm has.
-    pub fn watch(&self) -> Result<Watched, ArmError> {
+    pub fn watch(&self) -> Result<LiveRun, ArmError> {
         if self.links == 2 {
             self.run::<2>()
         } else {
@@ -278,7 +278,7 @@ impl LiveScene {
         clippy::cast_sign_loss,
         reason = "a ratio of two positive times; a cast saturates"
     )]
-    fn run<const N: usize>(&self) -> Result<Watched, ArmError> {
+    fn run<const N: usize>(&self) -> Result<LiveRun, ArmError> {
         let first = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
         let arm = Arm::<N>::new(first(&self.lengths), first(&self.masses), self.gravity)?;
         let control = match self.gains {
@@ -308,7 +308,7 @@ impl LiveScene {
         let each = ((self.seconds / self.timestep).round() as u64)
             .div_ceil(SAMPLES)
             .max(1);
-        let mut watched = Watched {
+        let mut watched = LiveRun {
             samples: vec![(0.0, vec![0.0; N])],
             diverged: false,
         };

@@ -16,7 +16,7 @@ mod sampling;
 mod scenario;
 mod support;
 
-pub use live::{LiveScene, Watched, live};
+pub use live::{LiveRun, LiveScene, live};
 pub use scenario::{Observation, Scenario};
 
 /// All scenes, in order.

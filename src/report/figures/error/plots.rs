@@ -83,11 +83,12 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision-time",
         headline_time(data),
-        "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is the \
-         minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
-         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. Dotted line: \
-         one unit in the last place of 1 rad. The error of a reach is the distance from a law that acts at every instant; that from the loop whose law runs once a period \
-         is the truncation in the figure of the error's parts. Each mark's tooltip has its own evaluations.",
+        "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is \
+         the minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
+         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. Dotted \
+         line: one unit in the last place of 1 rad. The error of a reach is the distance from a law that acts at every \
+         instant; that from the loop whose law runs once a period is the truncation in the figure of the error's \
+         parts. Each mark's tooltip has its own evaluations.",
         &Key::methods(),
         &plots,
     )
