@@ -6,6 +6,11 @@
 //!
 //! **Invariant:** the same states for every way.
 
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
 use std::f64::consts::PI;
 
 use super::reference::{DoubleDouble, exact_acceleration};

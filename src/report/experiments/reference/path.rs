@@ -2,6 +2,11 @@
 //!
 //! **Invariant:** an instant beyond the end is answered with the end.
 
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
 use super::double_double::DoubleDouble as Real;
 use super::taylor::{Taylor, TaylorStep, evaluate};
 use super::{COARSE, FINE, Law, continuous_drive, exact};
