@@ -13,7 +13,10 @@ export class Surface {
     this.onResize = onResize;
     this.width = 0; // CSS pixels
     this.height = 0;
-    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.density = 0; // device pixels in a CSS pixel; 0 before the first size
+    const resized = new ResizeObserver(() => this.fit());
+    resized.observe(canvas);
+    resized.observe(document.body); // what grows above a canvas moves it, by a part of a pixel too
     this.watchDensity();
     this.fit();
   }
@@ -30,6 +33,8 @@ export class Surface {
     // A browser rounds where the edges are, so that a box's place has a say in how many pixels it covers.
     const width = Math.round(right * density) - Math.round(left * density);
     const height = Math.round(bottom * density) - Math.round(top * density);
+    if (width === this.width * this.density && height === this.height * this.density && density === this.density) return;
+    this.density = density;
     this.width = width / density;
     this.height = height / density;
     this.canvas.width = Math.max(1, width);
