@@ -57,8 +57,7 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
   if (integrator) answers.push(await setIntegrator(integrator));
   if (period) answers.push(await setPeriod(period));
   if (setpoint) sendSetpoint(setpoint);
-  const zeros = new Array(state.links).fill(0);
-  if (start) answers.push(await setState(start.position ?? zeros, start.velocity ?? zeros));
+  if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
   if (servo) answers.push(await enable(true));
   applying = false;
   return answers.filter((answer) => !answer.result).map((answer) => answer.status);

@@ -9,7 +9,7 @@ import { goalOptions, showGoalPlace, showGoalRefusal } from "./goal_panel.js";
 import { latestOnly } from "./latest.js";
 import { nearestInReach, nearestTurn } from "./mechanics.js";
 import { goLive } from "./playback.js";
-import { cancelGoal, sendGoal, sendSetpoint, setPose, solve } from "./runtime.js";
+import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
 import { state } from "./store.js";
 
 const INTERVAL_MS = 100;
@@ -78,7 +78,7 @@ async function putArm(place) {
     if (!answer.result) return answer;
     place.pose = pose;
   }
-  return setPose(place.pose);
+  return setState(place.pose);
 }
 
 /** @param {{x: number, y: number}} wished @param {Mode} mode */

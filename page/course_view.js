@@ -134,7 +134,7 @@ async function begin() {
   const { scene, offset, paused } = STEPS[at];
   const refusals = await setScene(scene(state.links), paused ? true : false);
   if (mine !== turn) return;
-  if (offset) await setState(offset.slice(0, state.links), new Array(state.links).fill(0));
+  if (offset) await setState(offset.slice(0, state.links));
   setText(byId("course-status"), refusals.join(" "));
   if (mine !== turn) return;
   ready = true;
@@ -233,7 +233,7 @@ async function runScene(scene) {
   remember();
   const refusals = await setScene(settingsOf(scene), false);
   if (mine !== turn) return;
-  await setState(scene.start, scene.velocity ?? scene.start.map(() => 0));
+  await setState(scene.start, scene.velocity);
   setText(byId("course-status"), refusals.length > 0 ? `Refused: ${refusals.join(" ")}` : `${scene.name}: ${scene.expected}`);
   seen.scenes += 1;
   look();

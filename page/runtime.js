@@ -298,16 +298,13 @@ export async function reset() {
   return answer;
 }
 
-/** Puts the arm into another pose [rad], at these speeds [rad/s]. @param {number[]} position @param {number[]} velocity */
-export async function setState(position, velocity) {
+/**
+ * Puts the arm into another pose [rad], at these speeds [rad/s], else at rest; running or paused. It is no setting, so there is
+ * nothing to undo.
+ * @param {number[]} position @param {number[]} [velocity]
+ */
+export async function setState(position, velocity = position.map(() => 0)) {
   const answer = await bridge.call("/arm_sim/set_state", { position, velocity });
-  if (answer.result) touch();
-  return answer;
-}
-
-/** Puts the arm into another pose [rad], at rest, running or paused. It is no setting, so there is nothing to undo. */
-export async function setPose(position) {
-  const answer = await bridge.call("/arm_sim/set_state", { position, velocity: position.map(() => 0) });
   if (answer.result) {
     touch();
     state.pushed = false; // energy is counted anew
