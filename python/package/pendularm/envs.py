@@ -216,6 +216,23 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._ended = self._ended & ~mask
 
 
+def _arguments_and_rendering(target):
+    """The end of both tasks' documentation; `target` says what is drawn as one."""
+    return f"""## Arguments
+    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
+    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
+    `Batch` does, and `max_episode_steps`, -1 for no limit.
+
+    ## Rendering
+    Drawn are the arm, the target (here that is {target}) and the last 2 s of the end effector's path. A frame is
+    (480, 480, 3) of uint8; the vector environment returns a tuple with a frame per arm, and a window shows its first
+    16 arms. It needs pygame: `pip install "pendularm[render]"`.
+
+    ## Versions
+    v0: the first.
+    """
+
+
 _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as strong as would hold it stretched out.
 
     ## Action
@@ -238,19 +255,7 @@ _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as s
     Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25
     rad/s; truncated after 200 steps (10 s).
 
-    ## Arguments
-    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
-    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
-    `Batch` does, and `max_episode_steps`, -1 for no limit.
-
-    ## Rendering
-    Drawn are the arm, the target (here that is the highest point) and the last 2 s of the end effector's path. A frame is
-    (480, 480, 3) of uint8; the vector environment returns a tuple with a frame per arm, and a window shows its first
-    16 arms. It needs pygame: `pip install "pendularm[render]"`.
-
-    ## Versions
-    v0: the first.
-    """
+    """ + _arguments_and_rendering("the highest point")
 
 _REACH = """The end effector is to come to a target and stay, with efforts twice as strong as hold the arm stretched.
 
@@ -276,19 +281,7 @@ _REACH = """The end effector is to come to a target and stay, with efforts twice
     At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns
     faster than 25 rad/s; truncated after 100 steps (5 s).
 
-    ## Arguments
-    `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
-    by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as
-    `Batch` does, and `max_episode_steps`, -1 for no limit.
-
-    ## Rendering
-    Drawn are the arm, the target (here that is the one observed) and the last 2 s of the end effector's path. A frame is
-    (480, 480, 3) of uint8; the vector environment returns a tuple with a frame per arm, and a window shows its first
-    16 arms. It needs pygame: `pip install "pendularm[render]"`.
-
-    ## Versions
-    v0: the first.
-    """
+    """ + _arguments_and_rendering("the one observed")
 
 
 class PendularmEnv(_Single):
