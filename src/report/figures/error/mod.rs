@@ -20,8 +20,9 @@ use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let data = compute(making);
-    making.keep("work-precision-time", table_of_runs(&data));
-    making.keep("convergence", table_of_runs(&data));
+    let runs = table_of_runs(&data);
+    making.keep("work-precision-time", runs.clone());
+    making.keep("convergence", runs);
     Section {
         findings: findings(&data),
         verdicts: verdicts(&data),
