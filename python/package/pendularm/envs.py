@@ -216,7 +216,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._ended = self._ended & ~mask
 
 
-def _arguments_and_rendering(target):
+def _arguments_and_rendering(target: str) -> str:
     """The end of both tasks' documentation; `target` says what is drawn as one."""
     return f"""## Arguments
     `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
