@@ -190,6 +190,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
                 hosts,
                 origins,
                 strict_origin,
+                frames,
                 report,
             } = options.web.clone();
             let token = options.token.clone();
@@ -199,7 +200,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
                 origins,
                 strict_origin,
             };
-            Site::new(access, report)
+            Site::new(access, report).framed_by(&frames)
         },
         newcomers: Newcomers::of(unauthenticated),
     }

@@ -24,7 +24,7 @@ use self::values::{
     read_bind, read_clients, read_level, read_log_format, read_period, read_seed, read_token,
 };
 #[cfg(feature = "web")]
-use self::values::{read_host, read_origin, read_switch};
+use self::values::{read_frame, read_host, read_origin, read_switch};
 #[cfg(feature = "cli")]
 use crate::command::{CommandSubject, UNQUOTED};
 use crate::logging::LogFormat;
@@ -135,6 +135,14 @@ pub struct WebOptions {
     #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     #[arg(value_parser = ValueReader(read_switch))]
     pub strict_origin: bool,
+    /// Pages of other sites that may show this page and the report in a frame, by origin, separated by commas
+    #[arg(
+        long = "allow-frame",
+        env = "ARM_SIM_ALLOW_FRAME",
+        value_name = "ORIGINS"
+    )]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame))]
+    pub frames: Vec<Box<str>>,
     /// Folder of the report that is shown at /report/
     #[arg(long, env = "ARM_SIM_REPORT", value_name = "FOLDER", default_value = DEFAULT_REPORT)]
     pub report: PathBuf,

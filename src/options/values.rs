@@ -78,6 +78,18 @@ pub(super) fn read_origin(text: &str) -> Result<Box<str>, String> {
     needed(is_origin.then(|| origin.into()), needs, text)
 }
 
+/// A page that may show ours in a frame. A browser compares its scheme, host and port; a page without a host has none.
+#[cfg(feature = "web")]
+pub(super) fn read_frame(text: &str) -> Result<Box<str>, String> {
+    let origin = text.trim().to_ascii_lowercase();
+    let host = ["http://", "https://"]
+        .iter()
+        .find_map(|scheme| origin.strip_prefix(scheme));
+    let is_page = host.and_then(Authority::parse).is_some();
+    let needs = "origins of web pages, such as https://example.org, separated by commas";
+    needed(is_page.then(|| origin.into()), needs, text)
+}
+
 #[cfg(feature = "web")]
 pub(super) fn read_switch(text: &str) -> Result<bool, String> {
     let switch = match text {

@@ -42,6 +42,8 @@ pub struct Site {
     pub access: Access,
     /// Folder of the last report.
     pub report: PathBuf,
+    /// Origins whose pages may show the page and the report in a frame, separated by spaces.
+    frames: String,
     disk: Disk,
 }
 
@@ -49,11 +51,17 @@ impl Site {
     /// A site with these rules, and the report that is in that folder.
     #[must_use]
     pub fn new(access: Access, report: PathBuf) -> Self {
-        let disk = Disk::default();
         Self {
             access,
             report,
-            disk,
+            ..Self::default()
         }
+    }
+
+    /// The same site, which pages of these origins may show in a frame.
+    #[must_use]
+    pub fn framed_by(self, origins: &[Box<str>]) -> Self {
+        let frames = origins.join(" ");
+        Self { frames, ..self }
     }
 }

@@ -56,6 +56,20 @@ pub fn text(status: StatusCode, sentence: &str) -> HttpResponse {
     response
 }
 
+/// Lets pages of these origins, separated by spaces, show the answer in a frame.
+pub(super) fn permit_frames(response: &mut HttpResponse, origins: &str) {
+    let headers = response.headers_mut();
+    let policy = headers.get(CONTENT_SECURITY_POLICY);
+    let Some(policy) = policy.and_then(|policy| policy.to_str().ok()) else {
+        return;
+    };
+    let permitted = format!("frame-ancestors {origins}");
+    let policy = policy.replace("frame-ancestors 'none'", &permitted);
+    // This header can only refuse all other pages. Browsers that know `frame-ancestors` do not read it.
+    headers.remove(X_FRAME_OPTIONS);
+    set(response, CONTENT_SECURITY_POLICY, &policy);
+}
+
 /// Sets a header, whose value is ours.
 pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
     if let Ok(value) = HeaderValue::from_str(value) {

@@ -23,7 +23,7 @@ use tokio::time::{Instant, timeout};
 use super::access::AccessError;
 use super::authority::Authority;
 use super::head::{MAX_HEAD, MAX_HEADERS, RequestHead};
-use super::response::{AnswerBody, HttpResponse, file, refusal, set, text};
+use super::response::{AnswerBody, HttpResponse, file, permit_frames, refusal, set, text};
 use super::stream::{Deadline, HttpStream};
 use super::{Site, page, report, upgrade};
 
@@ -162,6 +162,9 @@ impl<G: Gate> Responder<'_, G> {
             Ok((own, cookie)) => match self.gate.admit().await {
                 Ok(()) => {
                     let mut response = self.resource(&request, &own).await;
+                    if response.status() == StatusCode::OK && !self.site.frames.is_empty() {
+                        permit_frames(&mut response, &self.site.frames);
+                    }
                     if let Some(cookie) = cookie {
                         set(&mut response, SET_COOKIE, &cookie);
                     }

@@ -130,6 +130,20 @@ class Hostile(PageTest):
             refused = lambda: sum("frame-ancestors" in one and "blocked" in one for one in page.complaints)
             self.wait(lambda: refused() == 2, f"two refusals, got {page.complaints}")
 
+    def test_a_page_that_an_option_names_may_frame_the_page(self):
+        port, stop = serve(self, "")
+        stop()
+        self.runtime.stop()
+        site = f"http://{FOREIGN}:{port}"
+        self.runtime = Runtime("--report", self.report.name, "--allow-frame", site)
+        self.addCleanup(self.runtime.__exit__)
+        _, stop = serve(self, f'<iframe src="{self.runtime.url}"></iframe>', port)
+        self.addCleanup(stop)
+        page = browser().page(f"{site}/")
+        self.addCleanup(page.close)
+        heard = lambda: self.runtime.call("/rosapi/subscribers", topic="/joint_states")["values"]["subscribers"]
+        self.wait(heard, f"the framed page hears the arm, got {page.complaints}")
+
     def test_a_window_that_a_foreign_page_opens_is_out_of_its_reach(self):
         page = self.visit("")
         page.run(f"window.opened = window.open('{self.runtime.url}'); 0")

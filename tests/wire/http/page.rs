@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::common::{PATIENCE, Runtime};
-use crate::web_client::{Answer, get, rest};
+use crate::web_client::{Answer, folder, get, rest};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -100,6 +100,31 @@ fn the_page_may_run_its_own_files_speak_to_its_own_port_and_nothing_else() {
         for start in elsewhere {
             assert!(!page.text().contains(&format!("{quote}{start}")));
         }
+    }
+}
+
+#[test]
+fn pages_of_the_named_origins_may_frame_the_page_and_its_report_and_no_others() {
+    let folder = folder("framed");
+    std::fs::write(folder.join("index.html"), "report").unwrap();
+    let folder = folder.to_str().unwrap();
+    let named = "https://Class.example,http://localhost:8000";
+    let framed = Runtime::with(&["--allow-frame", named, "--report", folder]);
+    for path in ["/", "/report/", "/main.js"] {
+        let answer = get(framed.address, path);
+        let policy = answer.header("content-security-policy").unwrap();
+        let ancestors = "frame-ancestors https://class.example http://localhost:8000";
+        assert!(policy.split("; ").any(|one| one == ancestors), "{policy}");
+        assert_eq!(answer.header("x-frame-options"), None, "{path}");
+    }
+    let refused = get(framed.address, "/nothing");
+    assert_eq!(refused.header("x-frame-options"), Some("DENY"));
+    let alone = Runtime::with(&["--report", folder]);
+    for path in ["/", "/report/"] {
+        let answer = get(alone.address, path);
+        let policy = answer.header("content-security-policy").unwrap();
+        assert!(policy.contains("frame-ancestors 'none'"), "{policy}");
+        assert_eq!(answer.header("x-frame-options"), Some("DENY"), "{path}");
     }
 }
 

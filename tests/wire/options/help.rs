@@ -31,6 +31,8 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
             "false",
         ),
         #[cfg(feature = "web")]
+        ("--allow-frame <ORIGINS>", "ARM_SIM_ALLOW_FRAME", ""),
+        #[cfg(feature = "web")]
         ("--report <FOLDER>", "ARM_SIM_REPORT", "report"),
     ] {
         let line = help.lines().find(|line| line.contains(option)).unwrap();

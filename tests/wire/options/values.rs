@@ -229,6 +229,21 @@ fn what_is_no_host_or_origin_or_switch_is_refused_by_name_and_value() {
             "{refused}"
         );
     }
+    for value in [
+        "example.org",
+        "file://",
+        "null",
+        "https://a/b",
+        "https://a; script-src *",
+        "*",
+    ] {
+        let refused = refusal(&[&format!("--allow-frame={value}")]);
+        assert!(
+            refused.starts_with("--allow-frame must be origins of web pages")
+                && refused.ends_with(&format!("got {value:?}")),
+            "{refused}"
+        );
+    }
     assert_eq!(
         refusal(&["--strict-origin=maybe"]),
         "--strict-origin must be true or false, got \"maybe\""
