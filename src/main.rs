@@ -10,7 +10,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::ExitCode;
 
-use pendularm::actors::{panics, runtime, signals};
+use pendularm::actors::{panics, runtime};
 #[cfg(feature = "cli")]
 use pendularm::command::{self, CommandError};
 use pendularm::logging::{self, LogFormat};
@@ -23,17 +23,17 @@ use pendularm::plan;
 use pendularm::record;
 #[cfg(feature = "report")]
 use pendularm::report;
-use tikv_jemalloc_ctl::{Access, AsName};
-use tikv_jemallocator::Jemalloc;
 
 /// Memory that was freed goes back to the system soon, by a thread that nobody waits for. The C library's allocator
 /// keeps it for ever where the last of it lies behind something small, which after a burst of small messages is the
 /// rule.
+#[cfg(unix)]
 #[global_allocator]
-static ALLOCATOR: Jemalloc = Jemalloc;
+static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 
 /// How long freed memory is kept for whoever asks next, in milliseconds. The allocator's own ten seconds are enough to
 /// fill it with what one client held, and then as much again with what the next one does: beyond what README promises.
+#[cfg(unix)]
 const FREED_KEPT_MS: isize = 500;
 
 /// Exit status for whatever else fails.
@@ -41,13 +41,22 @@ const FAILED: u8 = 1;
 /// Exit status for a bad option or a bad environment variable.
 const BAD_USAGE: u8 = 2;
 
-fn main() -> ExitCode {
+/// Has freed memory given back in [`FREED_KEPT_MS`].
+#[cfg(unix)]
+fn give_memory_back_soon() {
+    use tikv_jemalloc_ctl::{Access, AsName};
     // Arenas yet to come, and the one that this thread has. An allocator that refuses keeps its own time.
     for key in ["arenas.dirty_decay_ms\0", "arena.0.dirty_decay_ms\0"] {
         let _ = key.name().write(FREED_KEPT_MS);
     }
+}
+
+fn main() -> ExitCode {
+    #[cfg(unix)]
+    give_memory_back_soon();
+    #[cfg(unix)]
     // Without the handler a file that is too long kills the process, which nothing else depends on.
-    let _ = signals::survive_file_size_limit();
+    let _ = pendularm::actors::signals::survive_file_size_limit();
     match Options::parse(std::env::args_os()) {
         Ok(Parsed::Serve(options)) => serve(&options),
         #[cfg(feature = "report")]

@@ -6,25 +6,35 @@
 //! **Invariant:** from a signal on the process lives for [`LAST_RESORT`] at most.
 
 use std::future::poll_fn;
+use std::io;
 use std::sync::mpsc;
-use std::task::Poll;
+use std::task::{Context, Poll};
 use std::thread;
 use std::time::Duration;
 
+#[cfg(unix)]
 use rustix::process::Signal;
 use tokio::runtime::{Builder, Runtime};
-use tokio::signal::unix::{Signal as Arrivals, SignalKind, signal};
+#[cfg(unix)]
+use tokio::signal::unix::{SignalKind, signal};
+#[cfg(windows)]
+use tokio::signal::windows;
 use tokio::sync::oneshot;
 
 /// How long an orderly end may take: all of the second that a signal is given, but for what the log and the process
 /// itself need.
 pub const LAST_RESORT: Duration = Duration::from_millis(850);
 
+/// A request that has come, by name; or the task is woken when one does.
+type Arrivals = Box<dyn FnMut(&mut Context<'_>) -> Poll<&'static str> + Send>;
+
 /// Requests to end. They count even if the program was started with them ignored, as a shell starts jobs in the
 /// background.
+#[cfg(unix)]
 const REQUESTS: [(&str, Signal); 2] = [("SIGINT", Signal::INT), ("SIGTERM", Signal::TERM)];
 /// Further signals that end a process by default. They end the program in order, unless it was started with them
 /// ignored, as `nohup` starts a program. SIGABRT is not among them, because it asks for a core dump.
+#[cfg(unix)]
 const FATAL: &[(&str, Signal)] = &[
     ("SIGHUP", Signal::HUP),
     ("SIGQUIT", Signal::QUIT),
@@ -47,18 +57,53 @@ const FATAL: &[(&str, Signal)] = &[
 ///
 /// # Errors
 /// If the operating system refuses the signal handler.
-pub fn survive_file_size_limit() -> std::io::Result<()> {
+#[cfg(unix)]
+pub fn survive_file_size_limit() -> io::Result<()> {
     let runtime = runtime()?;
     let _entered = runtime.enter();
     // The handler stays for as long as the process lives.
     signal(SignalKind::from_raw(Signal::XFSZ.as_raw())).map(drop)
 }
 
-fn runtime() -> std::io::Result<Runtime> {
+fn runtime() -> io::Result<Runtime> {
     Builder::new_current_thread().enable_all().build()
 }
 
+/// The signals of this process, from now on. It needs a runtime of Tokio's.
+#[cfg(unix)]
+fn arrivals() -> io::Result<Vec<Arrivals>> {
+    let ignored = ignored_at_start();
+    let is_heard = |number: i32| ignored & (1 << (number - 1)) == 0;
+    let further = FATAL
+        .iter()
+        .filter(|(_, one)| is_heard(one.as_raw()))
+        .copied();
+    let all = REQUESTS.into_iter().chain(further);
+    all.map(|(name, one)| {
+        let mut one = signal(SignalKind::from_raw(one.as_raw()))?;
+        let poll = move |cx: &mut Context<'_>| one.poll_recv(cx).map(|_| name);
+        Ok(Box::new(poll) as Arrivals)
+    })
+    .collect()
+}
+
+/// The events of a console that end a process by default, from now on. It needs a runtime of Tokio's.
+#[cfg(windows)]
+fn arrivals() -> io::Result<Vec<Arrivals>> {
+    let mut ctrl_c = windows::ctrl_c()?;
+    let mut ctrl_break = windows::ctrl_break()?;
+    let mut close = windows::ctrl_close()?;
+    let mut shutdown = windows::ctrl_shutdown()?;
+    Ok(vec![
+        Box::new(move |cx| ctrl_c.poll_recv(cx).map(|_| "Ctrl-C")),
+        Box::new(move |cx| ctrl_break.poll_recv(cx).map(|_| "Ctrl-Break")),
+        Box::new(move |cx| close.poll_recv(cx).map(|_| "console closed")),
+        Box::new(move |cx| shutdown.poll_recv(cx).map(|_| "system shutdown")),
+    ])
+}
+
 /// The signals that the program was started with ignored, a bit for each. Only Linux says.
+#[cfg(unix)]
 fn ignored_at_start() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status
@@ -82,28 +127,18 @@ impl Signals {
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.
-    pub(super) fn hear(last_resort: Box<dyn FnOnce() + Send>) -> std::io::Result<Self> {
+    pub(super) fn hear(last_resort: Box<dyn FnOnce() + Send>) -> io::Result<Self> {
         let runtime = runtime()?;
-        let ignored = ignored_at_start();
-        let is_heard = |number: i32| ignored & (1 << (number - 1)) == 0;
-        let further = FATAL
-            .iter()
-            .filter(|(_, one)| is_heard(one.as_raw()))
-            .copied();
-        let mut arrivals: Vec<(&str, Arrivals)> = {
+        let mut arrivals = {
             let _entered = runtime.enter();
-            let all = REQUESTS.into_iter().chain(further);
-            all.map(|(name, one)| Ok((name, signal(SignalKind::from_raw(one.as_raw()))?)))
-                .collect::<std::io::Result<_>>()?
+            arrivals()?
         };
         let (come, came) = oneshot::channel();
         let (orderly, has_ended) = mpsc::channel::<()>();
         let wait = move || {
             let name = runtime.block_on(poll_fn(|cx| {
-                let mut all = arrivals.iter_mut();
-                let first =
-                    all.find_map(|(name, one)| one.poll_recv(cx).is_ready().then_some(*name));
-                first.map_or(Poll::Pending, Poll::Ready)
+                let mut all = arrivals.iter_mut().map(|poll| poll(cx));
+                all.find(Poll::is_ready).unwrap_or(Poll::Pending)
             }));
             // Nobody hears it if the runtime has ended by itself.
             let _ = come.send(());
@@ -121,6 +156,7 @@ impl Signals {
 }
 
 #[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::process::Command;

@@ -4,7 +4,10 @@
 
 use clap::Subcommand;
 use serde_json::{Value, json};
-use tokio::signal::unix::{SignalKind, signal};
+#[cfg(unix)]
+use tokio::signal::unix;
+#[cfg(windows)]
+use tokio::signal::windows;
 
 use super::arguments::TypedValue;
 use super::graph::{self, GraphVerb};
@@ -116,11 +119,26 @@ pub(super) async fn run_action(
     }
 }
 
+/// The requests that end a command.
+#[cfg(unix)]
+fn signals() -> std::io::Result<(unix::Signal, unix::Signal)> {
+    let hear = unix::signal;
+    Ok((
+        hear(unix::SignalKind::interrupt())?,
+        hear(unix::SignalKind::terminate())?,
+    ))
+}
+
+/// The same from a console of Windows.
+#[cfg(windows)]
+fn signals() -> std::io::Result<(windows::CtrlC, windows::CtrlBreak)> {
+    Ok((windows::ctrl_c()?, windows::ctrl_break()?))
+}
+
 /// Waits for the end of a goal that was sent. The first signal cancels it, the second ends the command.
 async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError> {
     let cancel = json!({"op": "cancel_action_goal", "id": "goal", "action": action});
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let mut terminate = signal(SignalKind::terminate())?;
+    let (mut interrupt, mut terminate) = signals()?;
     let mut is_canceled = false;
     loop {
         let said = tokio::select! {

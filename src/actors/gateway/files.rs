@@ -28,9 +28,8 @@ pub struct Room {
 pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
     let wanted = wanted_clients + MAX_UNAUTHENTICATED + OTHER_FILES + REFUSED_AT_ONCE;
     // It is never lowered.
-    match rlimit::increase_nofile_limit(wanted as u64) {
+    match raise_limit(wanted) {
         Ok(files) => {
-            let files = usize::try_from(files).unwrap_or(usize::MAX);
             let room = room_with(files, wanted_clients, asks_token);
             let clients = room.clients;
             if clients < wanted_clients {
@@ -47,6 +46,19 @@ pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
             room_with(usize::MAX, wanted_clients, asks_token)
         }
     }
+}
+
+/// Raises the limit to `wanted` or the most that is allowed. Returns how many files may be open now.
+#[cfg(unix)]
+fn raise_limit(wanted: usize) -> std::io::Result<usize> {
+    let files = rlimit::increase_nofile_limit(wanted as u64)?;
+    Ok(usize::try_from(files).unwrap_or(usize::MAX))
+}
+
+/// Windows has no limit of sockets for a process.
+#[cfg(windows)]
+fn raise_limit(_: usize) -> std::io::Result<usize> {
+    Ok(usize::MAX)
 }
 
 /// Counts the places for so many open files: there is at least one client. Where files are few, those without the token

@@ -11,6 +11,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
+#[cfg(unix)]
 use rustix::time::{ClockId, clock_gettime};
 
 thread_local! {
@@ -51,11 +52,22 @@ pub fn now() -> Instant {
 pub fn spent() -> Duration {
     match COUNTED.get() {
         Some(counted) => counted.look().spent,
-        // Nothing is charged on a machine whose clock would run backwards.
-        None => clock_gettime(ClockId::ThreadCPUTime)
-            .try_into()
-            .unwrap_or_default(),
+        None => processor_time(),
     }
+}
+
+/// Nothing is charged on a machine whose clock would run backwards.
+#[cfg(unix)]
+fn processor_time() -> Duration {
+    let spent = clock_gettime(ClockId::ThreadCPUTime);
+    spent.try_into().unwrap_or_default()
+}
+
+/// Windows says only in sixtieths of a second, so elapsed time is charged there.
+#[cfg(windows)]
+fn processor_time() -> Duration {
+    static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    BEGAN.elapsed()
 }
 
 /// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time

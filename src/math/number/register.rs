@@ -102,6 +102,7 @@ pub(in crate::math) fn apart<S: Simd, R>(simd: S, work: impl FnOnce() -> R) -> R
 }
 
 /// A register of two, as plain `x86-64` has them.
+#[cfg(target_arch = "x86_64")]
 impl<S: Simd<f64s = f64x2<S>>> Wide<S, 1> {
     /// A number in each lane.
     #[inline(always)]
