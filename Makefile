@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -159,15 +159,21 @@ soak: ## Let badly behaved clients come and go for MINUTES (1), and check what m
 	@MINUTES="$(MINUTES)" SEED="$(SEED)" ONLY="$(ONLY)" bash scripts/soak.sh
 
 clean: ## Remove what was built, measured and packed; vendored sources stay
-	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, report/, $(ARCHIVE)"
+	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, dist/, report/, $(ARCHIVE)"
 	$(CARGO) clean
-	rm -rf $(ARCHIVE) report fuzz/target python/target tests/clients/roslibrust/target
+	rm -rf $(ARCHIVE) dist report fuzz/target python/target tests/clients/roslibrust/target
 
 vendor: ## Fetch the dependencies' sources into vendor/, so that every later build is offline
 	@bash scripts/vendor.sh
 
 submission: ## Pack submission.tar.gz: this project with its dependencies' sources, ready to build offline
 	@bash scripts/package.sh $(ARCHIVE)
+
+dist: page submission ## Put all that people can fetch into dist/: static program, wheel, pendularm.html, sources, bill of materials, checksums
+	@bash scripts/dist.sh
+
+test-dist: ## Install each thing in dist/ where nothing else is, and use it; needs Chromium, and a network for the wheel
+	@bash scripts/test-dist.sh
 
 test-submission: submission ## Pack, then build and start the archive's program with no network and an empty CARGO_HOME
 	@bash scripts/test-package.sh $(ARCHIVE)

@@ -5,8 +5,10 @@ program=$1
 prefix=$2
 
 mkdir -p "$prefix/bin"
-cp "$program" "$prefix/bin/pendularm"
-chmod 755 "$prefix/bin/pendularm"
+# On Windows a program has an ending.
+case $program in *.exe) file=pendularm.exe ;; *) file=pendularm ;; esac
+cp "$program" "$prefix/bin/$file"
+chmod 755 "$prefix/bin/$file"
 "$program" completions --help >/dev/null 2>&1 || exit 0
 
 completions() { # shell, folder, file

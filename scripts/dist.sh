@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Puts what people can fetch into dist/: the program and the wheel for this system; on Linux also the page as one file, the
+# sources with their dependencies, and a bill of materials; checksums. `make dist` has built pendularm.html and
+# submission.tar.gz before.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
+system=$(uname -s | tr '[:upper:]' '[:lower:]' | sed 's/^mingw.*/windows/')-$(uname -m)
+name=pendularm-$version-$system
+
+say() { echo "dist: $*"; }
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+rm -rf dist
+mkdir dist
+
+case $system in
+linux-*)
+    export PORTABLE=1
+    program=$(bash scripts/static.sh)
+    cp pendularm.html dist/
+    cp submission.tar.gz "dist/pendularm-$version-sources.tar.gz"
+    python3 scripts/notices.py --sbom "dist/pendularm-$version.cdx.json"
+    ;;
+*)
+    cargo build --release --locked
+    program=${CARGO_TARGET_DIR:-target}/release/pendularm
+    [ -e "$program" ] || program=$program.exe
+    ;;
+esac
+
+bash scripts/wheel.sh "$program"
+cp python/target/wheels/*.whl dist/
+
+bash scripts/install.sh "$program" "$work/$name"
+cp LICENSE-MIT LICENSE-APACHE README.md SECURITY.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
+tar -czf "dist/$name.tar.gz" -C "$work" "$name"
+
+if command -v sha256sum >/dev/null; then sums=(sha256sum); else sums=(shasum -a 256); fi
+(cd dist && "${sums[@]}" -- * >"$work/SHA256SUMS" && mv "$work/SHA256SUMS" .)
+for file in dist/*; do say "$file: $(wc -c <"$file") bytes"; done

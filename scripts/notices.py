@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""Says what others' work is in the program and in the wheel: notices with the licences' texts, or a bill of materials.
+
+notices.py --notices FILE, or --sbom FILE (CycloneDX 1.5). Asked is Cargo alone, for this platform, without what only
+builds or tests.
+"""
+
+import argparse
+import hashlib
+import json
+import subprocess
+import tomllib
+import uuid
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+MANIFESTS = [ROOT / "Cargo.toml", ROOT / "python/Cargo.toml"]
+LICENCES = ["LICEN[CS]E*", "COPYING*", "NOTICE*", "UNLICENSE*", "*/COPYING"]
+BESIDE = """The program contains the standard library of Rust (MIT OR Apache-2.0, https://github.com/rust-lang/rust), and where it is
+static the C library musl (MIT, https://musl.libc.org)."""
+
+
+def shipped(manifest: Path) -> tuple[dict, list[dict]]:
+    """The package of a manifest, and the packages whose code is in what is built from it."""
+    host = next(line.split()[1] for line in output("rustc", "-vV").splitlines() if line.startswith("host:"))
+    asked = ["cargo", "metadata", "--locked", "--format-version", "1", "--manifest-path", str(manifest)]
+    metadata = json.loads(output(*asked, "--filter-platform", host))
+    packages = {package["id"]: package for package in metadata["packages"]}
+    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
+    root = metadata["resolve"]["root"]
+    found, open_ = set(), [root]
+    while open_:
+        node = open_.pop()
+        if node not in found:
+            found.add(node)
+            for dependency in nodes[node]["deps"]:
+                if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
+                    open_.append(dependency["pkg"])
+    return packages[root], [packages[one] for one in found if packages[one]["source"]]
+
+
+def output(*command: str) -> str:
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def notices(product: dict, packages: list[dict]) -> str:
+    """A line for each package, then each text once, under those whose it is."""
+    lines, owners = [], {}
+    for package in packages:
+        name = f"{package['name']} {package['version']}"
+        origin = package["repository"] or package["homepage"] or "; ".join(package["authors"])
+        lines.append(f"{name}: {package['license']}, {origin}")
+        folder = Path(package["manifest_path"]).parent
+        for file in sorted({file for pattern in LICENCES for file in folder.glob(pattern) if file.is_file()}):
+            text = file.read_text(encoding="utf-8", errors="replace").strip()
+            owners.setdefault(" ".join(text.split()), (text, []))[1].append(name)
+    head = f"{product['name']} {product['version']} contains these packages, each under its own licence.\n{BESIDE}"
+    texts = [f"{'=' * 80}\n{', '.join(names)}\n\n{text}" for text, names in owners.values()]
+    return "\n\n".join([head, "\n".join(lines), *texts]) + "\n"
+
+
+def component(package: dict, checksums: dict[tuple[str, str], str]) -> dict:
+    name, version = package["name"], package["version"]
+    return {
+        "type": "library",
+        "bom-ref": f"pkg:cargo/{name}@{version}",
+        "name": name,
+        "version": version,
+        "purl": f"pkg:cargo/{name}@{version}",
+        "licenses": [{"expression": package["license"].replace("/", " OR ")}],
+        "hashes": [{"alg": "SHA-256", "content": checksums[name, version]}],
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted.add_argument("--notices", type=Path)
+    wanted.add_argument("--sbom", type=Path)
+    options = parser.parse_args()
+    product, packages, checksums = {}, {}, {}
+    for manifest in MANIFESTS:
+        own, others = shipped(manifest)
+        product = product or own
+        packages |= {(package["name"], package["version"]): package for package in others}
+        locked = tomllib.loads(manifest.with_name("Cargo.lock").read_text(encoding="utf-8"))["package"]
+        checksums |= {(one["name"], one["version"]): one["checksum"] for one in locked if "checksum" in one}
+    rows = [packages[name] for name in sorted(packages)]
+    if options.notices:
+        options.notices.write_text(notices(product, rows), encoding="utf-8")
+        return
+    components = [component(package, checksums) for package in rows]
+    known = hashlib.sha256(json.dumps(components).encode()).digest()[:16]
+    bill = {
+        "$schema": "http://cyclonedx.org/schema/bom-1.5.schema.json",
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "serialNumber": f"urn:uuid:{uuid.UUID(bytes=known, version=4)}",
+        "version": 1,
+        "metadata": {
+            "component": {
+                "type": "application",
+                "bom-ref": product["name"],
+                "name": product["name"],
+                "version": product["version"],
+                "licenses": [{"expression": product["license"]}],
+            }
+        },
+        "components": components,
+    }
+    options.sbom.write_text(json.dumps(bill, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

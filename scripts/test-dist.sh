@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# Installs each thing in dist/ where nothing else is, and uses it: the program in an empty folder as its root, the wheel in a
+# fresh virtual environment, the page in Chromium from disk. `make test-submission` builds the sources without a network.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+root=$PWD
+
+say() { echo "test-dist: $*"; }
+fail() { echo "test-dist: $*" >&2; exit 1; }
+
+work=$(mktemp -d)
+server=
+finish() {
+    [ -z "$server" ] || kill -KILL "$server" 2>/dev/null || true
+    rm -rf "$work"
+}
+trap finish EXIT
+
+(cd dist && sha256sum --quiet --check SHA256SUMS) || fail "a checksum is wrong"
+[ "$(cd dist && ls | grep -vc SHA256SUMS)" = "$(wc -l <dist/SHA256SUMS)" ] || fail "a file has no checksum"
+
+say "the program, where there is no other file"
+mkdir "$work/empty"
+tar -xzf dist/pendularm-*-"$(uname -s | tr '[:upper:]' '[:lower:]')-$(uname -m)".tar.gz -C "$work"
+cp "$work"/pendularm-*/bin/pendularm "$work/empty"
+grep -q '^glam ' "$work"/pendularm-*/NOTICE-THIRD-PARTY.txt || fail "no notices"
+alone=(chroot "$work/empty")
+"${alone[@]}" /pendularm --version 2>/dev/null || alone=(unshare -r chroot "$work/empty")
+"${alone[@]}" /pendularm --bind 127.0.0.1:0 --log off >"$work/out" &
+server=$!
+for _ in $(seq 300); do
+    grep -q '^listening on ' "$work/out" && break
+    sleep 0.1
+done
+port=$(sed -n 's/^listening on .*://p' "$work/out")
+[ -n "$port" ] || fail "no listening line within 30 s"
+exec 3<>"/dev/tcp/127.0.0.1/$port"
+echo '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' >&3
+IFS= read -r -t 30 reply <&3 || fail "no answer within 30 s"
+[[ $reply == *'"result":true'* ]] || fail "$reply"
+kill -TERM "$server"
+wait "$server" || fail "exit status $?"
+server=
+
+say "the wheel, in a fresh environment"
+python3 -m venv "$work/environment"
+"$work/environment/bin/pip" install --quiet --disable-pip-version-check dist/*.whl "cyclonedx-python-lib[json-validation]>=11,<12"
+cd "$work"
+environment/bin/python - "$root"/dist/*.cdx.json <<'END'
+import importlib.metadata, pathlib, sys
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+import pendularm
+
+run = pendularm.rollout(duration=1.0, reference=True)
+assert run.error < 1e-6, run.error
+files = [file.name for file in importlib.metadata.files("pendularm")]
+assert "NOTICE-THIRD-PARTY.txt" in files, files
+bill = pathlib.Path(sys.argv[1]).read_text(encoding="utf-8")
+assert '"glam"' in bill
+wrong = JsonStrictValidator(SchemaVersion.V1_5).validate_str(bill)
+assert wrong is None, wrong
+END
+environment/bin/pendularm --version
+
+say "the page, from disk"
+cd "$root"
+python3 tests/browser/file.py dist/pendularm.html
+say "ok"
