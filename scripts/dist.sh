@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Puts what people can fetch into dist/: the program and the wheel for this system; on Linux also the page as one file, the
-# sources with their dependencies, and a bill of materials; checksums. `make dist` has built pendularm.html and
+# Puts what people can fetch into dist/: the program and the wheel for this system. On Linux also the page as one file,
+# the sources with their dependencies, and a bill of materials. Checksums. `make dist` has built pendularm.html and
 # submission.tar.gz before.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # `make fuzz`: builds the fuzz targets and runs each; arguments pick targets. Stops at the first failure.
 #
-# A search, for TIME seconds each (60): coverage leads it, no two are alike. What the fuzzer finds interesting is kept
-# in the target folder, and the next search goes on from there. It needs cargo-fuzz.
+# A search, for TIME seconds each (60): coverage leads it, no two are alike. Inputs that the fuzzer finds interesting
+# are kept in the target folder, and the next search goes on from there. It needs cargo-fuzz.
 #
 # With RUNS=n a repetition: mutations of the kept seeds, RUNS times as many as the target's share, drawn from fixed
-# numbers and led by nothing. Hash tables have other keys in every process and processors have other instructions, so
-# what coverage leads differs from run to run; this does the same executions on every machine, slow or fast. CI does it.
-# It needs a C++ compiler, no cargo-fuzz.
+# numbers and led by nothing. Hash tables have other keys in every process, and processors have other instructions. So a
+# search that coverage leads differs from run to run. This does the same executions on every machine, slow or fast. CI
+# does it. It needs a C++ compiler, no cargo-fuzz.
 #
 # No sanitizer: our own code has no unsafe in it, which is all that one would look into, and it would cost half of the
 # speed and a nightly compiler. Debug assertions and overflow checks are on instead (fuzz/Cargo.toml): they fail where our

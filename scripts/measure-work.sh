@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Counts instructions and allocations of the work that a scene does or leaves out, the server's own with nobody and
-# somebody listening, how often its gateway wakes, and what a build without the web feature lacks. Writes DIRECTORY/work.csv for
-# `pendularm report --only work`. Needs valgrind; a minute beside building.
-# usage: scripts/measure-work.sh DIRECTORY
+# Counts instructions and allocations of the work that a scene does or leaves out. Counted too are the server's own with
+# nobody and somebody listening, its gateway's wake-ups, and the parts that a build without the web feature lacks.
+# Writes DIRECTORY/work.csv for `pendularm report --only work`. Needs valgrind; a minute beside building. usage:
+# scripts/measure-work.sh DIRECTORY
 set -euo pipefail
 
 out=${1:?usage: scripts/measure-work.sh DIRECTORY}
@@ -49,7 +49,7 @@ for links in 2 3; do
     count_step "estimate-$links-rk4" 1000 "$target/release/estimate" $links
 done
 
-# Whose instructions they are: those of the arm, in a step of the arm and in one of the 1-DOF service.
+# The owner of the instructions: the arm, in a step of the arm and in one of the 1-DOF service.
 of_functions() { # pattern, file of callgrind: instructions in functions whose name matches, without what they call
     awk -v pattern="$1" '
         /^c?fn=/ { id = $1; sub(/^c?fn=/, "", id); name = $0; if (sub(/^[^ ]* /, "", name)) names[id] = name; if (/^fn=/) current = names[id]; next }

@@ -5,16 +5,18 @@
 #
 # `--sample N` takes N mutants out of all, drawn by their names, so that the same ones come again when other lines have moved theirs.
 #
-# `actors`, only when it is asked for, is src/actors with src/web; what they are made of (src/math, src/protocol, src/study and so on) is a crate
-# below, compiled once. What their own tests miss is tried again, unless `--near` is given: with the simulation's seeds, and on the wire, against the
-# built program. A mutant that is noticed only there is `elsewhere`.
+# `actors`, only when it is asked for, is src/actors with src/web. The layers below (src/math, src/protocol, src/study
+# and so on) are a crate of their own, compiled once. Mutants that their own tests miss are tried again, unless --near
+# is given: with the simulation's seeds, and on the wire, against the built program. A mutant that is noticed only there
+# is `elsewhere`.
 #
 # `--check` only lays the layers out and checks that each compiles alone; it needs no cargo-mutants.
 #
-# The whole project would take minutes per mutant. So a layer is laid out alone, as a crate of its own under target/mutants (or MUTANTS_DIR),
-# with its integration tests as modules: one file to compile, incrementally, and one program to link and run. It ends at its first failed test.
-# Fewer tests run than in `make test`, which can only lower the score: no documentation tests, not the long runs of tests/math/default_gains.rs, and 64
-# random cases where a property test takes its number from proptest (256).
+# The whole project would take minutes per mutant. So a layer is laid out alone, as a crate of its own under
+# target/mutants (or MUTANTS_DIR). Its integration tests are modules: one file to compile, incrementally, and one
+# program to link and run. It ends at its first failed test. Fewer tests run than in `make test`, which can only lower
+# the score. There are no documentation tests, and not the long runs of tests/math/default_gains.rs. A property test
+# that takes its number from proptest (256) has 64 random cases.
 #
 # Outcomes are kept. A later run takes up where the last one ended, and redoes what was missed and what is in a source file that has changed. A test
 # that was taken away does not show: --fresh forgets the outcomes.
@@ -23,7 +25,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 bar=90
-# Processor time of one run of a layer's tests, which need about 2, 0.6 and 35 s: what loops is caught so, however busy the machine is.
+# Processor time of one run of a layer's tests, which need about 2, 0.6 and 35 s. A mutant that loops is caught so,
+# however busy the machine is.
 declare -A cpu_seconds=([math]=10 [protocol]=6 [actors]=150)
 base=${MUTANTS_DIR:-$root/target/mutants}
 # Each layer builds in its own folder.
@@ -104,7 +107,8 @@ lay_out() { # layer, folder
             echo '[dev-dependencies]'; dependencies "$1" dev-dependencies
         fi
         echo '[profile.dev]'; echo 'debug = false'; echo 'lto = "off"'
-        # The actors compute little: what they call is optimised, and the crate below, being a member of the workspace, is not in "*".
+        # The actors compute little: the layers that they call are optimised, and the crate below, being a member of the
+        # workspace, is not in "*".
         if [ "$1" = actors ]; then echo '[profile.dev.package]'; echo '"*".opt-level = 1'; echo 'below.opt-level = 1'; else echo 'opt-level = 1'; fi
     } >"$2/Cargo.toml"
     {
@@ -205,8 +209,8 @@ outcomes() { # folder
             "$1/versions.tsv" "$1/known.tsv" -
 }
 
-# Of the mutants on standard input, those of the sample: the first when they are sorted by a hash of their names, in which line and column are left out
-# and those that are alike are numbered.
+# Of the mutants on standard input, those of the sample: the first ones when they are sorted by a hash of their names.
+# Line and column are left out of a name, and equal names are numbered.
 sampled() {
     if [ -z "$sample" ]; then cat; return; fi
     awk -F '\t' '{ name = $2; sub(/:[0-9]+:[0-9]+:/, ":", name); print name " " ++alike[name] "\t" $0 }' |
@@ -222,7 +226,8 @@ try_mutants() { # layer, folder, outcomes, the word for what is caught, targets,
     sampled <"$folder/outcomes.tsv" | grep -P "^($wanted)\t" >"$folder/wanted.tsv" || return 0
     # cargo mutants passes over those that it finds in this file.
     awk -F '\t' 'NR == FNR { wanted[$0]; next } !($0 in wanted) { print $2 }' "$folder/wanted.tsv" "$folder/outcomes.tsv" >"$folder/mutants.out/previously_caught.txt"
-    # Its status says that something was missed; the score is ours to judge. What can't be judged is a layer whose own tests fail.
+    # Its status says that something was missed; the score is ours to judge. A layer whose own tests fail can't be
+    # judged.
     (cd "$folder" && cargo mutants --in-place --iterate --timeout 300 "--cargo-arg=$targets" --colors never "$@") || status=$?
     case $status in 0 | 2 | 3) ;; *) fail "$layer: cargo mutants ended with status $status" ;; esac
     keep_outcomes "$folder" "$caught"

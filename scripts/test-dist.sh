@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs each thing in dist/ where nothing else is, and uses it: the program in an empty folder as its root, the wheel in a
-# fresh virtual environment, the page in Chromium from disk. `make test-submission` builds the sources without a network.
+# Installs each thing in dist/ where nothing else is, and uses it. The program runs in an empty folder as its root, the
+# wheel in a fresh virtual environment, and the page in Chromium from disk. `make test-submission` builds the sources
+# without a network.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD

@@ -2,8 +2,8 @@
 # Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes
 # from PyPI into python/.venv. The wheel is left in python/target/wheels/, alone.
 #
-# On Linux with PORTABLE=1 the wheel is for every system whose C library is of 2012 or later (glibc 2.17): the program is the static
-# one, and Zig links the library, which knows the symbols of each release. It takes a release build more.
+# On Linux with PORTABLE=1 the wheel is for every system whose C library is of 2012 or later (glibc 2.17). The program
+# is the static one. Zig links the library, since it knows the symbols of each release. It takes a release build more.
 set -euo pipefail
 portable=${PORTABLE:-}
 [ -n "$portable" ] || program=$(realpath "$1")

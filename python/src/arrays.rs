@@ -158,7 +158,7 @@ impl<'py> Numbers<'py> {
 
 /// The array itself where it may be read as one slice, its rows one after the other, and a copy of it elsewhere.
 ///
-/// A slice of an array whose columns lie side by side would have its numbers in another order, and a field of a packed
+/// A slice of an array whose columns lie side by side would have its numbers in another order. A field of a packed
 /// record has a stride that is no whole number of doubles. An array that cannot be written may be one that shows a
 /// batch's arms, which other threads step meanwhile: they are not to be kept from it.
 pub(crate) fn laid_out<'py, T: Element, D: Dimension>(

@@ -1,5 +1,4 @@
-//! The arm of pendularm for Python: what the live runtime steps, as a library that NumPy arrays go into and come out
-//! of.
+//! The arm of pendularm for Python: the steps of the live runtime, as a library that takes and returns NumPy arrays.
 //!
 //! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every
 //! arm is stepped by. `package/pendularm/` is what users import; it words what this module answers.

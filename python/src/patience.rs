@@ -38,8 +38,8 @@ pub(crate) fn until_done<T: Send>(
     }
 }
 
-/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another
-/// thread.
+/// Waits for a lock without keeping the interpreter's. The value behind it is whole, also after a panic of
+/// another thread.
 pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
     one.lock_py_attached(py)
         .unwrap_or_else(PoisonError::into_inner)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-# Far longer than anything takes; who waits so long has failed.
+# Far longer than anything takes; a longer wait is a failure.
 PATIENCE = 60.0
 
 # A script that a shell starts in the background ignores SIGINT, and so would all that the tests start.

@@ -52,7 +52,7 @@ def test_many_states_are_as_many_single_ones(links):
         together = function(arm, *fields)
         singly = [function(arm, *row) for row in zip(*fields, strict=True)]
         assert together.tolist() == np.array(singly).tolist()
-    # So many that they fill the machine's registers, in more than one go and with a rest.
+    # Enough arms to fill the machine's registers, in more than one go and with a rest.
     many = [random.uniform(-3, 3, (1003, links)) for _ in range(3)]
     together = dynamics.forward_dynamics(arm, *many)
     singly = [dynamics.forward_dynamics(arm, *row) for row in zip(*many, strict=True)]

@@ -122,7 +122,7 @@ def test_the_seeds_are_those_of_as_many_single_environments(name):
     assert ours.np_random_seed == (4, 2, 5)
     ours.reset(seed=9, options={"reset_mask": np.array([False, True, False])})
     assert ours.np_random_seed == (4, 10, 5)
-    # Who asks for the seeds before the first reset has those that it goes on with.
+    # A caller that asks for the seeds before the first reset has the seeds that follow.
     one, other = gymnasium.make_vec(name, 3), gymnasium.make_vec(name, 3)
     seeds = one.np_random_seed
     assert len(set(seeds)) == 3

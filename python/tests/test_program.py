@@ -109,7 +109,7 @@ def test_it_serves_the_page_until_a_signal(way, number):
         began = time.monotonic()
         run.send_signal(number)
         assert run.wait(60) == 0
-        # The runtime ends within a second by itself; what is left is for a machine that is busy with other work.
+        # The runtime ends within a second by itself; the rest is for a machine that is busy with other work.
         assert time.monotonic() - began < 10
 
 

@@ -1,5 +1,5 @@
-//! The types of the graph, made of the catalogue's: those of messages as they are, and the parts of which ROS 2 makes
-//! services and actions.
+//! The types of the graph, made of the catalogue's. Messages are as they are; services and actions of ROS 2 are made
+//! of their parts.
 //!
 //! A call that the arm refuses has no answer in ROS 2. So the services that are this project's own answer `success` and
 //! `message` too, behind the fields of the catalogue.

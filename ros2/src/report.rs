@@ -9,7 +9,8 @@ pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "pendularm-ros2: {line}");
 }
 
-/// Says a line unless it was the last one said here: what fails every second is said once.
+/// Says a line unless it was the last one said here: a failure that comes every second is said
+/// once.
 #[derive(Debug, Default)]
 pub struct Repeated(String);
 

@@ -29,7 +29,7 @@ HERE = "tcp/127.0.0.1:7447"
 COUNTS = [1, 10, 50] if IS_BENCH else [1, 50]
 # How many messages a measurement hears: 20 s or 2 s.
 MESSAGES = 1200 if IS_BENCH else 120
-# How long a killed router is away [s]. Who looks for it makes longer and longer pauses.
+# How long a killed router is away [s]. A searcher makes longer and longer pauses.
 AWAY = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] if IS_BENCH else [1.0]
 
 

@@ -155,7 +155,7 @@ def test_a_trajectory_moves_the_arm(peer, states):
     def is_there():
         # Published until it is heard: a publisher's first message may be gone before the router knows of it.
         publisher.publish(header=header, joint_names=["joint1", "joint2"], points=[point])
-        # 0.01 rad: what the integral leaves after some seconds is far less.
+        # 0.01 rad: the rest that the integral leaves after some seconds is far less.
         return all(abs(a - b) < 0.01 for a, b in zip(states[-1].position, goal))
 
     wait_for("the arm at the setpoint", is_there)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
 # the first time. It installs into the build folder. CLIENT=1 builds a node of the crate ros2-client too, which takes
-# minutes; BENCH=1 measures instead, with a release build, and BENCH=quick only tries that the two hosts work.
+# minutes. BENCH=1 measures instead, with a release build. BENCH=quick only tries that the two hosts work.
 set -euo pipefail
 program=$(realpath "$1")
 target=$(realpath -m "${2:-target/ros2}")

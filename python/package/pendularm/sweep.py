@@ -223,7 +223,8 @@ def sweep(
             try:
                 hand_out(question, total, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
             finally:
-                # Who leaves early, by Ctrl-C say, does not wait for the pieces that are under way.
+                # A caller that leaves early, by Ctrl-C say, does not wait for the pieces that are
+                # under way.
                 stopped.set()
     for start in starts:
         if done[start].keys() != done[0].keys():

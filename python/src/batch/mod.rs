@@ -38,7 +38,7 @@ const MOST_ARMS: usize = 1_000_000;
 /// Most threads that share the work of one batch.
 const MOST_THREADS: usize = 1024;
 
-/// The number of links never changes; what does is behind a lock, since threads may share a batch.
+/// The number of links never changes. The state is behind a lock, since threads may share a batch.
 #[derive(Debug)]
 enum Either {
     Two(Mutex<Vec<Simulation<2>>>),
@@ -49,10 +49,10 @@ enum Either {
 ///
 /// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and
 /// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
-/// handed in has one row per arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where
-/// they lie, if they can be written. `threads` share the work, as many as there are cores unless given, and fewer where
-/// the system has no more of them; with 1 the caller does it alone. Calls that change one batch from several threads
-/// wait for each other; all that shows the arms may be read meanwhile, and shows how far each of them is. A batch can be
+/// handed in has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous doubles are read without a
+/// copy, if they can be written. `threads` share the work, as many as there are cores unless given, and fewer where the
+/// system has no more of them; with 1 the caller does it alone. Calls that change one batch from several threads wait
+/// for each other; all that shows the arms may be read meanwhile, and shows how far each of them is. A batch can be
 /// neither copied nor pickled, and a process that is forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]

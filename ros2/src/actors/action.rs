@@ -1,7 +1,7 @@
 //! An action of the arm's in the graph: three services and two topics, as ROS 2 makes them.
 //!
-//! **Invariant:** a goal is accepted when the arm has said something of it; whoever waits for its end is answered, at
-//! the latest when the arm goes.
+//! **Invariant:** a goal is accepted when the arm has said something of it. Every caller that waits for its end is
+//! answered, at the latest when the arm goes.
 
 use std::rc::Rc;
 

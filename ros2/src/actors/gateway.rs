@@ -97,7 +97,7 @@ impl Gateway {
             is_success: frame.get("result") == Some(&Value::Bool(true)),
             status: text(&frame, "status").to_owned(),
         };
-        // Who asked may have gone meanwhile.
+        // The caller may have gone meanwhile.
         let _ = waiting.send(Ok(answer));
     }
 }

@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
-/// Goals that are kept: those that have ended too, for who asks late how.
+/// Goals that are kept, ended ones too, for callers that ask late.
 pub const MAX_GOALS: usize = 64;
 /// Requests that may wait for the end of one goal.
 const MAX_WAITING: usize = 16;
@@ -42,9 +42,9 @@ pub struct Goal<R> {
     /// When it came.
     pub stamp: Stamp,
     status: i8,
-    /// Who sent it, until the arm has said something of it.
+    /// The caller that sent it, until the arm has said something of it.
     pub asked: Option<R>,
-    /// Who waits for its end.
+    /// The callers that wait for its end.
     pub waiting: Vec<R>,
     result: Option<Value>,
 }
@@ -157,7 +157,7 @@ impl<R> GoalTable<R> {
         Ok(())
     }
 
-    /// The arm pursues it: who sent it may hear so, once.
+    /// The arm pursues it. Its sender may hear so, once.
     pub fn accept(&mut self, id: GoalId) -> Option<(R, Stamp)> {
         let goal = self.get(id)?;
         let asked = goal.asked.take()?;
@@ -171,7 +171,7 @@ impl<R> GoalTable<R> {
         self.0.remove(at)
     }
 
-    /// It has ended: those who wait for that.
+    /// It has ended: the callers that wait for that.
     pub fn end(&mut self, id: GoalId, status: i8, result: Value) -> Vec<R> {
         let Some(goal) = self.get(id) else {
             return Vec::new();

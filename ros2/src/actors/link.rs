@@ -1,6 +1,6 @@
 //! The TCP connection to the arm: one JSON object per line.
 //!
-//! **Invariant:** a line is read when the one before it has been taken; what waits to be written is bounded.
+//! **Invariant:** a line is read when the one before it has been taken. What waits to be written is bounded.
 
 use std::time::Duration;
 
@@ -45,8 +45,8 @@ pub(super) struct Ended {
     pub(super) why: String,
 }
 
-/// Connects, is let in, and from then on hands every frame to `came`, and the end to `ended`. What is sent into the
-/// channel is written.
+/// Connects, is let in, and from then on hands every frame to `came`, and the end to `ended`. A line in the channel
+/// is written.
 pub(super) async fn open(
     link: u64,
     address: String,

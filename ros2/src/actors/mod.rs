@@ -10,7 +10,7 @@
 //! | [`service::ServiceBridge`] | one per service |
 //! | [`action::ActionBridge`] | one per action |
 //!
-//! **Invariant:** mailboxes are bounded: who has no room for a message refuses it, and says so to whoever waits.
+//! **Invariant:** mailboxes are bounded. One that is full refuses a message, and says so to the sender.
 
 pub mod action;
 mod endpoints;
@@ -97,7 +97,7 @@ pub struct Pursue {
     pub id: String,
     /// The goal.
     pub goal: Value,
-    /// Who hears of it.
+    /// The subscribers of it.
     pub to: Recipient<GoalUpdate>,
 }
 

@@ -16,7 +16,7 @@ pub struct Attachment {
     pub sequence: i64,
     /// When it was sent, in nanoseconds since 1970.
     pub sent: i64,
-    /// Who sent it, or who asked.
+    /// The sender, or the caller.
     pub gid: [u8; GID],
 }
 
