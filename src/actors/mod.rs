@@ -1,5 +1,5 @@
-//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*; what
-//! clients write is read, and what they read written, beside them.
+//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*.
+//! Operations of clients are read, and answers written, beside them.
 //!
 //! ```text
 //!              accepts                 Request, Disconnect              Call of a question, SetSetpoint, Interest
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! There is a connection for each client, and one of everything else. The nodes are `arm_sim` on a thread of its own,
-//! `ik`, `ik_action`, `ik_trial`, `follow`, `rosapi`, `parameters`, `rosout`, `tf_web` and `recorder`, and
-//! `integration` and `study`, whose work the pool of workers does.
+//! `ik`, `ik_action`, `ik_trial`, `follow`, `rosapi`, `parameters`, `rosout`, `tf_web` and `recorder`. The pool of
+//! workers does the work of `integration` and `study`.
 //!
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
 //! or from another node; the [`node::Reply`] knows the way back.
@@ -146,8 +146,8 @@
 //! [`GetParam`]: ros::rosapi::GetParam
 //! [`SetParam`]: ros::rosapi::SetParam
 //!
-//! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
-//! sees a node's answers and messages in the order in which the node produced them.
+//! **Invariant:** every message of a node to a client passes through the registry's one mailbox. So a client sees a
+//! node's answers and messages in the order in which the node produced them.
 
 pub mod arm;
 pub mod compute;

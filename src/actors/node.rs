@@ -1,7 +1,7 @@
 //! The language of the nodes: questions with their one answer, messages on topics, interest.
 //!
-//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a
-//! client or another node, is behind the [`Reply`]: the node does not know.
+//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
+//! a client or another node, is behind the [`Reply`]: the node does not know it.
 //!
 //! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that
 //! is dropped unanswered says so itself.
@@ -99,7 +99,7 @@ impl Pieces for AlreadyGiven {
     }
 }
 
-/// Who asked.
+/// The asker.
 pub trait Asker<T>: Send {
     /// Takes the one answer. The news of the call's end, where it is there, travels with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
@@ -134,7 +134,7 @@ pub trait Asker<T>: Send {
 
 /// The way back to whoever asked: one answer, then the end of the call.
 ///
-/// A client that called is read no further until this value is dropped, so that a call that has effects after its
+/// A client that called is read no further until this value is dropped. So a call that has effects after its
 /// answer (a goal's setpoint) has had them before the client's next request is looked at.
 pub struct Reply<T> {
     /// None once the answer has been given.

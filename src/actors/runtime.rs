@@ -1,9 +1,9 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
-//! Threads: this one for the gateway (listeners, connections, registry) and the small nodes; one for the arm; a few
-//! workers for heavy requests; one that waits for signals; a few for long work of the gateway, and one each for the log
-//! and a record, which they start themselves. The only place that decides which thread a node is on, and that looks at
-//! the number of links.
+//! Threads: this one for the gateway (listeners, connections, registry) and the small nodes, one for the arm, a few
+//! workers for heavy requests, and one that waits for signals. The gateway starts a few more for its long work, and the
+//! log and a record have one each. The only place that decides which thread a node is on, and that looks at the number
+//! of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 

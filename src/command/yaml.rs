@@ -52,7 +52,7 @@ pub fn write_yaml(raw: &RawValue, end: &str, out: impl Write) -> Result<(), Comm
     })
 }
 
-/// The place of a value: what stands before it on its line.
+/// The place of a value: the text before it on its line.
 #[derive(PartialEq)]
 enum Place {
     Top,

@@ -1,6 +1,6 @@
 //! Repeated events, reported once a second.
 //!
-//! A client can cause an event as often as it sends a frame. The first event of a kind is reported at once. Those that
+//! A client can cause an event as often as it sends a frame. The first event of a kind is reported at once. Lines that
 //! follow within a second are reported together, with their number, when the second is over. A kind is a place in the
 //! source.
 //!

@@ -21,9 +21,10 @@ pub const FEEDBACK_RATE: f64 = 60.0;
 
 /// Returns the largest rounding error of a difference of two times \[s\] near `time`.
 ///
-/// A time is `base + k h`: half a unit in the last place for the product, half for the sum, at both ends, and as much
-/// again because `h` is only the double nearest to, say, 1 ms. All that is less than four times `2⁻⁵² time` (3e-12 s
-/// after an hour). Without it, half a second would take a step more at some times than at others.
+/// A time is `base + k h`. Its error is half a unit in the last place for the product and half for the sum, at both
+/// ends. It is as much again because `h` is only the double nearest to, say, 1 ms. All that is less than four times
+/// `2⁻⁵² time` (3e-12 s after an hour). Without it, half a second would take a step more at some times than at
+/// others.
 pub(super) fn rounding(time: f64) -> f64 {
     4.0 * f64::EPSILON * time.abs()
 }
@@ -154,8 +155,8 @@ impl Goal {
 /// The times at which something with a fixed rate of simulation time is due.
 ///
 /// The first question is answered with yes and starts the count, so that even a goal that is over after one step
-/// reports once. After that there is one yes in each period in which the clock moved, never two for one question: steps
-/// longer than a period give one each, and what was missed is not made up. A clock that runs backwards starts afresh.
+/// reports once. After that there is one yes in each period in which the clock moved, never two for one question. Steps
+/// longer than a period give one each, and missed periods are not made up. A clock that runs backwards starts afresh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cadence {
     /// Periods per second.

@@ -1,17 +1,17 @@
 //! How many whole steps are due now, so that simulation time runs at wall time.
 //!
 //! The pacer is told the time and keeps two numbers: the moment from which it counts (the anchor) and the steps taken
-//! since. `T` seconds after the anchor, `⌊T / timestep⌋` steps must have been taken in all; what is missing is due.
+//! since. `T` seconds after the anchor, `⌊T / timestep⌋` steps must have been taken in all; missing steps are due.
 //!
 //! ```text
 //! anchor ├──step──┼──step──┼──step──┼──step──┼─── now        taken = 2, due = 2
 //! ```
 //!
-//! A machine that falls behind owes at most [`CATCH_UP`] and the step in progress. What exceeds that is dropped, by
-//! moving the anchor, so that a stall, however long, is not followed by a burst. It uses plain arithmetic only.
+//! A machine that falls behind owes at most [`CATCH_UP`] and the step in progress. Steps beyond that are dropped,
+//! by moving the anchor, so that a stall, however long, is not followed by a burst. It uses plain arithmetic only.
 //!
 //! **Invariant:** the steps due come from one division of the time since the anchor, never from a running sum, so
-//! that 1 ms stays exact for days; and no call ever answers more than `⌊CATCH_UP / timestep⌋ + 1`.
+//! that 1 ms stays exact for days. No call returns more than `⌊CATCH_UP / timestep⌋ + 1`.
 
 use std::time::Duration;
 

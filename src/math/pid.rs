@@ -15,7 +15,7 @@
 //! The derivative acts on the measured velocity, which is known, instead of differencing the error. Nothing else
 //! compensates gravity: with ki = 0 the arm sags until kp e carries its load.
 //!
-//! **Invariant:** the law is a pure function of the state at the start of a step; the integral that it computed
+//! **Invariant:** the law is a pure function of the state at the start of a step. The integral that it computed
 //! counts only once the caller commits it, so that a step that is not taken leaves nothing behind.
 
 #![allow(
@@ -26,8 +26,8 @@
 use super::arm::State;
 use super::number::{Number, entries};
 
-/// Bound of each joint's integral \[rad s\]. With the default gains it stands for over a thousand times the effort that
-/// gravity asks for, so it never hinders; without it a blocked or impossible setpoint would wind up for ever.
+/// Bound of each joint's integral \[rad s\]. With the default gains it is over a thousand times the effort that gravity
+/// asks for, so it never hinders. Without it a blocked or impossible setpoint would wind up for ever.
 pub const INTEGRAL_LIMIT: f64 = 50.0;
 
 /// Gains of every joint, of one arm or of several side by side; each is finite and not negative.
@@ -41,7 +41,7 @@ pub struct Gains<const N: usize, T = f64> {
     pub kd: [T; N],
 }
 
-/// Gains for the default 2-link arm: any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
+/// Gains for the default 2-link arm. Any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
 /// and 0.02 m within 2 s. Stable in every pose up to a timestep of 4.3 ms.
 ///
 /// Other numbers of links have no default: gains must fit the inertia that each joint moves.
@@ -166,7 +166,8 @@ impl<const N: usize> Pid<N> {
         self.integral = integral;
     }
 
-    /// Turns the controller on or off. From off to on the integral starts at zero; what is on already stays as it is.
+    /// Turns the controller on or off. From off to on the integral starts at zero; a controller that is on already
+    /// stays as it is.
     pub fn enable(&mut self, on: bool) {
         if on && !self.enabled {
             self.integral = [0.0; N];

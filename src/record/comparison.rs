@@ -16,7 +16,7 @@ use super::writer::VERSION;
 use crate::math::simulation::Simulation;
 use crate::protocol::wire::text::excerpt;
 
-/// Steps between two messages of a record, at most: a tick has a tenth of that on the fastest machine, so that a record
+/// Steps between two messages of a record, at most. A tick has a tenth of that on the fastest machine, so that a record
 /// whose file was slow for a while is not refused.
 pub const MAX_LEAP: u64 = 10_000_000;
 /// The least time that a step takes, in nanoseconds: no machine was seen to take one in less than three times that.

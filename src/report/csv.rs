@@ -1,6 +1,7 @@
 //! Rows of comma-separated values, for whoever wants to draw the figures again.
 //!
-//! **Invariant:** numbers are written so that reading them back gives the same bits; what is missing is an empty field.
+//! **Invariant:** numbers are written so that reading them back gives the same bits; a missing number is an empty
+//! field.
 
 use std::fmt::Write;
 

@@ -1,6 +1,6 @@
 //! The tools at hand while a section is made.
 //!
-//! **Invariant:** a section writes nothing by itself: what it keeps is written by the report.
+//! **Invariant:** a section writes nothing by itself: the report writes its files.
 
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 //!
 //! Runs the sections in `figures` side by side, keeps each in a file of its own, and writes `index.html`,
 //! `report.json`, and one `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others
-//! are taken from their files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock,
+//! are taken from their files. Measurements are in [`experiments`], on `math` and `study`; this is where the clock,
 //! the files and the drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
@@ -141,7 +141,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     Ok(page)
 }
 
-/// Makes sections on all cores. Those that measure times are made one after the other.
+/// Makes sections on all cores. Sections that measure times are made one after the other.
 fn side_by_side(
     makers: Vec<&'static Maker>,
     make: impl Fn(&'static Maker) -> Result<Section, ReportError> + Sync,

@@ -1,6 +1,6 @@
 //! The two clocks of a sampled loop: how seldom the law may run, and how long a step may be.
 //!
-//! The largest stable *control period* is a property of controller and arm: the arm between two runs of the law moves
+//! The largest stable *control period* is a property of controller and arm. Between two runs of the law the arm moves
 //! as it would move exactly, and a real robot would show the same limit. The largest stable *timestep* at a control
 //! period is a property of the simulation: of its method, and of how many steps it takes in a period.
 //!
@@ -12,8 +12,8 @@ use super::linear::Linear;
 use super::stability::{Modes, Stepping};
 use crate::math::integrator::Method;
 
-/// Steps of Runge-Kutta 4 in a control period for which the arm moves as it would move exactly: a period near its limit
-/// is so short beside the arm's own swing that the limit is within 1e-6 of what it is with 100 steps.
+/// Steps of Runge-Kutta 4 in a control period for which the arm moves as it would move exactly. A period near its limit
+/// is so short beside the arm's own swing that the limit is within 1e-6 of that with 100 steps.
 const EXACT: u32 = 8;
 
 /// Most steps in a period that are tried: by then a method is as good as exact, or the arm's own swing grows under it.

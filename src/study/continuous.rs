@@ -13,7 +13,7 @@ use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::increment;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 
-/// An arm whose control law is evaluated in every stage, integral and all: the method steps `(q, s)`, where the
+/// An arm whose control law is evaluated in every stage, integral and all. The method steps `(q, s)`: the
 /// integral `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContinuousLoop<const N: usize> {

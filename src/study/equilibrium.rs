@@ -56,12 +56,12 @@ pub struct Equilibrium<const N: usize> {
     pub balanced: bool,
 }
 
-/// The equilibrium that the arm settles at from the setpoint: the setpoint itself where every joint has an integral,
-/// the sagging pose otherwise, the hanging one for an arm left to itself.
+/// The equilibrium that the arm settles at from the setpoint. It is the setpoint itself where every joint has an
+/// integral, the sagging pose otherwise, and the hanging one for an arm left to itself.
 ///
-/// Joints that integrate stay at the setpoint; the others go downhill on the potential `V = U + ½ kp (q - q*)² - c q`
-/// by Newton steps, and down from every saddle, so that what is found is a pose that the arm would rest in. An integral
-/// that would have to exceed its limit is taken as a constant effort at the limit.
+/// Joints that integrate stay at the setpoint. The others go downhill on the potential `V = U + ½ kp (q - q*)² - c q`
+/// by Newton steps, and down from every saddle. So the result is a pose that the arm would rest in. An integral that
+/// would have to exceed its limit is taken as a constant effort at the limit.
 #[must_use]
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let ControlLoop {
@@ -267,7 +267,7 @@ fn size<const N: usize>(matrix: &Symmetric<N>) -> f64 {
     (0..N).fold(0.0, |max: f64, i| max.max(matrix[i][i].abs()))
 }
 
-/// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]: turning any joint up to `k` turns all links beyond `k` alike,
+/// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` alike,
 /// and turning the whole arm by a quarter makes that derivative out of the load itself.
 pub(crate) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
     let mut turned = *q;

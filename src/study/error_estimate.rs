@@ -1,10 +1,10 @@
 //! The local error of a step of `h`, against two steps of `h/2` of Runge-Kutta 4 from the same state.
 //!
-//! For a method of lower order these are the truth. Two half steps of its own would not be: where an arm is let go at
-//! rest the term that leads elsewhere vanishes, and what is left does not shrink by the power that step doubling takes
-//! it to. Runge-Kutta 4 itself is off by `C h⁵`, its two half steps by `2 C (h/2)⁵`; their difference is 15/16 of the
-//! whole. The effort is the one that the control law holds for the step, frozen in both: the error is the method's own,
-//! not that of the sampled law.
+//! For a method of lower order these are the truth. Two half steps of its own would not be. Where an arm is let go at
+//! rest the leading term vanishes, and the rest does not shrink by the power that step doubling assumes. Runge-Kutta 4
+//! itself is off by `C h⁵`, its two half steps by `2 C (h/2)⁵`; their difference is 15/16 of the whole. The effort is
+//! the one that the control law holds for the step, frozen in both: the error is the method's own, not that of the
+//! sampled law.
 //!
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.4.
 //!

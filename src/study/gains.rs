@@ -2,11 +2,11 @@
 //!
 //! The default gains are scaled to the arm. A joint's gains go with the inertia that it moves, and with the pace `σ` of
 //! the loop, for which time runs `σ` times as fast: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The inertia of a joint is
-//! that of all links beyond it, or, where a heavy outer link turns a light inner one along, what it feels while the
-//! others are free; means of the two are tried in turn (`SHAPES`).
+//! that of all links beyond it. Where a heavy outer link turns a light inner one along, it is the inertia that the
+//! joint feels while the others are free. Means of the two are tried in turn (`SHAPES`).
 //!
-//! A pace is taken if the smallest timestep limit over all poses leaves the margin, and if the arm itself, stepped as
-//! the live arm is, settles in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
+//! A pace is taken if the smallest timestep limit over all poses leaves the margin. The arm itself, stepped as the
+//! live arm is, also has to settle in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
 //!
 //! **Invariant:** the work is bounded, and gains that are answered have been tried.
 
@@ -357,8 +357,8 @@ fn template<const N: usize>() -> Gains<N> {
     }
 }
 
-/// The inertia that each joint moves \[kg m²\]: with all joints beyond it stretched and the others held, and, by its
-/// weight as an exponent, the least that it feels in any pose while the others are free.
+/// The inertia that each joint moves \[kg m²\]: with all joints beyond it stretched and the others held. With its
+/// weight as an exponent, the least that it feels in any pose while the others are free enters too.
 fn inertia<const N: usize>(arm: &Arm<N>, weight: f64) -> [f64; N] {
     let mass = mass_matrix(arm, &[0.0; N]);
     let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);

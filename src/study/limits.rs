@@ -11,8 +11,8 @@ use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
 
-/// Part of the smallest limit over all poses that is advised: what linearisation leaves out (a start of 0.3 rad off
-/// costs up to a third of a stiff limit, poses on the way have limits of their own) stays within it.
+/// Part of the smallest limit over all poses that is advised, to allow for effects outside the linearisation. A
+/// start of 0.3 rad off costs up to a third of a stiff limit, and poses on the way have limits of their own.
 pub const ADVISED_PART: f64 = 0.8;
 
 /// How near to the bound the smallest limit found must be to count as certified.
@@ -86,8 +86,8 @@ pub struct Limits<const N: usize> {
     /// The motion that grows there first.
     pub critical: Option<Critical>,
     /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` where that is certified,
-    /// of the bound where that is less and still of use. Where the loop runs away in some pose that can't be: then of
-    /// the smaller of `held` and the smallest of all poses without gravity, which is for this setpoint alone.
+    /// of the bound where that is less and still of use. Where the loop runs away in some pose that can't be. Then it
+    /// is of the smaller of `held` and the smallest of all poses without gravity, which is for this setpoint alone.
     pub advised: Option<f64>,
 }
 

@@ -11,8 +11,8 @@
 //! | M⁻¹ | inverse of the mass matrix | 1/(kg m²) |
 //! | s | deviation of the integral, of the joints that have one | rad s |
 //!
-//! M⁻¹ and S are columns of forward dynamics without gravity, so they are as exact as the arm's own kernel, where a
-//! dense inverse of M would lose ten digits to a heavy outer link.
+//! M⁻¹ and S are columns of forward dynamics without gravity, so they are as exact as the arm's own kernel. A dense
+//! inverse of M would lose ten digits to a heavy outer link.
 //!
 //! **Invariant:** whatever the arm and the gains, a linearisation is made in bounded time.
 

@@ -1,4 +1,4 @@
-//! The study: what method and timestep do to the arm, predicted and measured.
+//! The study: the effect of method and timestep on the arm, predicted and measured.
 //!
 //! | module | answers |
 //! | --- | --- |

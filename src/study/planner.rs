@@ -12,7 +12,7 @@
 //! The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A run that
 //! could only be dearer than another is not made.
 //!
-//! Where no control period is given both are planned: the law then runs in every step, since a longer period at the
+//! Where no control period is given both are planned. The law then runs in every step, since a longer period at the
 //! same timestep costs as much and is further from the truth. Under control no timestep is planned beyond what is
 //! advised for every pose, since the error of one move says nothing about the next.
 //!

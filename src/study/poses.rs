@@ -4,8 +4,8 @@
 //! outer joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it.
 //! Then the poses in between are searched: a climb from every cell that stands out among its neighbours goes uphill on
 //! the growth at the smallest limit so far. Wherever something grows, that pose has a smaller limit. Poses that gravity
-//! makes run away even in continuous time say nothing about timesteps and are left out; without gravity they count,
-//! since then it is the gains that run away.
+//! makes run away even in continuous time say nothing about timesteps and are left out. Without gravity they count,
+//! since then the gains run away.
 //!
 //! An arm whose joints integrate can be held in every pose, and where it runs away it does so for good. Towards the
 //! border of such poses the limit falls to zero. So these are searched first ([`PoseSearch::for_runaway`]): uphill on

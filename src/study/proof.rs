@@ -2,7 +2,7 @@
 //!
 //! For a step with held effort, `z x = …` for an eigenvector x with eigenvalue z, put `z = (1 + w h/2) / (1 - w h/2)`:
 //! the unit circle becomes the left half plane of `w`. The arm under a constant effort moves on a parabola, which every
-//! method but Euler takes exactly, and the velocity becomes `w x`. What is left of the law is a polynomial of symmetric
+//! method but Euler takes exactly, and the velocity becomes `w x`. The rest of the law is a polynomial of symmetric
 //! matrices
 //!
 //! `P₃ w³ + P₂ w² + P₁ w + P₀`
@@ -14,11 +14,11 @@
 //! | P₁ | `Kp + Γ` | `Kp + Γ - h/2 Ki` |
 //! | P₀ | `Ki` | `Ki` |
 //!
-//! with `Γ = ∂G/∂q`. Multiplied by x from both sides it is a cubic with real coefficients, and by Hurwitz' rule all its
-//! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`: for every x, so for every pose, if the matrices are
-//! so. Only `M` and `Γ` know the pose. `Γ` is bounded by its largest entries, and the pose in which `P₃` ceases first
-//! to be positive is found by branch and bound: over a box of joint angles `M` is at least what it is in the middle,
-//! less what its cosines can lose.
+//! with `Γ = ∂G/∂q`. Multiplied by x from both sides it is a cubic with real coefficients. By Hurwitz' rule all its
+//! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`. This holds for every x, so for every pose, if the
+//! matrices are so. Only `M` and `Γ` know the pose. `Γ` is bounded by its largest entries. The pose in which `P₃`
+//! first ceases to be positive is found by branch and bound: over a box of joint angles `M` is at least its value in
+//! the middle, less the loss of its cosines.
 //!
 //! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no
 //! longer symmetric. Where `P₃, P₂ > 0` that is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`; every coefficient
@@ -200,8 +200,9 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// A matrix that the mass matrix of no pose of a box falls below: in the angles of the links it is
-    /// `μ_ij l_i l_j cos(φ_i - φ_j)`, and what a cosine loses costs `2 y_i y_j ≤ t y_i² + y_j²/t` at most.
+    /// A matrix that the mass matrix of no pose of a box falls below. In the angles of the links it is
+    /// `μ_ij l_i l_j cos(φ_i - φ_j)`, and the loss of a cosine costs `2 y_i y_j ≤ t y_i² + y_j²/t` at
+    /// most.
     fn least_mass(&self, middle: &[f64; N], half: &[f64; N]) -> Symmetric<N> {
         let mut links: Symmetric<N> = [[0.0; N]; N];
         for i in 0..N {

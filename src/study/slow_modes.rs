@@ -1,12 +1,12 @@
 //! Growth of a loop's slow modes beside fast ones a trillion times their rate.
 //!
-//! Eigenvalues of a matrix are good to some 1e-16 of the largest, which at a damping rate of 1e12/s says nothing of
+//! Eigenvalues of a matrix are good to some 1e-16 of the largest. At a damping rate of 1e12/s that says nothing of
 //! a mode that grows by a factor e a second. The modes of a loop are also the zeros of the small matrix
 //!
 //! `P(λ) = λ² I + S + M⁻¹ (Kp + λ Kd + Ki/λ)`
 //!
-//! whose columns alone are large where a joint's gains are, so that elimination keeps the digits of the rest. Newton's
-//! rule on `log det P`, begun at an eigenvalue, brings a mode to its own last digits: `λ ↦ λ - 1 / tr(P⁻¹ P')`.
+//! whose columns alone are large where a joint's gains are, so that elimination keeps the other digits. Newton's rule
+//! on `log det P`, begun at an eigenvalue, brings a mode to its own last digits: `λ ↦ λ - 1 / tr(P⁻¹ P')`.
 //!
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 5.
 //!
@@ -41,8 +41,8 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
     if slow == 0 {
         return false;
     }
-    // Eigenvalues of the whole loop may be too far off to begin at; those of the loop whose fast joints are locked are
-    // not.
+    // Eigenvalues of the whole loop may be too far off to begin at. The eigenvalues of the loop whose fast joints are
+    // locked are not.
     let locked = locked_modes(linear, rate);
     modes
         .iter()
@@ -77,7 +77,7 @@ fn fast_joint(linear: &Linear, least: f64) -> Option<usize> {
     })
 }
 
-/// The loop without `joint`, which does not move: what holds it acts on the others too.
+/// The loop without `joint`, which does not move: the holding effort acts on the others too.
 fn locked(linear: &Linear, joint: usize) -> Linear {
     let (n, ease) = (linear.joints(), &linear.inverse_mass);
     let other = |i: usize| if i < joint { i } else { i + 1 };

@@ -136,7 +136,7 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
+    /// Whether there is a mode that no timestep can help. It grows, or it is so near to drifting that rounding
     /// decides on which side it is (a double zero is good to the root of the rounding error).
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;

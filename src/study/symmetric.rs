@@ -2,7 +2,7 @@
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 8.5.
 //!
-//! **Invariant:** the sweeps are bounded; what is not finite is passed on.
+//! **Invariant:** the sweeps are bounded; infinities and NaN are passed on.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,8 +1,9 @@
-//! Who may ask: the rules for `Host`, `Origin` and the token.
+//! The rules of admission: `Host`, `Origin` and the token.
 //!
-//! A page from anywhere can make its visitor's browser send requests to this port. It cannot choose two headers: `Host`
-//! tells under which name the browser looked for us (not ours where a hostile name server points a foreign name here),
-//! and `Origin` whose page opens a WebSocket. Programs send what they like there, and could use the raw port as well.
+//! A page from anywhere can make its visitor's browser send requests to this port. It cannot choose two headers. `Host`
+//! tells under which name the browser looked for us, which is not ours where a hostile name server points a foreign
+//! name here. `Origin` tells whose page opens a WebSocket. Programs send what they like there, and could use the raw
+//! port as well.
 //!
 //! **Invariant:** a request that no rule allows is refused, with a text that names the rule or the option.
 

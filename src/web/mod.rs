@@ -11,8 +11,8 @@
 //! | [`stream`] | the connection's stream, with its deadlines |
 //! | [`message`] | a WebSocket message into a frame |
 //!
-//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. What speaks over an upgraded stream
-//! is the same connection as over a plain one.
+//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. The connection over an upgraded
+//! stream is the same as over a plain one.
 //!
 //! **Invariant:** a connection that has begun with a request is never read as JSON, unless it becomes a WebSocket.
 
@@ -38,7 +38,7 @@ pub const DEFAULT_REPORT: &str = "report";
 /// The files that are served over HTTP, and the rules for whom.
 #[derive(Debug, Default)]
 pub struct Site {
-    /// Who may ask.
+    /// The rules of admission.
     pub access: Access,
     /// Folder of the last report.
     pub report: PathBuf,

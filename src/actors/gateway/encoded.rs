@@ -1,7 +1,7 @@
 //! Topic messages in the forms that some of their subscribers have asked for.
 //!
-//! **Invariant:** a form is made once, whoever asked for it; what takes long is made on another thread, and its
-//! publisher waits.
+//! **Invariant:** a form is made once for all clients. A form that takes long is made on another thread, and
+//! its publisher waits.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -11,13 +11,13 @@ use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 const KIB: usize = 1024;
 
-/// Bytes that the program has resident at most with the default number of places, whatever clients do. What the system
-/// keeps for sockets is not in it.
+/// Bytes that the program has resident at most with the default number of places, whatever clients do. The system's
+/// buffers for sockets are not in it.
 pub const MAX_MEMORY: usize = 640 * KIB * KIB;
-/// Bytes of one client at most, without long frames and answers: its input, as it comes and as a frame; pieces of a
-/// message; topic messages that wait; the message that is being written; responses, with one more than may wait;
-/// computations, with one more than may wait; the entries of the registry; a WebSocket's buffers, and the idle
-/// connection.
+/// Bytes of one client at most, without long frames and answers. They are its input, as it comes and as a frame,
+/// pieces of a message, and topic messages that wait or are being written. Responses and computations count with
+/// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are in it
+/// too.
 pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + SHORT
     + MAX_TOPIC_BYTES
@@ -27,8 +27,8 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + 2 * SHORT
     + MAX_KEPT
     + 96 * KIB;
-/// Bytes that a long frame takes at most: as it comes, as a message, as text, as the value that is passed on, as what
-/// is sent on, and that in another form.
+/// Bytes that a long frame takes at most: as it comes, as a message, as text, as the value that is passed on, as the
+/// frame that is sent on, and that in another form.
 pub const LONG_FRAME_BYTES: usize = 6 * MAX_FRAME;
 /// Bytes of the program itself, and of the trees of messages that are being encoded.
 const PROGRAM_BYTES: usize = 40 * KIB * KIB;
@@ -58,8 +58,8 @@ pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 pub const MAX_KEPT: usize = 128 * 1024;
 /// Bytes that each of these takes beside three times its names: its places in the tables.
 pub const ENTRY_BYTES: usize = 640;
-/// How long a request may take from its first bytes to the end of its head, and how long a client may take from
-/// connecting to its token: enough for a slow line, too little to hold a place with.
+/// How long a request may take from its first bytes to the end of its head, and a client from connecting to its
+/// token. It is enough for a slow line, and too little to hold a place with.
 pub const HEAD_TIME: Duration = Duration::from_secs(5);
 /// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
 /// end of the stream itself may take.

@@ -1,6 +1,6 @@
 //! The messages between connections, the registry and the nodes.
 //!
-//! **Invariant:** the registry has one mailbox, and so has each connection: what one sender sends takes effect in the
+//! **Invariant:** the registry has one mailbox, and so has each connection. Messages of one sender take effect in the
 //! order sent.
 
 use std::net::IpAddr;
@@ -114,7 +114,7 @@ pub struct Request {
     pub id: Option<Payload>,
     /// Its request.
     pub op: Op,
-    /// The room that the frame takes, if it is long: what becomes of it takes the same.
+    /// The room that the frame takes, if it is long: its later forms take the same.
     pub permit: Option<Permit>,
 }
 

@@ -78,7 +78,7 @@ pub enum NotRecorded {
     /// There is no record.
     #[error("nothing is being recorded")]
     Nothing,
-    /// So many files are in the folder already.
+    /// The folder has this many files already.
     #[error("the folder holds {0} records already")]
     Full(
         /// As many as it may.

@@ -1,7 +1,7 @@
 //! The way of entries to the file: a bounded queue, and the thread that writes.
 //!
-//! **Invariant:** nobody waits for the file; what does not fit into the queue is dropped, counted and told, an input
-//! last of all.
+//! **Invariant:** nobody waits for the file. A message that does not fit into the queue is dropped, counted and
+//! reported; an input is dropped last of all.
 
 use std::fs::{self, File};
 use std::io;

@@ -1,8 +1,8 @@
 //! Work that would keep the gateway's thread for longer than a turn, done on another thread meanwhile.
 //!
-//! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Work that is longer,
-//! needs nothing but its bytes and is waited for by one client (a frame of megabytes to be read, a message to be
-//! encoded, a long list to be written) is done here.
+//! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Long work that needs
+//! nothing but its bytes and that one client waits for is done here: a frame of megabytes to be read, a message to
+//! be encoded, a long list to be written.
 //!
 //! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of errand; the others
 //! wait in the order in which they came.
@@ -24,13 +24,15 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
-    /// The same with more than [`MEDIUM`]. Long ones have places of their own: what is shorter waits for less.
+    /// The same with more than [`MEDIUM`]. Long ones have places of their own, so that shorter work waits for
+    /// less.
     ReadingLong,
     /// Writes messages in the forms that clients ask for.
     Writing,
     /// The same with more than [`MEDIUM`].
     WritingLong,
-    /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
+    /// Writes long lists that clients ask for: a client that encodes messages without end delays no
+    /// question.
     Listing,
 }
 

@@ -2,7 +2,7 @@
 //! once.
 //!
 //! A call goes from the gateway's thread to the arm's and back. Waking a thread whose core has gone to sleep takes
-//! longer than all the work of the call; a client that calls again and again would pay for it twice each time. Others
+//! longer than all the work of the call. A client that calls again and again would pay for it twice each time. Others
 //! are let through: the thread offers its core at every turn. Both costs are measured in `docs/benchmarks.md`.
 //!
 //! **Invariant:** nobody stays awake for longer than [`MOMENT`] after the last call, and idle runtimes not at all.

@@ -1,7 +1,7 @@
-//! Counters that one node writes and another reports: what `/diagnostics` says about the gateway, and work whose
+//! Counters that one node writes and another reports: the gateway's part of `/diagnostics`, and work whose
 //! absence is to be shown. The pools for what is long lie beside them.
 //!
-//! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
+//! The arm publishes `/diagnostics` from its own thread. Asking the registry once a second would make the gateway part
 //! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
 //!
 //! **Invariant:** the counters are statistics: nothing is decided by them.

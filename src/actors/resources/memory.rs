@@ -1,4 +1,5 @@
-//! Memory that clients make the program hold: so many places times a bounded client, and two pools for what is long.
+//! Memory that clients make the program hold: bounded places times a bounded client, and two pools for long frames
+//! and answers.
 //!
 //! Short bytes have a bound in each connection (`gateway::limits`). An answer longer than [`SHORT`] takes a [`Permit`]
 //! before it is computed, and keeps it until it has been written. A published message longer than [`MEDIUM`], and any

@@ -1,5 +1,5 @@
-//! Who runs first where there are more threads than cores: the arm and the gateway, which serve all, before what works
-//! for one client.
+//! The order in which threads run where they are more than cores: the arm and the gateway, which serve all, before
+//! work for one client.
 //!
 //! **Invariant:** a thread steps back once, when it starts, and stays there.
 

@@ -1,8 +1,8 @@
 //! The clocks on which the cost of work is measured: the slices of computations, the arm's wake-ups. How long work may
-//! take is elapsed time; what somebody is charged for it is the processor time of the thread that did it: a machine
-//! that does something else is nobody's debt.
+//! take is elapsed time. A client is charged the processor time of the thread that did its work: time that other
+//! programs take is charged to nobody.
 //!
-//! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done
+//! It is the machine's own, unless a simulation counts instead. There each look costs the same, so that the work done
 //! between two looks, and all that follows from it, is the same in every run.
 //!
 //! **Invariant:** only what work costs is read here. Simulation time and what a client waits for go by the runtime's

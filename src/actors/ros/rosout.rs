@@ -14,7 +14,7 @@ use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::LogMessage;
 
-/// Warnings that may wait to be published; what does not fit is in the log alone.
+/// Warnings that may wait to be published; the rest is in the log alone.
 const MAX_WAITING: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 //! Forward dynamics by an articulated-body recursion in which nothing cancels.
 //!
-//! A joint transmits a force and an effort, and the effort is known. So all that link `i` with everything beyond it is
-//! to the link before is a relation between the acceleration `p` of its joint and the force `f` through it: `f = A p +
+//! A joint transmits a force and an effort, and the effort is known. So link `i` with everything beyond it is, to the
+//! link before, a relation between the acceleration `p` of its joint and the force `f` through it. This is `f = A p +
 //! B`, with a symmetric positive definite 2×2 tensor `A`. One pass from the tip to the base finds every `A` and `B`,
 //! one pass back the accelerations.
 //!
@@ -23,15 +23,15 @@
 //!
 //! The masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares when
 //! they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the same
-//! two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff part
+//! two directions, because a heavy tip makes `x` 1e9 times `d`. As a plain vector, the rounding error of its stiff part
 //! would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise. Rotations
 //! are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
 //! acceleration of the base. Without it nothing depends on where the first link points to, and
 //! [`super::weightless_dynamics`] leaves out that angle's sine and cosine.
 //!
 //! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
-//! heavy tip (`tests/math/`). Known limit: where masses *and* lengths spread by many powers of ten at once,
-//! such as 1e7 kg in 0.1 mm at the end of 500 km of gram-light links, the joint of the tiny tip may lose eight.
+//! heavy tip (`tests/math/`). Known limit: masses *and* lengths that spread by many powers of ten at once, such as 1e7
+//! kg in 0.1 mm at the end of 500 km of gram-light links. There the joint of the tiny tip may lose eight.
 //!
 //! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics
 //! Algorithms* (2008), ch. 7; the split into two directions is our own.
@@ -87,7 +87,8 @@ pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
         transmitted * rods[i].per_mass_length
     });
 
-    // From the tip to the base: what each link carries, and how its tip will answer the one before.
+    // From the tip to the base: the inertia and bias that each link carries, and how its tip will
+    // answer the one before.
     let mut carried = Carried::nothing(zero);
     let mut hinges = [Hinge::none(zero); N];
     let mut per_w = [zero; N];
@@ -138,7 +139,7 @@ pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
 /// Sines and cosines of all angles but the first, for which those of 0 stand.
 #[inline(always)]
 fn sin_cos_beyond_first<T: Number, const N: usize>(q: &[T; N]) -> ([T; N], [T; N]) {
-    // The constant stands last, where the compiler takes its sine and cosine and finds the others side by side: with it
+    // The constant stands last, where the compiler takes its sine and cosine and finds the others side by side. With it
     // in front a step of 3 links takes fewer instructions and half as long again.
     let zero = q[0].like(0.0);
     let beyond = entries!(zero, i => if i + 1 < N { q[i + 1] } else { zero });

@@ -42,8 +42,8 @@ impl Registers {
     }
 }
 
-/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\], of
-/// as many states as the shortest column has entries; longer columns of `qdd` keep the rest of theirs.
+/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
+/// The shortest column decides the number of states; longer columns of `qdd` keep the rest of theirs.
 ///
 /// Never panics, and is as finite as [`super::forward_dynamics`].
 ///

@@ -1,8 +1,8 @@
 //! One arm in the lower lanes of registers of two, sines and cosines in both: how plain `x86-64` has it fastest.
 //!
 //! Left to itself, the compiler packs numbers of the recursion in pairs as it finds them. That saves instructions, but
-//! each pair is shuffled together and apart where the next result is waited for: with 3 links a third of the time. What
-//! stands in a register of two from the start it leaves as it is.
+//! each pair is shuffled together and apart where the next result is waited for: with 3 links a third of the time.
+//! Values that are in a register of two from the start stay as they are.
 //!
 //! **Invariant:** the bits are those of the same recursion over plain numbers.
 

@@ -10,8 +10,8 @@
 //! | G | gravity load, gradient of the potential energy | n, N m | [`gravity_load`] |
 //! | q̈ | joint accelerations | n, rad/s² | [`textbook`], [`forward_dynamics`] |
 //!
-//! [`textbook`] is this line as it stands. The arm itself steps with [`forward_dynamics`], a recursion along the links
-//! that needs no matrix and loses up to ten digits less on uneven arms; a test holds the two together.
+//! [`textbook`] is this line as it stands. The arm itself steps with [`forward_dynamics`], a recursion along the
+//! links. It needs no matrix and loses up to ten digits less on uneven arms. A test holds the two together.
 //!
 //! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i` with unit vectors `u_i = (cos φ_i, sin φ_i)`,
 //! the Lagrangian is
@@ -20,7 +20,7 @@
 //!
 //! where `γ_i = m_i/2 + m_{i+1} + … + m_n`, `μ_ij = γ_max(i,j)` for `i ≠ j`, and `μ_ii = m_i/3 + m_{i+1} + … + m_n`.
 //! Since `φ̇_i` is the sum of the first `i` joint rates, the effort about joint `i` is the sum of the efforts about the
-//! links `i…n`: joint-space terms are sums over outer links of the terms of this Lagrangian.
+//! links `i…n`. So joint-space terms are sums over outer links of the terms of this Lagrangian.
 //!
 //! **Invariant:** one derivation for every n; no branch on the number of links. Source: Spong, Hutchinson
 //! and Vidyasagar, *Robot Modeling and Control* (2006), ch. 7.

@@ -1,6 +1,6 @@
 //! The faults of an expression, in sentences for the person who wrote it.
 //!
-//! **Invariant:** a message is short and printable whatever the text was: what it quotes is escaped and shortened.
+//! **Invariant:** a message is short and printable for every text. A quotation in it is escaped and shortened.
 
 use std::fmt;
 

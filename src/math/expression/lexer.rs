@@ -135,8 +135,8 @@ impl<'a> Lexer<'a> {
     }
 }
 
-/// The column, from 1, of the character at a byte offset. What stands before the first mistake, or in a text without
-/// one, is ASCII: every other character is unrecognized. So bytes are characters there.
+/// The column, from 1, of the character at a byte offset. A text without a mistake, and a text up to its first
+/// mistake, is ASCII: every other character is unrecognized. So bytes are characters there.
 pub(super) const fn column(offset: usize) -> usize {
     offset + 1
 }

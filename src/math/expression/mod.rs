@@ -72,8 +72,8 @@ impl Expression {
         let stack = &mut stack.0;
         stack.clear();
         let mut literals = self.0.literals.iter();
-        // The topmost value stays out of the stack: most operations then touch no memory. What is pushed below the very
-        // first operand is never taken back.
+        // The topmost value stays out of the stack: most operations then touch no memory. A value that is pushed below
+        // the very first operand is never taken back.
         let mut top = f64::NAN;
         for op in &self.0.ops {
             match op {

@@ -1,7 +1,7 @@
 //! Angles that differ by whole turns: which one is meant.
 //!
-//! Whole turns are taken away by the sine and cosine, whose argument the platform reduces by all the digits of π;
-//! subtracting a rounded 2π a million times would cost nine digits of a joint that has wound up.
+//! Whole turns are taken away by the sine and cosine, whose argument the platform reduces by all the digits of π.
+//! Subtracting a rounded 2π a million times would cost nine digits of a joint that has wound up.
 //!
 //! **Invariant:** an angle that is in range already comes back bit for bit.
 

@@ -1,6 +1,6 @@
 //! Inverse kinematics of 2 and 3 links in closed form.
 //!
-//! With the wrist (the end effector itself for 2 links) at distance `r` and bearing `β` from the base, the Law of
+//! The wrist (the end effector itself for 2 links) is at distance `r` and bearing `β` from the base. The Law of
 //! Cosines closes the triangle `l₁, l₂, r`, and the last link is decoupled from it:
 //!
 //! ```text
@@ -22,12 +22,13 @@ use glam::DVec2;
 
 use super::{Reach, Target, Unreachable, heading, turn, wrap};
 
-/// How far outside the reach a target still counts as on its edge, as a share of the sum of the lengths: far above what
-/// rounding can do to a boundary computed elsewhere (1e-13), far below what anybody could mean (1 nm per metre).
+/// How far outside the reach a target still counts as on its edge, as a share of the sum of the lengths. It is far
+/// above the rounding of a boundary computed elsewhere (1e-13), and far below anything that could be meant (1 nm per
+/// metre).
 pub const BOUNDARY: f64 = 1e-9;
 
-/// Rounding of a wrist's distance, as a share of the sum of the lengths: a difference of two vectors of that size, each
-/// good to a few units in the last place.
+/// Rounding of a wrist's distance, as a share of the sum of the lengths. It is a difference of two vectors of that
+/// size, each good to a few units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Rounding of one joint angle \[rad\]: four units in the last place of π. Poses that differ by less are as near.

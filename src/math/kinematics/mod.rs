@@ -36,7 +36,7 @@ pub struct Target {
 /// The distances from the base \[m\] that the end effector of an arm can have: a ring, or a disc where `inner` is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// Least distance \[m\]: what the longest link has over all the others together, or 0.
+    /// Least distance \[m\]: the longest link less all the others together, or 0.
     pub inner: f64,
     /// Greatest distance \[m\]: the sum of the lengths.
     pub outer: f64,

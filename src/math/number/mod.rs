@@ -1,11 +1,11 @@
 //! A number of the arm's formulas: one for one arm, or a few registers full of them, a lane for each of several arms.
 //!
 //! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
-//! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
-//! an angle, select and do not branch.
+//! done in all lanes alike. Two have to look at a lane by itself, the bound of an integral and the quadrant of an
+//! angle: they select and do not branch.
 //!
 //! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next but
-//! where that changes nothing: so that a lane has the bits of the arm that is stepped alone, on every machine and in
+//! where that changes nothing. So a lane has the bits of the arm that is stepped alone, on every machine and in
 //! registers of every width.
 
 mod arithmetic;
@@ -22,7 +22,7 @@ pub use registers::Registers;
 
 /// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
 ///
-/// A loop in place of [`std::array::from_fn`], whose closures the compiler may leave as functions of their own: there
+/// A loop in place of [`std::array::from_fn`], whose closures the compiler may leave as functions of their own. There
 /// the wide registers are not switched on, and every operation in them would be a call.
 macro_rules! entries {
     ($any:expr, $i:ident => $entry:expr) => {{
@@ -45,15 +45,15 @@ pub trait Number: Arithmetic {
     #[must_use]
     fn less_exact(self, factor: Self, other: f64) -> Self;
 
-    /// The nearest number to `self` between `-limit` and `limit`; what is not a number stays so.
+    /// The nearest number to `self` between `-limit` and `limit`; NaN stays NaN.
     #[must_use]
     fn clamped(self, limit: f64) -> Self;
 
-    /// Whether all lanes of all values are sure to be within `±limit`; what is not a number is not.
+    /// Whether all lanes of all values are sure to be within `±limit`; NaN is not.
     fn all_within(values: &[Self], limit: f64) -> bool;
 
-    /// Sine and cosine of an angle by those of what is left of it beyond a number of quarter turns, the lowest two bits
-    /// of `self`: an odd number exchanges them, and their signs are those of the quadrant.
+    /// Sine and cosine of an angle, by those of its rest beyond a number of quarter turns, the lowest two bits of
+    /// `self`. An odd number exchanges them, and their signs are those of the quadrant.
     #[must_use]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self);
 

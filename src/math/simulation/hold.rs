@@ -2,9 +2,9 @@
 //! the controller is off; or whoever drives the arm by hand.
 //!
 //! A control period is `k` steps, `k` the whole number nearest to the period that was asked for over the timestep, and
-//! at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay,
-//! what it answers is in force one period later, as where the computation takes as long as the period (Åström and
-//! Wittenmark, Computer-Controlled Systems, 3rd ed., section 1.3).
+//! at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay, its
+//! result is in force one period later, as where the computation takes as long as the period (Åström and Wittenmark,
+//! Computer-Controlled Systems, 3rd ed., section 1.3).
 //!
 //! **Invariant:** with a period of one step and no delay the law runs in every step, with the timestep as its `dt`.
 
@@ -75,7 +75,7 @@ impl<const N: usize> Default for Held<N> {
     }
 }
 
-/// What is held, with what follows from it and the timestep.
+/// The held effort, with the values that follow from it and the timestep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hold<const N: usize> {
     pub(in crate::math) held: Held<N>,
@@ -88,7 +88,7 @@ pub struct Hold<const N: usize> {
 }
 
 impl<const N: usize> Hold<N> {
-    /// What is held, in steps of `timestep` \[s\].
+    /// The held effort, in steps of `timestep` \[s\].
     #[must_use]
     pub fn new(held: Held<N>, timestep: f64) -> Self {
         let steps = held.period.steps(timestep);
@@ -158,7 +158,7 @@ impl<const N: usize> Hold<N> {
         (Control { effort, integral }, held)
     }
 
-    /// The step has been taken: what it holds is held from now on.
+    /// The step has been taken: its effort is held from now on.
     pub fn commit(&mut self, held: Held<N>) {
         self.held = held;
     }

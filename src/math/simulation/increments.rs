@@ -42,7 +42,7 @@ pub fn step_under<const N: usize>(
     }
 }
 
-/// The state that such a step leads to; what rounding leaves is lost.
+/// The state that such a step leads to; the rest of rounding is lost.
 #[inline(always)]
 #[must_use]
 pub fn state_after<const N: usize>(
@@ -69,15 +69,15 @@ fn acceleration<const N: usize>(
     }
 }
 
-/// Whether the dynamics can do without the first angle, and gain by it: sines and cosines are taken two at a time, so
+/// Whether the dynamics can do without the first angle, and gain by it. Sines and cosines are taken two at a time, so
 /// that an odd number of angles less one is a whole pass less. With 2 links next to nothing is saved.
 #[inline(always)]
 pub(super) fn leaves_out_first_angle<const N: usize>(arm: &Arm<N>) -> bool {
     N % 2 == 1 && arm.gravity() == 0.0
 }
 
-/// The state that a step of `h` \[s\] from `state` leads to under an `acceleration`, which the time does not enter, and
-/// its `carry`, which rounding leaves for the next step.
+/// The state that a step of `h` \[s\] from `state` leads to under an `acceleration`, which does not depend on time. Its
+/// `carry` is the rest of rounding, for the next step.
 #[inline(always)]
 pub(super) fn stepped<T: Number, const N: usize>(
     acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],

@@ -64,8 +64,8 @@ impl<const N: usize> Disturbance<N> {
     /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
     /// timestep` steps, rounded up, so that at least one has it.
     ///
-    /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, far
-    /// less than a timestep: 1.1 s in steps of 0.1 s are eleven steps, not twelve.
+    /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, and
+    /// by far less than a timestep. So 1.1 s in steps of 0.1 s are eleven steps, not twelve.
     fn new(effort: [f64; N], start: f64, duration: f64) -> Self {
         let ends = (start + duration) * (1.0 - 4.0 * f64::EPSILON);
         Self {
@@ -143,7 +143,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Does what [`Simulation::advance`] does, and shows `observe` the state after every step. `observe` may end the
-    /// advance there. Whatever must be judged at every physics step hooks in here.
+    /// advance there. A judge of every physics step hooks in here.
     pub fn advance_with(
         &mut self,
         steps: u64,
@@ -375,7 +375,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Changes the time between two runs of the control law, which must be finite and not negative; a period begins
-    /// with the next step. What is in force already changes nothing.
+    /// with the next step. A value that is in force already changes nothing.
     pub fn set_control_period(&mut self, period: ControlPeriod) {
         if period != self.hold.held.period {
             let change = |held: &mut Held<N>| held.period = period;

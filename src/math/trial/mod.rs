@@ -1,9 +1,9 @@
 //! A timed trial: one random target after another, counted as the arm reaches them.
 //!
 //! A [`Trial`] is told what happens and says what to do about it, as a list of [`TrialCommand`]s; the actor around it
-//! only carries messages. It knows no arm: targets come from a closure (usually around [`sample`]), goals are somebody
-//! else's and known by their ids, and the time is the simulation time that [`Trial::tick`] is told, before anything
-//! else that happened at that time.
+//! only carries messages. It knows no arm. Targets come from a closure (usually around [`sample`]), and goals are
+//! known by their ids. The time is the simulation time that [`Trial::tick`] gets, before anything else that happened
+//! at that time.
 //!
 //! ```text
 //!                    start                       accepted                    concluded: reached
@@ -12,7 +12,7 @@
 //!     └────────────────────────────────┴───────────────────────────┘ stop, or the duration is over
 //! ```
 //!
-//! **Invariant:** only the result of the goal in flight counts: whatever arrives about any older goal changes nothing.
+//! **Invariant:** only the result of the goal in flight counts: news of an older goal change nothing.
 
 mod sampling;
 mod terms;

@@ -22,10 +22,10 @@ const MARGIN: f64 = 0.05;
 ///
 /// Every part of the reachable plane is as likely as any other of the same area: uniform in bearing and in the square
 /// of the distance from the base. (Uniform distances or joint angles would crowd around the base.) One twentieth of the
-/// reach's width is left free at either edge: there the arm is stretched or folded, the end effector is slow to follow
-/// the joints, part of the epsilon around the target can't be entered, and a small change of the lengths would put the
-/// target out of reach. Three links get an orientation too: one of which each is as likely as any other, or where the
-/// arm can't have that, the nearest that it can have.
+/// reach's width is left free at either edge. There the arm is stretched or folded, and the end effector is slow to
+/// follow the joints. Part of the epsilon around the target can't be entered, and a small change of the lengths would
+/// put the target out of reach. Three links get an orientation too: one of which each is as likely as any other, or
+/// where the arm can't have that, the nearest that it can have.
 pub fn sample<const N: usize>(
     lengths: &[f64; N],
     mut random: impl FnMut() -> f64,

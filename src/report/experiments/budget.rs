@@ -1,7 +1,7 @@
 //! Origins of an error: truncation, rounding, and the effort held for a step.
 //!
-//! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the
-//! effort that these steps hold, and `law` the true motion under the law at every instant:
+//! `live` are the live arm's steps in doubles, and `exact` the same steps with 106 bits. `plant` is the true motion
+//! under the effort that these steps hold, and `law` the true motion under the law at every instant:
 //!
 //! `live - law = (live - exact) + (exact - plant) + (plant - law)`: rounding, truncation, control hold.
 //!

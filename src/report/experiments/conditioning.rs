@@ -1,8 +1,8 @@
 //! How many digits the accelerations of an arm lose, by mass ratio, pose and way of solving.
 //!
 //! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two ways are compared with it: the live arm's
-//! recursion, and the textbook's: form `M(q)` in joint space and eliminate. What a half-unit change in the last place
-//! of the angles does to the truth is shown beside them: no way can be asked for more.
+//! recursion, and the textbook's: form `M(q)` in joint space and eliminate. The effect of a half-unit change in the
+//! last place of the angles on the truth is shown beside them: no algorithm can do better.
 //!
 //! **Invariant:** the same states for every way.
 
@@ -24,7 +24,7 @@ pub enum PoseShape {
     Bent,
     /// Outer angles of some 1e-6 rad: nearly a straight line, where eliminating a joint-space matrix loses most.
     Stretched,
-    /// The second joint at π but for 1e-8 to 0.1 rad, the third anywhere: the first two links lie on one another, and
+    /// The second joint at π but for 1e-8 to 0.1 rad, the third anywhere. The first two links lie on one another, and
     /// the third turns about a point next to the base.
     Folded,
 }

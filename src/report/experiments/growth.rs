@@ -1,8 +1,8 @@
-//! How much a small deviation of the arm itself grows per control period: what the spectral radius predicts.
+//! How much a small deviation of the arm itself grows per control period: the spectral radius predicts it.
 //!
-//! The arm is nudged off its equilibrium, and after every period its deviation (position, velocity, integral) is scaled
-//! back to the size of the nudge, so that the fastest mode alone is left and neither dies in rounding nor leaves what
-//! is linear.
+//! The arm is nudged off its equilibrium. After every period its deviation (position, velocity, integral) is scaled
+//! back to the size of the nudge. So the fastest mode alone is left, and neither dies in rounding nor leaves the linear
+//! range.
 //!
 //! **Invariant:** no prediction enters but the equilibrium.
 

@@ -91,7 +91,7 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
     ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
-/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth: in the first,
+/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth. In the first,
 /// modes die out that say nothing about the last to do so. `None` once the deviation has escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {

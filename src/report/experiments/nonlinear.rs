@@ -3,9 +3,9 @@
 //!
 //! A move or a swing is run and judged by what becomes of it. Deviations from a periodic swing are followed by the
 //! method's own derivative, step after step around the swing: the eigenvalues of the product are the method's Floquet
-//! multipliers. Two of the true ones are 1 (along the swing, and to the swing of a little more energy); the other
-//! pair says whether what is beside the swing stays there. Source: Guckenheimer and Holmes, *Nonlinear Oscillations*
-//! (1983), ch. 1.5.
+//! multipliers. Two of the true ones are 1 (along the swing, and to the swing of a little more energy). The other
+//! pair says whether a deviation from the swing stays small. Source: Guckenheimer and Holmes, *Nonlinear
+//! Oscillations* (1983), ch. 1.5.
 //!
 //! **Invariant:** no prediction enters a measurement.
 
@@ -114,8 +114,8 @@ pub fn are_carried(swings: &[(ControlLoop<2>, State<2>)]) -> Vec<bool> {
     watched.iter().map(holds).collect()
 }
 
-/// A swing of the free default arm that comes back to where it began: from rest, both links to one side, through the
-/// hanging pose to rest on the other side, and back.
+/// A swing of the free default arm that comes back to its start. It goes from rest, both links to one side, through
+/// the hanging pose to rest on the other side, and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodicSwing {
     /// Its state at rest.

@@ -80,7 +80,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-/// What was seen of the scenes that were run; `short` names those that fall short.
+/// The outcomes of the scenes that were run; `short` names those that fall short.
 fn finding(run: usize, short: &[String]) -> String {
     let held = run - short.len();
     let finding = format!("**{held} of {run} stiff and extreme scenes do as theory says**");

@@ -244,8 +244,8 @@ impl<const N: usize> Follower<N> {
     }
 }
 
-/// The order at which a motion costs least for a tolerance: two more than in Jorba and Zou, section 3.3, who take the
-/// cost of a step to grow with the square of its order; every step begins with an evaluation besides.
+/// The order at which a motion costs least for a tolerance: two more than in Jorba and Zou, section 3.3. They take
+/// the cost of a step to grow with the square of its order; every step begins with an evaluation besides.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -4,10 +4,10 @@
 //!
 //! `Σ_j K_ij (cos(φ_i - φ_j) φ̈_j + sin(φ_i - φ_j) φ̇_j²) + W_i cos φ_i = τ_i - τ_{i+1}`
 //!
-//! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`, products of series are
-//! convolutions, and the accelerations' coefficients solve one linear system after the other, always with the same
-//! matrix. The first of them is given, so that it can come from a kernel that loses fewer digits. Known limit: a last
-//! link of a billion times the mass of the two that it folds costs a digit or two beyond those that its start has lost.
+//! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`. Products of series are
+//! convolutions. The accelerations' coefficients solve one linear system after the other, always with the same matrix.
+//! The first of them is given, so that it can come from a kernel that loses fewer digits. Known limit: a last link of a
+//! billion times the mass of the two that it folds costs a digit or two beyond those that its start has lost.
 //!
 //! The series is one for doubles, as the study follows an arm, and for numbers of twice the digits, as the report's
 //! references have them.
@@ -93,8 +93,8 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
         self.order
     }
 
-    /// The series about a state, by sine and cosine of the joint angles and the joints' rates and accelerations there:
-    /// rates up to order 1, angles of order 0 left out.
+    /// The series about a state, by sine and cosine of the joint angles and the joints' rates and accelerations there.
+    /// It has rates up to order 1; angles of order 0 are left out.
     pub(crate) fn begin(
         &mut self,
         arm: &Arm<N>,

@@ -1,6 +1,6 @@
 //! Complex numbers, as far as eigenvalues need them.
 //!
-//! **Invariant:** plain arithmetic; what is not finite is passed on.
+//! **Invariant:** plain arithmetic; infinities and NaN are passed on.
 
 use std::ops::{Add, Mul, Sub};
 

@@ -1,6 +1,6 @@
 //! Eigenvalues of a small real matrix, in three textbook stages: balancing by powers of two, Householder reduction to
-//! Hessenberg form, and the QR iteration with Wilkinson's shift in complex arithmetic, which treats real and complex
-//! eigenvalues alike.
+//! Hessenberg form, and the QR iteration. Wilkinson's shift in complex arithmetic treats real and complex eigenvalues
+//! alike.
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.4 and 7.5.
 //!

@@ -1,4 +1,4 @@
-//! Small dense matrices: what the step matrices of the stability predictions need, sizes up to some ten.
+//! Small dense matrices for the step matrices of the stability predictions, of sizes up to some ten.
 //!
 //! It uses nothing but floating point.
 //!

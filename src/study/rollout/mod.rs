@@ -5,10 +5,10 @@
 //! difference is the error of the method alone. Against a law that acts at every instant ([`Rollout::from_ideal`])
 //! holding the effort costs an error of first order in the control period, which no method can mend.
 //!
-//! Three more references of arms that differ in their last digits, one of them in steps half as long, say how far the
-//! first can be trusted: some twenty seconds on a chaotic swing. All of them err along the one direction that grows.
-//! Two may come near each other by chance; four hardly do, so that `SPREAD` times the largest distance between any
-//! two of them holds the truth.
+//! Three more references, of arms that differ in their last digits, one of them in steps half as long, say how far
+//! the first can be trusted. On a chaotic swing that is some twenty seconds. All of them err along the one direction
+//! that grows. Two may come near each other by chance; four hardly do, so that `SPREAD` times the largest distance
+//! between any two of them holds the truth.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -40,7 +40,8 @@ const MAX_SPAN: f64 = 0.05;
 pub struct Deviation {
     /// Largest error of a joint position, per sample \[rad\].
     pub errors: Vec<f64>,
-    /// How far the errors may be off, per sample \[rad\]: what the references are apart, at least a last digit.
+    /// How far the errors may be off, per sample \[rad\]: the distance between the references, at least a last
+    /// digit.
     pub uncertainties: Vec<f64>,
 }
 
@@ -135,8 +136,8 @@ impl<const N: usize> Rollout<N> {
         Ok(rollout)
     }
 
-    /// Goes on until about `work` evaluations of the dynamics are made, a coefficient of a reference counted as one,
-    /// and says how many that were: 0 once the run is over.
+    /// Goes on until about `work` evaluations of the dynamics are made; a coefficient of a reference counts as one.
+    /// Returns how many they were: 0 once the run is over.
     pub fn advance(&mut self, work: u64) -> u64 {
         let before = self.all_evaluations();
         let bound = before.saturating_add(work.max(1));
@@ -312,8 +313,8 @@ impl<const N: usize> Rollout<N> {
         self.ideals.as_ref().map(|_| &self.from_ideal)
     }
 
-    /// The largest error of a deviation of this run and its uncertainty \[rad\], where they are known for all samples:
-    /// an error of some of them can't be compared with another run's.
+    /// The largest error of a deviation of this run and its uncertainty \[rad\], where they are known for all samples.
+    /// An error of some of them can't be compared with another run's.
     #[must_use]
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
         let whole = deviation.filter(|deviation| deviation.errors.len() == self.times.len());

@@ -1,9 +1,9 @@
 //! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
 //!
-//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
-//! reading task hands one op at a time to the registry and waits until it has taken effect; the actor's handlers put
-//! what they are sent into the outbox; the writer, which the same actor polls behind its handlers, drains it. A
-//! client that reads slowly fills its own outbox and nothing else.
+//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`. The
+//! reading task hands one op at a time to the registry and waits until it has taken effect. The actor's handlers put
+//! messages into the outbox. The writer, which the same actor polls behind its handlers, drains it. A client that
+//! reads slowly fills its own outbox and nothing else.
 //!
 //! The connection is generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
 //!

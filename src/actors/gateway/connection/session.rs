@@ -213,8 +213,8 @@ impl ClientSession {
         }
     }
 
-    /// Has the client show the token, and gives what is to be done about it then. Who does not show it in time, or
-    /// has waited longest of too many, is closed.
+    /// Has the client show the token, and gives what is to be done about it then. Closes a client that misses the
+    /// deadline, and the oldest one when too many are unauthenticated.
     async fn admit<S>(
         &self,
         token: &Token,

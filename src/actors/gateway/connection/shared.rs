@@ -1,5 +1,5 @@
-//! The shared state of one connection: who the client is, what goes out to it, its computations, and how the
-//! connection ends.
+//! The shared state of one connection: the client, its outbox, its computations, and how the connection
+//! ends.
 //!
 //! **Invariant:** nothing that borrows a cell here waits while it does.
 
@@ -24,7 +24,7 @@ use crate::actors::resources::memory::Memory;
 
 /// The state that the actor, its writer and the reading task share; one thread, so plain cells do.
 pub(super) struct Shared {
-    /// Who the client is, once the registry knows it.
+    /// The client, once the registry knows it.
     pub(super) id: Cell<Option<ConnectionId>>,
     pub(super) registry: Addr<Registry>,
     /// Where long frames find their room.
@@ -35,7 +35,7 @@ pub(super) struct Shared {
     pub(super) wants_text: Arc<AtomicBool>,
     /// Something was written or computed: the reader may go on.
     pub(super) room: Notify,
-    /// Nothing more is read; what is queued is still sent.
+    /// Nothing more is read; queued messages are still sent.
     finishing: Cell<bool>,
     /// How the connection ends.
     pub(super) ending: Cell<Ending>,
@@ -88,7 +88,7 @@ impl Shared {
         self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
     }
 
-    /// So many bytes are on their way to the client: there may be room again.
+    /// This many bytes are on their way to the client: there may be room again.
     pub(super) fn written(&self, bytes: usize) {
         let may_read = self.may_read();
         self.outgoing.written(bytes);
@@ -132,7 +132,7 @@ impl Shared {
         self.computations.take();
     }
 
-    /// Ends reading; what is queued is still sent.
+    /// Ends reading; queued messages are still sent.
     pub(super) fn finish(&self) {
         self.finishing.set(true);
         self.outgoing.wake_writer();

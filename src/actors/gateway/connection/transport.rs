@@ -1,7 +1,7 @@
 //! Transports carry frames between a client and its connection: as plain bytes, or with another protocol around them.
 //!
-//! **Invariant:** whatever the transport, the reader sees a stream of bytes in which every frame ends where its braces
-//! close or with its line, and the writer hands over whole frames that end in a newline.
+//! **Invariant:** the reader sees a stream of bytes in which every frame ends where its braces close or with its line.
+//! The writer hands over whole frames that end in a newline. Both hold for every transport.
 
 use std::future::Future;
 use std::io::{self, IoSlice};
@@ -44,7 +44,7 @@ pub(super) trait Outbound {
     /// Whether the other side answers the end: reading goes on until it has.
     const END_IS_ANSWERED: bool;
 
-    /// Sends some of `frames`, in order, and gives the number of bytes; `None` if the client is gone. What is left of a
+    /// Sends some of `frames`, in order, and gives the number of bytes; `None` if the client is gone. The rest of a
     /// frame comes first in the next call.
     fn write(&mut self, frames: &[Bytes]) -> impl Future<Output = Option<usize>>;
 

@@ -68,7 +68,7 @@ pub(crate) struct Client {
     pub(super) outlets: Outlets,
     /// Its address.
     pub(super) from: IpAddr,
-    /// What all that follows takes, and calls and goals that wait for other clients.
+    /// The room of all that follows, and of calls and goals that wait for other clients.
     pub(super) kept: Kept,
     pub(super) advertised: HashMap<Box<str>, KeptEntry>,
     /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are

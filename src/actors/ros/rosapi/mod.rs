@@ -1,5 +1,5 @@
-//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the
-//! arm.
+//! `/rosapi/*`: the topics, services, nodes and parameters that there are. Topics and services of clients are asked
+//! of the registry; parameters and time of the arm.
 //!
 //! Parameters are read and set by the arm's own questions: the same checks, the same words.
 //!

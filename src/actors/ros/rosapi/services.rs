@@ -1,4 +1,4 @@
-//! The questions to `rosapi`: what each is, how it is read, and how its answer is written.
+//! The questions to `rosapi`, how each is read, and how its answer is written.
 //!
 //! **Invariant:** a parameter's value is read as the arm's own service reads it; a question about one that does not
 //! exist gets as far as the node, which says so.

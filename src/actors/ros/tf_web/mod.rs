@@ -1,8 +1,8 @@
 //! `tf2_web_republisher`: frames as web viewers want them, which can't put chains of frames together.
 //!
-//! A client that asks by the service gets the name of a topic, on which every frame comes as seen from the world. Who
-//! sends a goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names
-//! as feedback, seen from the frame that it names, at its rate.
+//! A client that asks by the service gets the name of a topic, on which every frame comes as seen from the world. A
+//! client sends a goal, by the action or by the topics of ROS 1's actions (as roslib 1 does). It gets the frames that
+//! it names as feedback, seen from the frame that it names, at its rate.
 //!
 //! A wish belongs to its connection and ends with it. A published one also ends when that connection unsubscribes from
 //! the feedback.
@@ -39,8 +39,8 @@ pub const MAX_FRAMES: usize = 32;
 const PERIOD: Duration = Duration::from_micros(16_667);
 /// Time between two messages of the topic.
 const TOPIC_PERIOD: Duration = Duration::from_millis(33);
-/// Messages of all wishes in one look, of which 60 come in a second: a message takes up to 30 us of the gateway's
-/// thread, and a published wish's goes to all who subscribe.
+/// Messages of all goals in one look, of which 60 come in a second. A message takes up to 30 us of the gateway's
+/// thread, and one that is published goes to all subscribers.
 const AT_ONCE: usize = 5;
 
 /// The end of a wish when its connection has too many.

@@ -23,7 +23,7 @@ use crate::protocol::wire::{json, text};
 
 /// Messages a second where a wish does not say.
 const RATE: f64 = 10.0;
-/// Messages a second, at least: what is asked more seldom comes so often.
+/// Messages a second, at least: a lower rate is raised to this.
 const LEAST_RATE: f64 = 0.1;
 
 impl<const N: usize> TfRepublisher<N> {

@@ -1,10 +1,10 @@
 //! Many simulations advanced side by side, a lane of the machine's registers for each.
 //!
-//! Arms with the same method, with the controller alike on or off, and alike with or without gravity share a register;
-//! state, parameters, gains, setpoint, timestep, disturbance and number of steps are each arm's own. What the processor
-//! has decides at run time how many lanes there are: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
+//! Arms share a register if they have the same method, the controller alike on or off, and gravity alike or none.
+//! State, parameters, gains, setpoint, timestep, disturbance and number of steps are each arm's own. The processor
+//! decides at run time how many lanes there are: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
-//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time, and a few
+//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time. A few
 //! such pairs take each step in turn, so that the processor works at one while another waits for its own results.
 //!
 //! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
@@ -28,7 +28,7 @@ use crate::math::number::Registers;
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// Most arms that wait for a lane: so many more than there are lanes that empty lanes at the end count for little.
+/// Most arms that wait for a lane: enough that empty lanes at the end count for little.
 const QUEUE: usize = 1024;
 
 impl Registers {

@@ -69,7 +69,7 @@ pub(super) struct Seat<'a, const N: usize> {
 /// A control period, or the rest of one, in which the effort is given.
 struct HeldSteps<const N: usize> {
     effort: [f64; N],
-    /// What the arm holds before it, and after the first step.
+    /// The arm's effort before it, and after the first step.
     before: Held<N>,
     after_one: Held<N>,
     /// Steps that have been taken.
@@ -222,7 +222,7 @@ impl<const N: usize> HeldSteps<N> {
         }
     }
 
-    /// What the arm holds now.
+    /// The arm's present effort.
     fn held(&self) -> Held<N> {
         match self.taken.checked_sub(1) {
             None => self.before,

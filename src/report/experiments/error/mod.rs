@@ -3,7 +3,7 @@
 //! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration. A run
 //! takes any number of equal steps. Its error is the largest, over joints and over its steps (or [`MOST_LOOKS`] or so
 //! of them), of the angles' distances to the reference, which is known at any instant. Cost is counted in evaluations
-//! of the dynamics here; who wants seconds times [`Scene::replay`], which takes the same steps and does no more.
+//! of the dynamics here. For seconds, time [`Scene::replay`], which takes the same steps and does no more.
 //!
 //! **Invariant:** nothing is chosen per method: same starts, same timesteps, same reference, same measure.
 

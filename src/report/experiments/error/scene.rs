@@ -64,7 +64,7 @@ pub trait Scene {
     }
     /// As [`Scene::run`], but a run whose error exceeds `most` ends there and counts as diverged.
     fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome;
-    /// The same steps without counting or comparing. What comes back only keeps them from being optimised away.
+    /// The same steps without counting or comparing. The results only keep them from being optimised away.
     fn replay(&self, method: Method, steps: u64) -> f64;
     /// The value that [`Scene::replay`] must come back with, taken from the run that is judged.
     fn judged_end(&self, method: Method, steps: u64) -> f64;

@@ -1,8 +1,8 @@
 //! Arithmetic on unevaluated sums of two doubles: some 31 decimal digits, for references only.
 //!
 //! A number is `hi + lo` with `|lo| ≤ ulp(hi) / 2`. Sums and products of two doubles are made exact by Knuth's two-sum
-//! and by Dekker's product (doubles split in halves, so that no fused multiply-add is needed and every machine gives
-//! the same bits).
+//! and by Dekker's product. Doubles are split in halves, so that no fused multiply-add is needed and every machine
+//! gives the same bits.
 //!
 //! Source: Dekker, *Numer. Math.* 18 (1971); Hida, Li and Bailey, *Library for double-double and quad-double
 //! arithmetic* (2007).

@@ -1,4 +1,4 @@
-//! The arm's Lagrangian with double-double constants: what every reference starts from.
+//! The arm's Lagrangian with double-double constants: the start of every reference.
 //!
 //! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i`:
 //!

@@ -24,7 +24,7 @@ pub struct ReferencePath<const N: usize> {
 }
 
 impl<const N: usize> ReferencePath<N> {
-    /// The motion from `start` under the law at every instant, or under a constant effort, for `duration` \[s\]; `None`
+    /// The motion from `start` under the law at every instant, or under a constant effort, for `duration` \[s\]. `None`
     /// for an effort that is held from one control instant to the next.
     #[must_use]
     pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Option<Self> {

@@ -4,8 +4,8 @@
 //! The series is the study's (`study::follower::series`, after Jorba and Zou), begun with the acceleration of the
 //! Lagrangian in twice the digits.
 //!
-//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two
-//! settings.
+//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; a proof needs a comparison of
+//! two settings.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,6 +1,7 @@
 //! S27 to S35: gravity, timesteps, angles and parameters far from the ordinary.
 //!
-//! **Invariant:** what no arm can have is refused by name; whatever is taken stays finite, or the scene falls short.
+//! **Invariant:** values that no arm can have are refused by name. A run with accepted values stays finite, or the
+//! scene falls short.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,6 +1,6 @@
 //! S01 to S06: at rest, swinging, chaotic, with nobody at the controls.
 //!
-//! **Invariant:** no scene has a controller; what moves, moves by itself.
+//! **Invariant:** no scene has a controller; all motion is free.
 
 #![allow(
     clippy::indexing_slicing,

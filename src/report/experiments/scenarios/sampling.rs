@@ -1,4 +1,5 @@
-//! S11 to S15: what the controller's own clock, its delay and its integral do, whatever the method.
+//! S11 to S15: the effect of the controller's own clock, its delay and its integral, whatever the
+//! method.
 //!
 //! **Invariant:** every verdict is about the control law; the methods only step the arm.
 
@@ -187,7 +188,7 @@ fn windup() -> Observation {
     };
     let (_, wound) = advance(&mut pid, 60_000);
     let limited = pid.integral()[0];
-    // Hanging needs no effort; what was wound up has to be unwound by the opposite error first.
+    // Hanging needs no effort. The integral has to be unwound by the opposite error first.
     let goal = [-FRAC_PI_2, 0.0];
     pid.set_setpoint(Setpoint::at(goal));
     let mut recovered = None;
@@ -233,8 +234,8 @@ fn too_much_integral() -> Observation {
     )
 }
 
-/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]: from the largest deviation within
-/// two periods to that within the next two, once other modes have died out.
+/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]. It is measured from the largest
+/// deviation within two periods to that within the next two, once other modes have died out.
 fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
     const STEPS: u32 = 20_000;
     let h = 2.0 * swing / f64::from(STEPS);

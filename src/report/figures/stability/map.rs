@@ -161,8 +161,8 @@ fn edge(edges: &[f64], growth: &[Option<f64>]) -> Option<f64> {
     edges.get(first).copied().filter(|_| first > 0)
 }
 
-/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor
-/// e meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
+/// Whether the watch is too short to tell. By the prediction the slowest mode changes its energy by less than a factor
+/// e meanwhile, so that the phase of its swing decides. Measurements have no part in this.
 fn undecided(step: &Matrix) -> bool {
     let watched = in_f64(STEPS);
     2.0 * watched * step.spectral_radius().ln().abs() < 1.0

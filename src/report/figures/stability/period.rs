@@ -64,7 +64,7 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
     table
 }
 
-/// Growth per control period: what was predicted and measured, and the figure of it.
+/// Growth per control period, predicted and measured, and the figure of it.
 pub(super) struct Growth {
     pub(super) csv: Csv,
     /// Dots, and how far the furthest lies from its curve, as a part of the growth.

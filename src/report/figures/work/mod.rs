@@ -1,7 +1,7 @@
 //! Work that a scene does not need, and whether it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page. A missing count is said to be
 //! unmeasured.
 //!
 //! **Invariant:** no number in here that was not measured for this report.

@@ -8,7 +8,7 @@ use super::server;
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, seconds};
 
-/// Something left out: what, where, and the names of the counts with it and without it.
+/// Something left out, its place, and the names of the counts with it and without it.
 struct Row {
     work: &'static str,
     place: &'static str,

@@ -1,7 +1,7 @@
 //! The rate of failed authentication: wrong tokens of one address are answered ten a second and no faster.
 //!
-//! Only wrong tokens wait. The right one is admitted at once, from wherever it comes: whoever guesses on the holder's
-//! own machine must not lock the holder out. The wait makes guessing slow, and the
+//! Only wrong tokens wait. The right one is admitted at once, from any address: guessers on the holder's own machine
+//! must not lock the holder out. The wait makes guessing slow, and the
 //! [length](crate::protocol::op::token::MIN_TOKEN) of a token makes it hopeless.
 //!
 //! **Invariant:** so many addresses are kept in mind and no more, whoever guesses from wherever.

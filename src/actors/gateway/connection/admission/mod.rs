@@ -16,8 +16,8 @@ use crate::web::Site;
 
 /// Bytes that a client may send before it has shown its token.
 pub const MAX_AUTH_BYTES: usize = 16 * 1024;
-/// Connections that have not shown the token yet. They are counted apart from the clients, and the oldest makes room
-/// for the next: whoever shows the token at once is never the oldest of so many.
+/// Connections that have not shown the token yet. They are counted apart from the clients, and the oldest is closed
+/// for the next. A client that shows the token at once is never the oldest of so many.
 pub const MAX_UNAUTHENTICATED: usize = 128;
 
 /// Clients that wait for a kept place, where no other place is free. The oldest is refused when there are more.

@@ -1,4 +1,4 @@
-//! From a frame to its effect: what is cut off the stream becomes an op, which the registry performs.
+//! From a frame to its effect: a piece cut off the stream becomes an op, which the registry performs.
 //!
 //! **Invariant:** every frame becomes one op or one complaint, and an op has taken effect when its frame is done with.
 

@@ -1,7 +1,7 @@
 //! The reading task of a connection: frames as they come, one op at a time. [`perform`](super::perform) acts on each.
 //!
-//! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted), so
-//! all that a client asks of the runtime happens in the order in which it asked. A series of messages counts as one op.
+//! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted). So a
+//! client's requests happen in the order in which it sent them. A series of messages counts as one op.
 
 use std::rc::Rc;
 
@@ -42,7 +42,7 @@ pub(crate) struct Reader {
     pub(super) performed: Option<Permit>,
     /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
     pub(super) speaks_json: bool,
-    /// The stream has ended; what came before may still wait.
+    /// The stream has ended; earlier bytes may still wait.
     has_ended: bool,
 }
 
@@ -193,7 +193,7 @@ impl Reader {
         }
     }
 
-    /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
+    /// The client has stopped sending, and may still be reading. Withdraws its registrations, since it can no longer
     /// answer or withdraw, and waits for the responses that are still to come.
     async fn await_responses(&self) {
         let answered = async {

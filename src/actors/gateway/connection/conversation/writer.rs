@@ -1,9 +1,9 @@
 //! Writing to one client: drains the outbox, several frames at a time. Nothing else writes to the socket of a client
 //! that is served.
 //!
-//! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
-//! put into the outbox is offered to the socket in the same turn. A client that has taken nothing wakes it by taking
-//! something.
+//! [`run`] is part of the connection's actor. It is polled after each message that the actor has handled, so the
+//! contents of the outbox are offered to the socket in the same turn. A client that has taken nothing wakes it by
+//! taking something.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 

@@ -1,8 +1,9 @@
-//! Flow control by what the client has read: what waits in its socket gets old, and can't be dropped any more.
+//! Flow control by the bytes that the client has read: bytes in its socket get old, and can't be dropped any
+//! more.
 //!
-//! The size of a socket's buffers says nothing about time: those of Linux hold 15 s of `/joint_states`. So a client
-//! that is slower than its topics is only written as much as it reads in [`AHEAD`], and the rest is dropped before it
-//! is written. Where nobody knows how much a client has not read, its socket's buffers are the only bound.
+//! The size of a socket's buffers says nothing about time: the buffers of Linux hold 15 s of `/joint_states`. So a
+//! client that is slower than its topics is only written as much as it reads in [`AHEAD`], and the rest is dropped
+//! before it is written. Where nobody knows how much a client has not read, its socket's buffers are the only bound.
 //!
 //! **Invariant:** a client that reads all that it is sent within [`HOLD`] is never kept waiting, and nobody is asked
 //! more often than every [`ASK`] about it.
@@ -15,7 +16,7 @@ use tokio::time::Instant;
 use crate::actors::gateway::connection::unread::UnreadSource;
 use crate::protocol::outbox::MAX_AGE;
 
-/// Nothing more is written once a byte has been unread for so long: Python reads 8 KiB at a time, half a second of
+/// Nothing more is written once a byte has been unread for so long. Python reads 8 KiB at a time: half a second of
 /// messages to a client that takes half of them.
 const HOLD: Duration = Duration::from_millis(100);
 /// A slow client is written as much as it reads in that time.

@@ -160,7 +160,7 @@ impl Outgoing {
         });
     }
 
-    /// So many bytes of what was taken have been written.
+    /// This many of the taken bytes have been written.
     pub(super) fn written(&self, bytes: usize) {
         self.flow.borrow_mut().note_written(bytes, Instant::now());
         let mut outbox = self.outbox.borrow_mut();

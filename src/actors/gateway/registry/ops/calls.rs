@@ -21,7 +21,7 @@ use crate::protocol::op::{Arguments, CallService};
 use crate::protocol::wire::payload::Payload;
 
 impl Registry {
-    /// Sends a call to the node or the client that serves it; whatever fails is the call's one response.
+    /// Sends a call to the node or the client that serves it. A failure is the call's one response.
     pub(crate) fn call(
         &mut self,
         origin: FrameOrigin,

@@ -2,7 +2,7 @@
 //! subscriber.
 //!
 //! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
-//! bytes. What takes long to encode holds up its publisher alone.
+//! bytes. A message that takes long to encode holds up its publisher alone.
 
 use std::sync::Arc;
 
@@ -126,7 +126,7 @@ impl Registry {
         }
     }
 
-    /// Delivers what could be made of a message in a form; what could not counts as dropped.
+    /// Delivers the forms that could be made of a message. The others count as dropped.
     fn deliver_form(
         &self,
         subscriber: &Subscriber,

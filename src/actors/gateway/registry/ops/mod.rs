@@ -1,5 +1,5 @@
-//! The rosbridge ops. Those of subscriptions, calls, actions and action servers have a file each; `fan_out.rs` delivers
-//! what is published, and `cleanup.rs` ends what nobody will answer.
+//! The rosbridge ops. Subscriptions, calls, actions and action servers have a file each. `fan_out.rs` delivers
+//! published messages, and `cleanup.rs` ends requests that nobody will answer.
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 

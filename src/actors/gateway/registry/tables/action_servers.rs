@@ -1,4 +1,4 @@
-//! Actions that clients serve: who serves which, and the goals that are on their way.
+//! Actions that clients serve: their servers, and the goals that are on their way.
 //!
 //! **Invariant:** a forwarded goal ends by the result of its own server, or with that client, and only once. A goal
 //! outlives its sender, but then nobody hears of it any more.
@@ -25,7 +25,7 @@ pub(crate) struct ForwardedGoal {
     /// The same as the server spells it.
     pub(crate) spelling: Box<str>,
     pub(crate) wants_feedback: bool,
-    /// What it takes of its sender's room.
+    /// The part of its sender's room that it takes.
     pub(crate) _entry: KeptEntry,
 }
 

@@ -1,4 +1,4 @@
-//! What the registry keeps of one client: registrations, and calls and goals that wait for other clients.
+//! The registry's entries of one client: registrations, and calls and goals that wait for other clients.
 //!
 //! **Invariant:** it is at most [`MAX_KEPT`] bytes, and given back by whoever drops it.
 

@@ -1,4 +1,4 @@
-//! Services that clients provide: who provides what, and the calls that are on their way.
+//! Services that clients provide: their providers, and the calls that are on their way.
 //!
 //! **Invariant:** a forwarded call is completed by its own provider's connection, or by its end, and only once.
 
@@ -24,7 +24,7 @@ pub(crate) struct Forwarded {
     pub(crate) service: Box<str>,
     /// When the caller's patience ends. The registry may look later, if the process has stood still.
     pub(crate) deadline: Instant,
-    /// What it takes of its caller's room.
+    /// The part of its caller's room that it takes.
     pub(crate) _entry: KeptEntry,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct Forwarded {
 #[derive(Clone)]
 pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,
-    /// The service's name as the provider spells it: what it is called by.
+    /// The service's name as the provider spells it: it is called by that.
     pub(crate) spelling: Box<str>,
 }
 

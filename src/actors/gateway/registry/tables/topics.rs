@@ -25,7 +25,7 @@ pub(crate) struct Subscription {
     pub(crate) encoding: Encoding,
     /// A guard that keeps its `fragment_size` among those of the topic.
     pub(crate) size: Option<Arc<usize>>,
-    /// What it takes of its client's room.
+    /// The part of its client's room that it takes.
     pub(crate) entry: KeptEntry,
 }
 
