@@ -53,25 +53,25 @@ impl Method {
                 name: "euler",
                 order: 1,
                 evaluations: 1,
-                turn_per_step: 0.4,
+                max_rotation_per_step: 0.4,
             },
             Self::Midpoint => Facts {
                 name: "midpoint",
                 order: 2,
                 evaluations: 2,
-                turn_per_step: 0.3,
+                max_rotation_per_step: 0.3,
             },
             Self::Verlet => Facts {
                 name: "verlet",
                 order: 2,
                 evaluations: 2,
-                turn_per_step: 0.8,
+                max_rotation_per_step: 0.8,
             },
             Self::Rk4 => Facts {
                 name: "rk4",
                 order: 4,
                 evaluations: 4,
-                turn_per_step: 1.25,
+                max_rotation_per_step: 1.25,
             },
         }
     }
@@ -97,8 +97,8 @@ impl Method {
     /// How far the fastest link of an arm may turn in a step \[rad\]: a method that cannot follow a turn within a step
     /// feeds energy into the arm. The numbers were measured; `study::motion` says on which arms.
     #[must_use]
-    pub const fn turn_per_step(self) -> f64 {
-        self.facts().turn_per_step
+    pub const fn max_rotation_per_step(self) -> f64 {
+        self.facts().max_rotation_per_step
     }
 }
 
@@ -107,7 +107,7 @@ struct Facts {
     name: &'static str,
     order: u32,
     evaluations: u32,
-    turn_per_step: f64,
+    max_rotation_per_step: f64,
 }
 
 impl fmt::Display for Method {

@@ -66,10 +66,9 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let any = angles[0];
     let shifted = entries!(any, i => angles[i] * FRAC_2_PI + ROUND);
     let k = entries!(any, i => shifted[i] + -ROUND);
-    let first = entries!(any, i => angles[i].less_exact(k[i], HALF_PI[0]));
-    let r = entries!(any, i => first[i].less_exact(k[i], HALF_PI[1]));
-    let tail =
-        entries!(any, i => (first[i] - r[i]).less_exact(k[i], HALF_PI[1]) - k[i] * HALF_PI[2]);
+    let first = entries!(any, i => angles[i].sub_exact_product(k[i], HALF_PI[0]));
+    let r = entries!(any, i => first[i].sub_exact_product(k[i], HALF_PI[1]));
+    let tail = entries!(any, i => (first[i] - r[i]).sub_exact_product(k[i], HALF_PI[1]) - k[i] * HALF_PI[2]);
 
     let r2 = entries!(any, i => r[i] * r[i]);
     let r4 = entries!(any, i => r2[i] * r2[i]);
@@ -84,9 +83,9 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     });
     let cosine = entries!(any, i => {
         let one = any.like(1.0);
-        let head = one.less_exact(r2[i], 0.5);
+        let head = one.sub_exact_product(r2[i], 0.5);
         let low = r4[i] * (r2[i] * C[1] + C[0]) - r[i] * tail[i];
-        head + (((one - head).less_exact(r2[i], 0.5) + low) + r4[i] * r4[i] * c[i])
+        head + (((one - head).sub_exact_product(r2[i], 0.5) + low) + r4[i] * r4[i] * c[i])
     });
 
     let (mut sin, mut cos) = (sine, cosine);

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::journal::{Note, NoteError, links, read_note};
-use super::reader::{Passage, ReadError, RecordEnding, Recording};
+use super::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 use super::schema::{INPUTS, STATES};
 use super::writer::VERSION;
 use crate::math::simulation::Simulation;
@@ -172,7 +172,7 @@ fn no_states(ending: Option<RecordEnding>) -> ReplayError {
     }
 }
 
-fn first_input(recording: &mut Recording<impl Read>) -> Result<Passage, ReplayError> {
+fn first_input(recording: &mut Recording<impl Read>) -> Result<RecordedMessage, ReplayError> {
     loop {
         match recording.next_passage()? {
             Some(passage) if passage.topic == INPUTS => return Ok(passage),
@@ -184,7 +184,7 @@ fn first_input(recording: &mut Recording<impl Read>) -> Result<Passage, ReplayEr
 
 fn play<const N: usize>(
     mut recording: Recording<impl Read>,
-    first: Passage,
+    first: RecordedMessage,
 ) -> Result<ReplayVerdict, ReplayError> {
     let mut run = Replay::<N> {
         arm: None,
@@ -225,7 +225,7 @@ struct Replay<const N: usize> {
 }
 
 impl<const N: usize> Replay<N> {
-    fn take(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+    fn take(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         match passage.topic.as_str() {
             INPUTS => self.input(passage),
             STATES => self.state(passage),
@@ -233,7 +233,7 @@ impl<const N: usize> Replay<N> {
         }
     }
 
-    fn input(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+    fn input(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         let InputMessage { step, input } = fields(passage)?;
         let note = read_note(&input).map_err(|why| ReplayError::Input { step, why })?;
         if let Note::Begin(checkpoint) = note {
@@ -261,7 +261,7 @@ impl<const N: usize> Replay<N> {
         Ok(())
     }
 
-    fn state(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+    fn state(&mut self, passage: &RecordedMessage) -> Result<(), ReplayError> {
         let recorded: StateMessage = fields(passage)?;
         let step = recorded.step;
         if !self.advance(step, passage)? {
@@ -298,7 +298,7 @@ impl<const N: usize> Replay<N> {
     }
 
     /// Takes the steps up to that one; false if there is nothing to compare there.
-    fn advance(&mut self, step: u64, passage: &Passage) -> Result<bool, ReplayError> {
+    fn advance(&mut self, step: u64, passage: &RecordedMessage) -> Result<bool, ReplayError> {
         let Some((simulation, at)) = &mut self.arm else {
             return Ok(false);
         };
@@ -350,7 +350,7 @@ struct StateMessage {
     effort: Vec<Option<f64>>,
 }
 
-fn fields<T: DeserializeOwned>(passage: &Passage) -> Result<T, ReplayError> {
+fn fields<T: DeserializeOwned>(passage: &RecordedMessage) -> Result<T, ReplayError> {
     let fields = passage
         .msg
         .as_ref()

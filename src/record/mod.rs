@@ -16,9 +16,9 @@ use bytes::Bytes;
 
 pub use self::comparison::{AT_ONCE, Difference, MAX_LEAP, ReplayError, ReplayVerdict, replay};
 pub use self::journal::{Note, NoteError, links, read_note, write_note};
-pub use self::reader::{Passage, ReadError, RecordEnding, Recording};
+pub use self::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 pub use self::schema::{CALLS, INPUTS, STATES};
-pub use self::writer::{CHUNK_BYTES, RecordError, RunSettings, Scribe};
+pub use self::writer::{CHUNK_BYTES, McapWriter, RecordError, RunSettings};
 use crate::protocol::catalog::{Service, Topic};
 
 /// Something to be recorded.

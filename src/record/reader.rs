@@ -27,7 +27,7 @@ const HEAD: usize = 4096;
 
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Passage {
+pub struct RecordedMessage {
     /// Its time, in nanoseconds since 1970.
     pub log_time: u64,
     /// The channel's topic.
@@ -105,7 +105,7 @@ impl<R: Read> Recording<R> {
     ///
     /// # Errors
     /// If the file is damaged before its end.
-    pub fn next_passage(&mut self) -> Result<Option<Passage>, ReadError> {
+    pub fn next_passage(&mut self) -> Result<Option<RecordedMessage>, ReadError> {
         let message = match self.reader.next() {
             Some(Ok(message)) => message,
             Some(Err(McapError::UnexpectedEof)) => {
@@ -131,7 +131,7 @@ impl<R: Read> Recording<R> {
             })
         };
         let msg = one.map(read).transpose()?;
-        Ok(Some(Passage {
+        Ok(Some(RecordedMessage {
             log_time: message.log_time,
             topic,
             sequence: message.sequence,

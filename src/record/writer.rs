@@ -64,7 +64,7 @@ impl From<McapError> for RecordError {
 }
 
 /// Writes entries into a file.
-pub struct Scribe<W: Write> {
+pub struct McapWriter<W: Write> {
     writer: Writer<NoSeek<W>>,
     channels: HashMap<&'static str, Channel>,
     messages: u64,
@@ -92,7 +92,7 @@ struct ResponseFrame<'a> {
     status: String,
 }
 
-impl<W: Write> Scribe<W> {
+impl<W: Write> McapWriter<W> {
     /// Begins a file.
     ///
     /// # Errors

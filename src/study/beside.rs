@@ -8,7 +8,7 @@
 use glam::DVec2;
 
 use super::continuous::ContinuousLoop;
-use super::follower::Follower;
+use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
@@ -38,7 +38,7 @@ impl<const N: usize> Steppable for Simulation<N> {
 
 /// The motion that others are compared with.
 #[derive(Debug, Clone)]
-pub(super) enum Truth<const N: usize> {
+pub(super) enum ReferenceRun<const N: usize> {
     /// An arm under a law that acts at every instant.
     Law(ContinuousLoop<N>),
     /// An arm under a law that runs once a control period.
@@ -51,7 +51,7 @@ pub(super) enum Truth<const N: usize> {
 #[derive(Debug, Clone)]
 pub(super) struct FreeMotion<const N: usize> {
     arm: Arm<N>,
-    follower: Follower<N>,
+    taylor: TaylorReference<N>,
     timestep: f64,
 }
 
@@ -59,21 +59,21 @@ impl<const N: usize> FreeMotion<N> {
     pub(super) fn new(arm: Arm<N>, start: State<N>, timestep: f64, tolerance: f64) -> Self {
         Self {
             arm,
-            follower: Follower::within(start, tolerance),
+            taylor: TaylorReference::within(start, tolerance),
             timestep,
         }
     }
 }
 
-impl<const N: usize> Steppable for Truth<N> {
+impl<const N: usize> Steppable for ReferenceRun<N> {
     fn step(&mut self) -> Option<u64> {
         match self {
             Self::Law(law) => law.step().then(|| law.control.method.evaluations().into()),
             Self::Sampled(sampled) => Steppable::step(&mut **sampled),
             Self::Free(free) => {
-                let before = free.follower.coefficients();
-                let is_followed = free.follower.follow(&free.arm, &[0.0; N], free.timestep);
-                let after = free.follower.coefficients();
+                let before = free.taylor.coefficients();
+                let is_followed = free.taylor.follow(&free.arm, &[0.0; N], free.timestep);
+                let after = free.taylor.coefficients();
                 (is_followed && after <= MAX_COEFFICIENTS).then_some(after - before)
             }
         }
@@ -83,7 +83,7 @@ impl<const N: usize> Steppable for Truth<N> {
         let (arm, state) = match self {
             Self::Sampled(sampled) => (sampled.arm(), sampled.state()),
             Self::Law(law) => (&law.control.arm, &law.state),
-            Self::Free(free) => (&free.arm, free.follower.state()),
+            Self::Free(free) => (&free.arm, free.taylor.state()),
         };
         forward(arm.lengths(), &state.position).position
     }
@@ -93,7 +93,7 @@ impl<const N: usize> Steppable for Truth<N> {
 #[derive(Debug, Clone)]
 pub(super) struct Beside<R, const N: usize> {
     run: R,
-    truth: Truth<N>,
+    truth: ReferenceRun<N>,
     /// Steps of the truth in one of the run.
     truth_steps: u64,
     /// Steps of the run that are still to be taken.
@@ -104,7 +104,13 @@ pub(super) struct Beside<R, const N: usize> {
 }
 
 impl<R: Steppable, const N: usize> Beside<R, N> {
-    pub(super) fn new(run: R, steps: u64, truth: Truth<N>, truth_steps: u64, allowed: f64) -> Self {
+    pub(super) fn new(
+        run: R,
+        steps: u64,
+        truth: ReferenceRun<N>,
+        truth_steps: u64,
+        allowed: f64,
+    ) -> Self {
         Self {
             run,
             truth,
@@ -174,7 +180,7 @@ mod tests {
             position: [0.0; 2],
             velocity: [0.0; 2],
         };
-        let truth = Truth::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
+        let truth = ReferenceRun::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
         let mut beside = Beside::new(Diverged(&asked), 1_000_000, truth, 1, f64::INFINITY);
         assert_eq!(beside.advance(), Some(f64::INFINITY));
         assert_eq!(beside.advance(), Some(f64::INFINITY));

@@ -6,7 +6,7 @@ use super::control_loop::ControlLoop;
 use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
 use super::motion::Motion;
-use super::poses::{Judged, PoseSearch};
+use super::poses::{PoseCandidate, PoseSearch};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
@@ -132,7 +132,7 @@ pub struct LimitSearch<const N: usize> {
     /// How the loop rests, unless it runs away.
     at_rest: Rest,
     /// A pose in which the loop runs away.
-    runaway: Option<Judged<N>>,
+    runaway: Option<PoseCandidate<N>>,
     stage: LimitStage<N>,
 }
 
@@ -246,7 +246,10 @@ impl<const N: usize> LimitSearch<N> {
     /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree, no search follows.
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
-        let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
+        let mut found = (
+            self.limits.held,
+            PoseCandidate::as_it_is(self.limits.equilibrium),
+        );
         let Some(Proven { timestep, pose }) = proven else {
             let integrates = control.integrating().contains(&true);
             return if integrates && control.arm.gravity() > 0.0 {
@@ -261,7 +264,7 @@ impl<const N: usize> LimitSearch<N> {
             && limit > 0.0
             && found.0.is_none_or(|least| limit < least)
         {
-            found = (there, Judged::as_it_is(pose));
+            found = (there, PoseCandidate::as_it_is(pose));
         }
         self.limits.bound = Some(timestep);
         if self.limits.held == Some(0.0) {
@@ -282,7 +285,10 @@ impl<const N: usize> LimitSearch<N> {
 
     /// Searches all poses, or those without gravity where some pose with it runs away.
     fn search_held(&self) -> LimitStage<N> {
-        let found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
+        let found = (
+            self.limits.held,
+            PoseCandidate::as_it_is(self.limits.equilibrium),
+        );
         let search = PoseSearch::new(&self.control, Sampling::Held, found);
         let search = if self.runaway.is_some() {
             search.weightless()
@@ -296,7 +302,7 @@ impl<const N: usize> LimitSearch<N> {
     fn conclude(
         &mut self,
         sampling: Sampling,
-        (least, worst): (Option<f64>, Judged<N>),
+        (least, worst): (Option<f64>, PoseCandidate<N>),
     ) -> LimitStage<N> {
         let control = &self.control;
         let limits = &mut self.limits;
@@ -325,7 +331,10 @@ impl<const N: usize> LimitSearch<N> {
             limits.worst_pose = Some(worst.pose);
             limits.critical = critical(&worst.linear(control), control.method, limit);
         }
-        let known = (limits.continuous, Judged::as_it_is(limits.equilibrium));
+        let known = (
+            limits.continuous,
+            PoseCandidate::as_it_is(limits.equilibrium),
+        );
         let search = PoseSearch::new(control, Sampling::Continuous, known);
         LimitStage::Poses(Sampling::Continuous, search)
     }

@@ -10,7 +10,7 @@
 //! | [`gains`] | gains for an arm and a timestep, stable in every pose, that settle in time |
 //! | [`fewest`] | the fewest steps with which a run is good enough |
 //! | [`planner`] | the cheapest method and timestep for an allowed error at the end effector |
-//! | [`rollout`] | an offline run with its error against a reference ([`follower`]) |
+//! | [`rollout`] | an offline run with its error against a reference ([`taylor`]) |
 //! | [`error_estimate`] | the local error of the step about to be taken |
 //!
 //! Everything steps through [`crate::math`], the live arm's own code.
@@ -25,7 +25,6 @@ mod critical;
 mod equilibrium;
 pub mod error_estimate;
 pub mod fewest;
-pub mod follower;
 pub mod gains;
 mod limits;
 pub mod linear;
@@ -38,3 +37,4 @@ pub mod rollout;
 mod slow_modes;
 pub mod stability;
 mod symmetric;
+pub mod taylor;

@@ -2,7 +2,7 @@
 //!
 //! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
 //! until the run diverges. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
-//! fastest link. [`turn_per_step`] is what every method was seen to carry.
+//! fastest link. [`max_rotation_per_step`] is what every method was seen to carry.
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
@@ -25,7 +25,7 @@
 //!
 //! **Invariant:** pure and cheap, some 3 µs, since every published tick asks for it.
 //!
-//! [`turn_per_step`]: crate::math::integrator::Method::turn_per_step
+//! [`max_rotation_per_step`]: crate::math::integrator::Method::max_rotation_per_step
 
 #![allow(
     clippy::indexing_slicing,
@@ -93,7 +93,7 @@ impl Motion {
             by_energy
         };
         // An arm too extreme to compute with gives NaN, which limits nothing.
-        let timestep = method.turn_per_step() / speed;
+        let timestep = method.max_rotation_per_step() / speed;
         if speed > 0.0 && timestep > 0.0 {
             Self { speed, timestep }
         } else {

@@ -20,13 +20,13 @@
 
 use std::f64::consts::PI;
 
-use super::beside::{Beside, FreeMotion, Truth};
+use super::beside::{Beside, FreeMotion, ReferenceRun};
 use super::clocks::clock_limits;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::fewest::StepSearch;
-use super::follower::ROUNDING;
 use super::limits::LimitSearch;
+use super::taylor::ROUNDING;
 use crate::math::arm::State;
 use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
@@ -172,7 +172,7 @@ impl Fineness {
 
 #[derive(Debug, Clone)]
 enum PlanStage<const N: usize> {
-    Comparing(Box<Beside<Truth<N>, N>>),
+    Comparing(Box<Beside<ReferenceRun<N>, N>>),
     Limiting(Method, Box<LimitSearch<N>>),
     /// The search looks for the number of steps in the whole.
     Running(Method, StepSearch, Box<Beside<Simulation<N>, N>>),
@@ -182,7 +182,7 @@ enum PlanStage<const N: usize> {
 impl<const N: usize> Planning<N> {
     /// The most memory that a plan takes, in bytes.
     pub const MOST_BYTES: usize = size_of::<Self>()
-        + size_of::<Beside<Truth<N>, N>>()
+        + size_of::<Beside<ReferenceRun<N>, N>>()
         + size_of::<Beside<Simulation<N>, N>>()
         + LimitSearch::<N>::MOST_BYTES;
 
@@ -257,7 +257,7 @@ impl<const N: usize> Planning<N> {
 
     /// The truth, followed so finely, and how many of its steps make one of a run that takes `steps` steps in the
     /// whole.
-    fn truth(&self, fineness: Fineness, steps: u64) -> (Truth<N>, u64) {
+    fn truth(&self, fineness: Fineness, steps: u64) -> (ReferenceRun<N>, u64) {
         let Task { control, start, .. } = self.task;
         match fineness {
             Fineness::Steps(finest) => {
@@ -266,19 +266,19 @@ impl<const N: usize> Planning<N> {
                 if is_sampled(&control) {
                     let control = control.with_method(Method::Rk4).with_timestep(timestep);
                     let sampled = Box::new(control.simulation(start));
-                    return (Truth::Sampled(sampled), each);
+                    return (ReferenceRun::Sampled(sampled), each);
                 }
                 let law = ContinuousLoop {
                     control: control.with_method(Method::Rk4).with_timestep(timestep),
                     state: start,
                     integral: [0.0; N],
                 };
-                (Truth::Law(law), each)
+                (ReferenceRun::Law(law), each)
             }
             Fineness::Tolerance(tolerance) => {
                 let timestep = self.whole / in_f64(steps);
                 let motion = FreeMotion::new(control.arm, start, timestep, tolerance);
-                (Truth::Free(motion), 1)
+                (ReferenceRun::Free(motion), 1)
             }
         }
     }

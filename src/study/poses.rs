@@ -47,21 +47,24 @@ const fn grid<const N: usize>() -> usize {
 
 /// A pose to be judged, with gravity or without.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Judged<const N: usize> {
+pub(super) struct PoseCandidate<const N: usize> {
     pub(super) pose: [f64; N],
-    weighs: bool,
+    has_gravity: bool,
 }
 
-impl<const N: usize> Judged<N> {
+impl<const N: usize> PoseCandidate<N> {
     /// A pose as it is, with the gravity that there is.
     pub(super) const fn as_it_is(pose: [f64; N]) -> Self {
-        Self { pose, weighs: true }
+        Self {
+            pose,
+            has_gravity: true,
+        }
     }
 
     /// The loop that was judged.
     pub(super) fn linear(&self, control: &ControlLoop<N>) -> Linear {
         let linear = Linear::at_pose(control, &self.pose);
-        if self.weighs {
+        if self.has_gravity {
             linear
         } else {
             linear.weightless()
@@ -72,7 +75,7 @@ impl<const N: usize> Judged<N> {
 /// A climb uphill on the growth, one judgement a move.
 #[derive(Debug, Clone, Copy)]
 struct Climb<const N: usize> {
-    at: Judged<N>,
+    at: PoseCandidate<N>,
     growth: f64,
     stride: f64,
     /// The direction that is tried next, and how many have failed in turn.
@@ -96,8 +99,8 @@ enum Sought {
 enum PoseStage<const N: usize> {
     Grid(usize),
     /// The largest growth of every cell at the smallest limit.
-    Rating(usize, Vec<(Judged<N>, f64)>),
-    Climbing(Vec<Judged<N>>, Option<Climb<N>>),
+    Rating(usize, Vec<(PoseCandidate<N>, f64)>),
+    Climbing(Vec<PoseCandidate<N>>, Option<Climb<N>>),
     Done,
 }
 
@@ -109,7 +112,7 @@ pub(super) struct PoseSearch<const N: usize> {
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
     /// The pose of that value.
-    worst: Judged<N>,
+    worst: PoseCandidate<N>,
     stage: PoseStage<N>,
 }
 
@@ -118,7 +121,7 @@ impl<const N: usize> PoseSearch<N> {
     pub(super) fn new(
         control: &ControlLoop<N>,
         sampling: Sampling,
-        (bound, worst): (Option<f64>, Judged<N>),
+        (bound, worst): (Option<f64>, PoseCandidate<N>),
     ) -> Self {
         Self {
             control: *control,
@@ -143,7 +146,7 @@ impl<const N: usize> PoseSearch<N> {
             control: *control,
             sought: Sought::Runaway,
             smallest: None,
-            worst: Judged::as_it_is(control.setpoint.position),
+            worst: PoseCandidate::as_it_is(control.setpoint.position),
             stage: PoseStage::Rating(0, Vec::new()),
         }
     }
@@ -184,12 +187,12 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     /// The smallest so far \[s\], `None` if nothing limits, and its pose.
-    pub(super) fn smallest(&self) -> (Option<f64>, Judged<N>) {
+    pub(super) fn smallest(&self) -> (Option<f64>, PoseCandidate<N>) {
         (self.smallest, self.worst)
     }
 
     /// One of the poses of the grid: first without gravity, then, if there is any, with it in every direction.
-    fn judged(&self, index: usize) -> Option<Judged<N>> {
+    fn judged(&self, index: usize) -> Option<PoseCandidate<N>> {
         let turns = self.turns();
         let mut pose = outer_pose::<N>(index / turns)?;
         let turn = index % turns;
@@ -198,9 +201,9 @@ impl<const N: usize> PoseSearch<N> {
         {
             *first = part_of_turn(turn - 1, DIRECTIONS);
         }
-        Some(Judged {
+        Some(PoseCandidate {
             pose,
-            weighs: turn > 0,
+            has_gravity: turn > 0,
         })
     }
 
@@ -214,7 +217,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn judge(&mut self, judged: &Judged<N>) {
+    fn judge(&mut self, judged: &PoseCandidate<N>) {
         let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
             return;
         };
@@ -229,7 +232,7 @@ impl<const N: usize> PoseSearch<N> {
             return;
         }
         let modes = Modes::of(&linear);
-        if judged.weighs && modes.run_away() {
+        if judged.has_gravity && modes.run_away() {
             return;
         }
         if let Some(limit) = stepping.search(&modes)
@@ -241,7 +244,7 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     /// Growth at the smallest limit so far, or in continuous time if a pose is sought that runs away.
-    fn growth(&mut self, judged: &Judged<N>) -> f64 {
+    fn growth(&mut self, judged: &PoseCandidate<N>) -> f64 {
         let linear = judged.linear(&self.control);
         let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
             let modes = Modes::of(&linear);
@@ -253,14 +256,19 @@ impl<const N: usize> PoseSearch<N> {
         };
         let growth = Stepping::new(&linear, self.control.method, sampling)
             .growth(self.smallest.unwrap_or(0.0));
-        if growth > NEUTRAL && judged.weighs && Modes::of(&linear).run_away() {
+        if growth > NEUTRAL && judged.has_gravity && Modes::of(&linear).run_away() {
             f64::NEG_INFINITY
         } else {
             growth
         }
     }
 
-    fn rate(&mut self, index: usize, judged: Judged<N>, cells: &mut Vec<(Judged<N>, f64)>) {
+    fn rate(
+        &mut self,
+        index: usize,
+        judged: PoseCandidate<N>,
+        cells: &mut Vec<(PoseCandidate<N>, f64)>,
+    ) {
         let growth = self.growth(&judged);
         match cells.get_mut(index / self.turns()) {
             Some(cell) if growth > cell.1 => *cell = (judged, growth),
@@ -269,7 +277,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn begin(&mut self, at: Judged<N>) -> Climb<N> {
+    fn begin(&mut self, at: PoseCandidate<N>) -> Climb<N> {
         Climb {
             at,
             growth: self.growth(&at),
@@ -283,7 +291,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Makes one move of a climb; none once it is at its top.
     fn climb(&mut self, mut climb: Climb<N>) -> Option<Climb<N>> {
         // The first joint counts only where there is gravity.
-        let first = usize::from(!climb.at.weighs);
+        let first = usize::from(!climb.at.has_gravity);
         let directions = 2 * N.saturating_sub(first);
         if climb.stride < SMALLEST_STRIDE || climb.moves >= MAX_MOVES || directions == 0 {
             return None;
@@ -316,7 +324,7 @@ impl<const N: usize> PoseSearch<N> {
 }
 
 /// Cells that grow no less than all of their neighbours.
-fn summits<const N: usize>(cells: &[(Judged<N>, f64)]) -> Vec<Judged<N>> {
+fn summits<const N: usize>(cells: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandidate<N>> {
     let (half, whole) = (grid::<N>() / 2 + 1, grid::<N>());
     let stands_out = |index: usize| {
         let mut apart = 1;

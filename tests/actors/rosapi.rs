@@ -11,7 +11,7 @@ use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::node::ask;
 #[cfg(feature = "record")]
 use pendularm::actors::recorder::Recorder;
-use pendularm::actors::resources::aside::{Errand, PLACES, aside};
+use pendularm::actors::resources::aside::{PLACES, WorkKind, aside};
 use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{
     ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, RosapiNode, SetParam,
@@ -143,7 +143,9 @@ fn the_list_is_made_once_there_is_a_place_to_write_it() {
         let held = std::sync::Arc::new(std::sync::Mutex::new(held));
         for _ in 0..PLACES {
             let held = std::sync::Arc::clone(&held);
-            actix_rt::spawn(aside(Errand::Listing, move || held.lock().unwrap().recv()));
+            actix_rt::spawn(aside(WorkKind::Listing, move || {
+                held.lock().unwrap().recv()
+            }));
         }
         turns().await;
         let question = json!({"op": "call_service", "service": "/rosapi/topics"});

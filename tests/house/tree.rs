@@ -22,7 +22,7 @@ pub(crate) fn root() -> &'static Path {
 }
 
 /// Every file below `folder` that is ours.
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

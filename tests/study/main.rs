@@ -21,7 +21,6 @@ mod clocks;
 mod equilibrium;
 mod error;
 mod experiments;
-mod follower;
 mod gains;
 mod growth;
 #[path = "../support/json.rs"]
@@ -38,3 +37,4 @@ mod review;
 mod rollout;
 mod scenarios;
 mod stability;
+mod taylor;

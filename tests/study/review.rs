@@ -13,10 +13,10 @@ use pendularm::report::experiments::chaos::separation;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate_step;
-use pendularm::study::follower::Follower;
 use pendularm::study::motion::Motion;
 use pendularm::study::rollout::{Rollout, RolloutRequest};
 use pendularm::study::stability::{Rest, limit_held, limits};
+use pendularm::study::taylor::TaylorReference;
 
 fn default_at<const N: usize>(setpoint: [f64; N]) -> ControlLoop<N>
 where
@@ -333,7 +333,7 @@ fn the_error_of_the_first_step_from_the_start_is_estimated() {
             let arm = Arm::<N>::default();
             let start = State::<N>::rest();
             let seen = estimate_step(&arm, &start, &[0.0; N], method, h).unwrap();
-            let mut truth = Follower::new(start);
+            let mut truth = TaylorReference::new(start);
             assert!(truth.follow(&arm, &[0.0; N], h));
             let mut live = Simulation::new(arm, pendularm::study::control_loop::no_control());
             live.set_method(method);

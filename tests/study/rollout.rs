@@ -6,8 +6,8 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::{estimate, estimate_step};
-use pendularm::study::follower::Follower;
 use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
+use pendularm::study::taylor::TaylorReference;
 
 fn swing() -> RolloutRequest<2> {
     RolloutRequest {
@@ -331,7 +331,7 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
         {
             let arm = Arm::<3>::default();
             let estimate = estimate_step(&arm, &state, &effort, method, h).unwrap();
-            let mut truth = Follower::new(state);
+            let mut truth = TaylorReference::new(state);
             assert!(truth.follow(&arm, &effort, h));
             let (dq, dv) = pendularm::math::integrator::increment(
                 method,

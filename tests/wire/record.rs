@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use pendularm::actors::recorder::limits::MAX_FILE_NAME;
 use pendularm::record::{
-    CALLS, Content, INPUTS, Passage, RecordEnding, RecordEntry, Recording, RunSettings, STATES,
-    Scribe, replay,
+    CALLS, Content, INPUTS, McapWriter, RecordEnding, RecordEntry, RecordedMessage, Recording,
+    RunSettings, STATES, replay,
 };
 use serde_json::{Value, json};
 
@@ -22,7 +22,7 @@ pub(super) fn folder(name: &str) -> PathBuf {
     folder
 }
 
-pub(super) fn passages(file: &Path) -> (Vec<Passage>, RecordEnding) {
+pub(super) fn passages(file: &Path) -> (Vec<RecordedMessage>, RecordEnding) {
     let mut recording = Recording::new(File::open(file).unwrap());
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {
@@ -209,7 +209,7 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
 fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     let file = folder("differs").join("run.mcap");
     let settings = RunSettings { links: 2, seed: 0 };
-    let mut scribe = Scribe::new(File::create(&file).unwrap(), &settings).unwrap();
+    let mut scribe = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
     let runtime_file = folder("differs-from").join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&runtime_file)]);
     let mut client = runtime.connect();

@@ -17,7 +17,7 @@ use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
-use pendularm::study::follower::Follower;
+use pendularm::study::taylor::TaylorReference;
 
 /// How long the arm swings \[s\].
 const DURATION: f64 = 4.0;
@@ -117,7 +117,7 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
     }
     for tolerance in tolerances() {
         line(truth, "pendularm reference", tolerance, || {
-            let mut follower = Follower::within(black_box(start::<N>()), tolerance);
+            let mut follower = TaylorReference::within(black_box(start::<N>()), tolerance);
             follower
                 .follow(&arm, &[0.0; N], DURATION)
                 .then(|| follower.state().position)

@@ -17,7 +17,7 @@ use tokio::sync::oneshot;
 use super::clock::TapeClock;
 use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use super::messages::{NotRecorded, Recorded};
-use crate::record::{Content, RecordEntry, RecordError, RunSettings, Scribe};
+use crate::record::{Content, McapWriter, RecordEntry, RecordError, RunSettings};
 
 /// The end of a record's file name.
 const EXTENSION: &str = "mcap";
@@ -64,7 +64,7 @@ pub(super) fn begin(
         .name("recorder".into())
         .spawn(move || {
             let scribe = open(&target).and_then(|file| {
-                Scribe::new(io::BufWriter::new(file), &settings)
+                McapWriter::new(io::BufWriter::new(file), &settings)
                     .map_err(|why| failure(&target, &why))
             });
             let scribe = match scribe {
@@ -173,7 +173,7 @@ impl TapeCounts {
 
 /// Writes entry after entry until the last tape is gone, the file takes no more, or it is long enough.
 fn write(
-    mut scribe: Scribe<io::BufWriter<File>>,
+    mut scribe: McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
     counts: &TapeCounts,
     target: &TapeTarget,
@@ -209,7 +209,7 @@ fn write(
 
 /// Whether that was all there was; false if the file has become too long.
 fn take_entries(
-    scribe: &mut Scribe<io::BufWriter<File>>,
+    scribe: &mut McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
     counts: &TapeCounts,
     target: &TapeTarget,

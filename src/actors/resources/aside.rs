@@ -21,7 +21,7 @@ pub const PLACES: usize = 2;
 
 /// The kinds of errands. Each has places of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Errand {
+pub enum WorkKind {
     /// Reads a client's input.
     Reading,
     /// The same with more than [`MEDIUM`]. Long ones have places of their own, so that shorter work waits for
@@ -36,7 +36,7 @@ pub enum Errand {
     Listing,
 }
 
-impl Errand {
+impl WorkKind {
     /// Reads so many bytes of a client's input.
     #[must_use]
     pub const fn reading(bytes: usize) -> Self {
@@ -67,17 +67,17 @@ thread_local! {
 }
 
 /// A place among those who are at work on one kind of errand.
-pub struct PlaceAside(OwnedSemaphorePermit);
+pub struct WorkPermit(OwnedSemaphorePermit);
 
-impl PlaceAside {
+impl WorkPermit {
     /// A place, once one is free: for work that is to take nothing while it waits. `None` if the runtime is ending.
-    pub async fn take(errand: Errand) -> Option<Self> {
+    pub async fn take(errand: WorkKind) -> Option<Self> {
         let free = match errand {
-            Errand::Reading => READING.with(Arc::clone),
-            Errand::ReadingLong => READING_LONG.with(Arc::clone),
-            Errand::Writing => WRITING.with(Arc::clone),
-            Errand::WritingLong => WRITING_LONG.with(Arc::clone),
-            Errand::Listing => LISTING.with(Arc::clone),
+            WorkKind::Reading => READING.with(Arc::clone),
+            WorkKind::ReadingLong => READING_LONG.with(Arc::clone),
+            WorkKind::Writing => WRITING.with(Arc::clone),
+            WorkKind::WritingLong => WRITING_LONG.with(Arc::clone),
+            WorkKind::Listing => LISTING.with(Arc::clone),
         };
         free.acquire_owned().await.ok().map(Self)
     }
@@ -112,8 +112,8 @@ impl PlaceAside {
 
 /// Waits for a place and does `work` there.
 pub async fn aside<T: Send + 'static>(
-    errand: Errand,
+    errand: WorkKind,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Option<T> {
-    PlaceAside::take(errand).await?.perform(work).await
+    WorkPermit::take(errand).await?.perform(work).await
 }

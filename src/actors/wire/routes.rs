@@ -10,7 +10,7 @@ use super::action_client::ActionRequest;
 use super::caller::{Caller, ServiceCall, TopicMessage};
 use super::served::{Answered, Callable, ClientAsker, PatientAsker, Streamed};
 use crate::actors::node::{Asker, Call, Interest, Reply};
-use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
 
 /// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
@@ -80,7 +80,7 @@ pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Sen
     if length > LONG_ARGUMENTS {
         // Boxed, for every kind of task is compiled anew: there is one then, not one for each service.
         let read: Box<dyn FnOnce() + Send> = Box::new(read);
-        actix_rt::spawn(aside(Errand::reading(length), read));
+        actix_rt::spawn(aside(WorkKind::reading(length), read));
     } else {
         read();
     }

@@ -49,24 +49,24 @@ const THIRD: f64 = 1.0 / 3.0;
 
 /// The joint accelerations of one arm or of several side by side, with or without gravity.
 #[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
-pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
+pub(in crate::math) fn recursion<T: Number, const N: usize, const HAS_GRAVITY: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
     q: &[T; N],
     qd: &[T; N],
     tau: &[T; N],
 ) -> [T; N] {
-    let (sin, cos) = if WEIGHS {
+    let (sin, cos) = if HAS_GRAVITY {
         trig::sin_cos(q)
     } else {
         sin_cos_beyond_first(q)
     };
-    recursion_along::<T, N, WEIGHS>(rods, gravity, (&sin, &cos), qd, tau)
+    recursion_along::<T, N, HAS_GRAVITY>(rods, gravity, (&sin, &cos), qd, tau)
 }
 
 /// The recursion from the sines and cosines of all angles; where nothing weighs, the first are not looked at.
 #[inline(always)]
-pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
+pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
     (sin, cos): (&[T; N], &[T; N]),
@@ -108,10 +108,10 @@ pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
     let u3 = if N > 1 { tau[0] - tau[1] } else { tau[0] } * (rods[0].per_mass_length * 3.0);
     let free = u3 - carried.bias_y3;
     let (mut tip, mut inner);
-    if WEIGHS {
+    if HAS_GRAVITY {
         let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
         let along = joint.x - w[0];
-        let across = (free.less_exact(joint.y, 0.5) - carried.b3 * along) * per_w[0];
+        let across = (free.sub_exact_product(joint.y, 0.5) - carried.b3 * along) * per_w[0];
         tip = Planar::new(along, across);
         inner = (across - joint.y) * rods[0].per_length;
     } else {
@@ -245,8 +245,8 @@ impl<T: Number> Carried<T> {
     fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
         Hinge {
             free: (u * 3.0 + self.b3 * w) - self.bias_y3,
-            x: (self.b3 * x_axis.x).less_exact(x_axis.y, 0.5),
-            y: (self.b3 * x_axis.y).less_exact(x_axis.x, -0.5),
+            x: (self.b3 * x_axis.x).sub_exact_product(x_axis.y, 0.5),
+            y: (self.b3 * x_axis.y).sub_exact_product(x_axis.x, -0.5),
         }
     }
 
@@ -261,8 +261,8 @@ impl<T: Number> Carried<T> {
             big_w,
             big_x,
             half_b,
-            d: big_x.less_exact(one_a, 0.25) * THIRD,
-            phi: (self.b3 * u - w * big_x.less_exact(big_w, 0.5)) + self.stiff,
+            d: big_x.sub_exact_product(one_a, 0.25) * THIRD,
+            phi: (self.b3 * u - w * big_x.sub_exact_product(big_w, 0.5)) + self.stiff,
             psi: (u * one_a + half_b * w) - self.soft,
             quotient: u.like(1.0) / (big_w * big_x),
         }

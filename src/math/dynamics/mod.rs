@@ -34,7 +34,7 @@ mod articulated_body;
 #[cfg(feature = "batch")]
 pub mod batch;
 #[cfg(all(feature = "batch", target_arch = "x86_64"))]
-mod in_twos;
+mod lane_pairs;
 mod one_arm;
 
 #[cfg(feature = "batch")]

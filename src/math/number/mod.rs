@@ -43,7 +43,7 @@ pub trait Number: Arithmetic {
     /// `self - factor * other`, of a product that is exact, or so small that it changes nothing: whether it is rounded
     /// by itself, or not, is the same.
     #[must_use]
-    fn less_exact(self, factor: Self, other: f64) -> Self;
+    fn sub_exact_product(self, factor: Self, other: f64) -> Self;
 
     /// The nearest number to `self` between `-limit` and `limit`; NaN stays NaN.
     #[must_use]
@@ -69,7 +69,7 @@ impl Number for f64 {
     const LANES: usize = 1;
 
     #[inline(always)]
-    fn less_exact(self, factor: Self, other: f64) -> Self {
+    fn sub_exact_product(self, factor: Self, other: f64) -> Self {
         self - factor * other
     }
 

@@ -181,7 +181,7 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
     const LANES: usize = K * S::f64s::LEN;
 
     #[inline(always)]
-    fn less_exact(mut self, factor: Self, other: f64) -> Self {
+    fn sub_exact_product(mut self, factor: Self, other: f64) -> Self {
         let minus = S::f64s::splat(self.token(), -other);
         each_register!(i => {
             self.0[i] = factor.0[i].mul_add(minus, self.0[i]);

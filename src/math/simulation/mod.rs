@@ -171,14 +171,14 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Takes so many steps; breaks with the number of those that were taken where it ends before.
-    fn take_steps<const WEIGHS: bool>(
+    fn take_steps<const HAS_GRAVITY: bool>(
         &mut self,
         steps: u64,
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> ControlFlow<u64> {
         // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
         for taken in 0..steps {
-            if !self.take_step::<WEIGHS>() {
+            if !self.take_step::<HAS_GRAVITY>() {
                 self.diverge();
                 return ControlFlow::Break(taken);
             }
@@ -199,7 +199,7 @@ impl<const N: usize> Simulation<N> {
 
     /// Takes one step. If its result is not finite, changes nothing and returns `false`.
     #[inline]
-    fn take_step<const WEIGHS: bool>(&mut self) -> bool {
+    fn take_step<const HAS_GRAVITY: bool>(&mut self) -> bool {
         let mut held = None;
         let mut control = if !self.hold.every_step {
             self.begin_held_step(&mut held)
@@ -217,7 +217,7 @@ impl<const N: usize> Simulation<N> {
         let (arm, effort) = (&self.arm, &control.effort);
         let (next, carry) = stepped(
             |_, q: &[f64; N], v: &[f64; N]| {
-                if WEIGHS {
+                if HAS_GRAVITY {
                     forward_dynamics(arm, q, v, effort)
                 } else {
                     weightless_dynamics(arm, q, v, effort)

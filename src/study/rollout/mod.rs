@@ -1,7 +1,7 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
 //! The run is the live loop, [`Simulation`], from any state. Its reference obeys the same control law, evaluated at the
-//! same instants and held for the same period, and follows the arm in between to rounding ([`Follower`]). So the
+//! same instants and held for the same period, and follows the arm in between to rounding ([`TaylorReference`]). So the
 //! difference is the error of the method alone. Against a law that acts at every instant ([`Rollout::from_ideal`])
 //! holding the effort costs an error of first order in the control period, which no method can mend.
 //!
@@ -24,8 +24,8 @@ mod request;
 pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
 
 use self::ideal::Ideal;
-use super::follower::Follower;
 use super::matrix::largest;
+use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::energy;
@@ -104,7 +104,7 @@ impl<const N: usize> Rollout<N> {
         let references = request.reference.then(|| {
             std::array::from_fn(|index| Reference {
                 arm: neighbour(&request.control.arm, index),
-                follower: Follower::new(request.start).cut(if index == 1 { 2 } else { 1 }),
+                taylor: TaylorReference::new(request.start).cut(if index == 1 { 2 } else { 1 }),
                 pid: simulation.pid().clone(),
                 hold: Hold::new(
                     Held {
@@ -217,7 +217,7 @@ impl<const N: usize> Rollout<N> {
         if let Some(references) = &self.references
             && references.iter().all(|one| !one.lost)
         {
-            let states = references.each_ref().map(|one| one.follower.state());
+            let states = references.each_ref().map(|one| one.taylor.state());
             let spread = SPREAD * largest_distance(&states);
             self.deviation.errors.push(apart(&state, states[0]));
             self.deviation.uncertainties.push(spread.max(last_digit));
@@ -259,9 +259,7 @@ impl<const N: usize> Rollout<N> {
     fn all_evaluations(&self) -> u64 {
         let references = self.references.iter().flatten();
         self.evaluations()
-            + references
-                .map(|one| one.follower.coefficients())
-                .sum::<u64>()
+            + references.map(|one| one.taylor.coefficients()).sum::<u64>()
             + self
                 .ideals
                 .iter()
@@ -335,7 +333,7 @@ impl<const N: usize> Rollout<N> {
 #[derive(Debug, Clone)]
 struct Reference<const N: usize> {
     arm: Arm<N>,
-    follower: Follower<N>,
+    taylor: TaylorReference<N>,
     pid: Pid<N>,
     hold: Hold<N>,
     /// Whether the motion was too wild to be followed.
@@ -383,22 +381,22 @@ impl<const N: usize> Reference<N> {
 
     /// Follows the run with about `work` coefficients at most, and says with how many.
     fn follow(&mut self, work: u64) -> u64 {
-        let before = self.follower.coefficients();
+        let before = self.taylor.coefficients();
         let bound = before.saturating_add(work);
         while self.behind.steps > 0 {
             if !self.behind.begun {
                 let timestep = self.behind.stretch;
                 if self.pid.is_enabled() {
-                    let state = self.follower.state();
+                    let state = self.taylor.state();
                     let (control, held) = self.hold.begin_step(&self.pid, state);
                     self.behind.effort = control.effort;
                     self.pid.commit(control.integral);
                     self.hold.commit(held);
                 }
-                self.follower.begin(timestep);
+                self.taylor.begin(timestep);
                 self.behind.begun = true;
             }
-            match self.follower.go_on(&self.arm, &self.behind.effort, bound) {
+            match self.taylor.go_on(&self.arm, &self.behind.effort, bound) {
                 None => break,
                 Some(false) => {
                     self.lost = true;
@@ -408,7 +406,7 @@ impl<const N: usize> Reference<N> {
             }
             self.behind.begun = false;
         }
-        self.follower.coefficients() - before
+        self.taylor.coefficients() - before
     }
 }
 

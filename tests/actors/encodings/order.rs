@@ -1,7 +1,7 @@
 //! The order of messages of which some are cut up elsewhere, and that each comes in time.
 
 use super::*;
-use pendularm::actors::resources::aside::{Errand, PlaceAside};
+use pendularm::actors::resources::aside::{WorkKind, WorkPermit};
 use tokio::time::Instant;
 
 #[test]
@@ -46,8 +46,8 @@ fn only_its_publisher_waits_for_a_message_that_is_cut_up() {
         }
         let [slow, quick] = &mut publishers;
         let places = [
-            PlaceAside::take(Errand::WritingLong).await,
-            PlaceAside::take(Errand::WritingLong).await,
+            WorkPermit::take(WorkKind::WritingLong).await,
+            WorkPermit::take(WorkKind::WritingLong).await,
         ];
         let publish =
             |topic, text: String| json!({"op": "publish", "topic": topic, "msg": {"data": text}});

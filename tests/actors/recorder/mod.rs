@@ -12,8 +12,8 @@ use pendularm::actors::recorder::listeners;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::record::{
-    Content, Passage, RecordEnding, RecordEntry, Recording, ReplayVerdict, RunSettings, Scribe,
-    replay,
+    Content, McapWriter, RecordEnding, RecordEntry, RecordedMessage, Recording, ReplayVerdict,
+    RunSettings, replay,
 };
 use serde_json::json;
 use tokio::time::{Instant, sleep};
@@ -66,7 +66,7 @@ impl Notes {
 
 pub fn file(entries: &[RecordEntry]) -> Vec<u8> {
     let settings = RunSettings { links: 2, seed: 1 };
-    let mut scribe = Scribe::new(Vec::new(), &settings).unwrap();
+    let mut scribe = McapWriter::new(Vec::new(), &settings).unwrap();
     for (number, entry) in entries.iter().enumerate() {
         scribe.write(entry).unwrap();
         if number % 20 == 19 {
@@ -76,7 +76,7 @@ pub fn file(entries: &[RecordEntry]) -> Vec<u8> {
     scribe.finish().unwrap()
 }
 
-pub fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
+pub fn passages(file: &[u8]) -> (Vec<RecordedMessage>, RecordEnding) {
     let mut recording = Recording::new(file);
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {

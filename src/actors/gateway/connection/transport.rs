@@ -50,7 +50,7 @@ pub(super) trait Outbound {
 
     /// Sends what the transport itself has to say, if anything; `None` if the client is gone. Called whenever there is
     /// nothing else to send.
-    fn tend(&mut self) -> impl Future<Output = Option<()>>;
+    fn send_due_ping(&mut self) -> impl Future<Output = Option<()>>;
 
     /// Ends the stream in order.
     fn end(&mut self) -> impl Future<Output = io::Result<()>>;
@@ -91,7 +91,7 @@ impl<W: AsyncWrite + Unpin> Outbound for Plain<W> {
         written.ok().filter(|&written| written > 0)
     }
 
-    async fn tend(&mut self) -> Option<()> {
+    async fn send_due_ping(&mut self) -> Option<()> {
         Some(())
     }
 

@@ -175,7 +175,7 @@ impl Handler<SetTap> for Registry {
         for topic in unwanted {
             match (was_set, self.tap.is_set()) {
                 (_, true) => self.tell_owner(topic, true),
-                (true, false) => self.let_rest(topic),
+                (true, false) => self.note_unwanted(topic),
                 (false, false) => {}
             }
         }

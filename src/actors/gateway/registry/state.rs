@@ -19,7 +19,7 @@ use super::refusal::Refusal;
 use super::tables::action_servers::ActionServers;
 use super::tables::census::{Tally, Use};
 use super::tables::kept::{Kept, KeptEntry};
-use super::tables::leftovers::{Leftovers, Registration};
+use super::tables::pending_cleanup::{PendingCleanup, Registration};
 use super::tables::services::{Forwarded, Services};
 use super::tables::tap::TapPoint;
 use super::tables::topics::{Subscription, Topics};
@@ -42,7 +42,7 @@ pub struct Registry {
     pub(super) services: Services,
     pub(super) action_servers: ActionServers,
     /// The registrations of clients that have gone, to be cleaned up.
-    pub(super) leftovers: Leftovers,
+    pub(super) pending_cleanup: PendingCleanup,
     /// When the next cleanup is, and the task that waits for it.
     pub(super) next_cleanup: Option<(Instant, SpawnHandle)>,
     pub(super) nodes: Nodes,
@@ -98,7 +98,7 @@ impl Registry {
             topics: Topics::default(),
             services: Services::default(),
             action_servers: ActionServers::default(),
-            leftovers: Leftovers::default(),
+            pending_cleanup: PendingCleanup::default(),
             next_cleanup: None,
             nodes: Nodes::default(),
             latched: HashMap::new(),
@@ -184,11 +184,11 @@ impl Registry {
             .chain(subscriptions.map(|(topic, all)| Registration::Subscribed(topic, all)))
             .chain(provided.map(|(service, entry)| Registration::Provided(service, entry)))
             .chain(served_actions.map(|(action, entry)| Registration::ServedAction(action, entry)));
-        self.leftovers
+        self.pending_cleanup
             .add_registrations(id, Box::new(registrations));
         let goals = self.action_servers.take_numbers(id);
         let calls = self.services.take_numbers(id);
-        self.leftovers.add(goals, calls);
+        self.pending_cleanup.add(goals, calls);
     }
 
     /// Withdraws one thing that a client had registered.
@@ -240,7 +240,7 @@ impl Registry {
             self.topics.forget_sizes(&name);
         }
         if !self.is_wanted(&name) {
-            self.let_rest(&name);
+            self.note_unwanted(&name);
         }
     }
 
@@ -264,7 +264,7 @@ impl Registry {
     }
 
     /// Notes that nobody wants messages on that topic any more.
-    pub(super) fn let_rest(&mut self, topic: &str) {
+    pub(super) fn note_unwanted(&mut self, topic: &str) {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);
         }

@@ -24,7 +24,7 @@ use crate::actors::arm::sim::{
 };
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
-use crate::actors::resources::aside::{Errand, PlaceAside};
+use crate::actors::resources::aside::{WorkKind, WorkPermit};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{self, Node, Service};
 use crate::protocol::op::fields::Rejections;
@@ -122,7 +122,7 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
                 return list(&mut reply, look, census);
             }
             // However many wait, a census is kept alive by those alone who are at work.
-            let Some(place) = PlaceAside::take(Errand::Listing).await else {
+            let Some(place) = WorkPermit::take(WorkKind::Listing).await else {
                 return;
             };
             let whole = TakeCensus {

@@ -69,11 +69,11 @@ pub struct WishFrames {
     /// Time between two messages.
     pub period: Duration,
     /// The receiver of the frames.
-    pub by: Wisher,
+    pub by: FrameReceiver,
 }
 
 /// A receiver of frames.
-pub enum Wisher {
+pub enum FrameReceiver {
     /// A client that has sent a goal of the action.
     Client(Box<ActionClient>),
     /// A client that has published a goal.
@@ -164,8 +164,8 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
         match forget {
             ForgetFrames::Of(who) => {
                 let is_meant = |wish: &WishFrames| match &wish.by {
-                    Wisher::Client(client) => client.is(&who.goal),
-                    Wisher::Topic { .. } => false,
+                    FrameReceiver::Client(client) => client.is(&who.goal),
+                    FrameReceiver::Topic { .. } => false,
                 };
                 let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
                 match at.and_then(|at| self.wishes.remove(at)) {
@@ -174,8 +174,8 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
                 }
             }
             ForgetFrames::Published(id) => self.wishes.retain(|(wish, _)| match &wish.by {
-                Wisher::Client(_) => true,
-                Wisher::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
+                FrameReceiver::Client(_) => true,
+                FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
             }),
         }
         self.keep_timer(ctx);
@@ -209,22 +209,22 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 impl WishFrames {
     /// A client that has sent a goal of the action hears of its end.
     fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
-        if let Wisher::Client(client) = &self.by {
+        if let FrameReceiver::Client(client) = &self.by {
             client.conclude(values, status);
         }
     }
 
     fn client(&self) -> ConnectionId {
         match &self.by {
-            Wisher::Client(client) => client.connection,
-            Wisher::Topic { connection, .. } => *connection,
+            FrameReceiver::Client(client) => client.connection,
+            FrameReceiver::Topic { connection, .. } => *connection,
         }
     }
 
     fn is_gone(&self) -> bool {
         match &self.by {
-            Wisher::Client(client) => client.is_gone(),
-            Wisher::Topic { listening, .. } => listening.strong_count() == 0,
+            FrameReceiver::Client(client) => client.is_gone(),
+            FrameReceiver::Topic { listening, .. } => listening.strong_count() == 0,
         }
     }
 }
@@ -283,8 +283,8 @@ impl<const N: usize> TfRepublisher<N> {
             *due = next(*due, wish.period, now + Duration::from_nanos(order));
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
-                Wisher::Client(client) => client.feed_back(message),
-                Wisher::Topic { id, .. } => {
+                FrameReceiver::Client(client) => client.feed_back(message),
+                FrameReceiver::Topic { id, .. } => {
                     let message = answers::feedback(stamp, id.clone(), message);
                     publish(&self.publish, Topic::TfWebFeedback, message);
                 }

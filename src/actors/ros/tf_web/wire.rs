@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::json;
 use serde_json::value::RawValue;
 
-use super::{ForgetFrames, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames, Wisher};
+use super::{ForgetFrames, FrameReceiver, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames};
 use crate::actors::wire::action_client::ActionRequest;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
@@ -86,7 +86,7 @@ fn requests<const N: usize>(
                 sources,
                 target,
                 period,
-                by: Wisher::Client(Box::new(client)),
+                by: FrameReceiver::Client(Box::new(client)),
             }),
             Err(rejections) => client.refuse(&rejections.status()),
         },
@@ -142,7 +142,7 @@ fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejecti
     let id = id.into_owned();
     let goal = goal.ok_or_else(|| refused("goal", &"is required"))?;
     let (sources, target, period) = read_wish(&Arguments::Object(goal.into()), links)?;
-    let by = Wisher::Topic {
+    let by = FrameReceiver::Topic {
         id,
         connection: message.connection,
         listening: Weak::clone(&message.listening),

@@ -11,7 +11,7 @@ use std::array::from_fn;
 
 use fearless_simd::Simd;
 
-use super::seat::Seat;
+use super::job::BatchJob;
 use crate::math::arm::{Rod, State};
 use crate::math::dynamics::recursion;
 use crate::math::integrator::Method;
@@ -136,10 +136,10 @@ impl<T: Number, const N: usize> Lanes<T, N> {
     }
 
     /// Puts an arm into a lane.
-    pub(super) fn seat(&mut self, lane: usize, seat: &mut Seat<'_, N>) {
-        let state = seat.arm.state;
-        let integral = seat.begin_period(&state, || [0.0; N]);
-        let arm = &*seat.arm;
+    pub(super) fn place(&mut self, lane: usize, job: &mut BatchJob<'_, N>) {
+        let state = job.arm.state;
+        let integral = job.begin_period(&state, || [0.0; N]);
+        let arm = &*job.arm;
         let (gains, setpoint) = (arm.pid.gains(), arm.pid.setpoint());
         let moving = Moving {
             state: arm.state,
@@ -148,7 +148,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
             integral,
         };
         let push = match arm.disturbance {
-            Some(disturbance) if seat.is_pushed() => disturbance.effort,
+            Some(disturbance) if job.is_pushed() => disturbance.effort,
             _ => [-0.0; N],
         };
         self.set(
@@ -160,7 +160,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
                 gains: *gains,
                 setpoint: *setpoint,
                 timestep: arm.timestep,
-                given: seat.given(),
+                given: job.given(),
                 push,
             },
         );
@@ -174,11 +174,11 @@ impl<T: Number, const N: usize> Lanes<T, N> {
     }
 
     /// Begins a control period in a lane.
-    pub(super) fn begin_period(&mut self, lane: usize, seat: &mut Seat<'_, N>) {
-        let integral = seat.begin_period(&self.moving.state(lane), || {
+    pub(super) fn begin_period(&mut self, lane: usize, job: &mut BatchJob<'_, N>) {
+        let integral = job.begin_period(&self.moving.state(lane), || {
             joints_in(lane, &self.moving.integral)
         });
-        let given = seat.given();
+        let given = job.given();
         for i in 0..N {
             self.moving.integral[i].set_lane(lane, integral[i]);
             self.given[i].set_lane(lane, given[i]);
@@ -217,7 +217,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     /// The state that the next step leads to.
     #[inline(always)]
-    pub(super) fn next<const WEIGHS: bool>(
+    pub(super) fn next<const HAS_GRAVITY: bool>(
         &self,
         method: Method,
         controlled: bool,
@@ -242,7 +242,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
         let (state, carry) = if method == Method::Euler {
             stepped(
                 #[inline(always)]
-                |_, q, v| self.accelerations::<WEIGHS>(q, v, &effort),
+                |_, q, v| self.accelerations::<HAS_GRAVITY>(q, v, &effort),
                 Method::Euler,
                 state,
                 carry,
@@ -253,7 +253,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
                 apart(
                     self.timestep.token(),
                     #[inline(always)]
-                    || self.accelerations::<WEIGHS>(q, v, &effort),
+                    || self.accelerations::<HAS_GRAVITY>(q, v, &effort),
                 )
             };
             stepped(shared, method, state, carry, self.timestep)
@@ -267,12 +267,12 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     }
 
     #[inline(always)]
-    fn accelerations<const WEIGHS: bool>(
+    fn accelerations<const HAS_GRAVITY: bool>(
         &self,
         q: &[Wide<S, K>; N],
         v: &[Wide<S, K>; N],
         effort: &[Wide<S, K>; N],
     ) -> [Wide<S, K>; N] {
-        recursion::<_, N, WEIGHS>(&self.rods, &self.gravity, q, v, effort)
+        recursion::<_, N, HAS_GRAVITY>(&self.rods, &self.gravity, q, v, effort)
     }
 }

@@ -10,17 +10,17 @@
 //! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
 //! whoever stands beside it.
 
-mod formation;
+mod job;
 mod lanes;
-mod seat;
+mod runner;
 
 use std::cmp::Reverse;
 use std::ops::ControlFlow;
 
 use fearless_simd::dispatch;
 
-use self::formation::Formation;
-use self::seat::{Observer, Seat, StepKind};
+use self::job::{BatchJob, Observer, StepKind};
+use self::runner::BatchRunner;
 use super::Simulation;
 use crate::math::arm::State;
 use crate::math::number::Registers;
@@ -58,7 +58,8 @@ impl Registers {
         self,
         arms: impl Iterator<Item = (&'a mut Simulation<N>, u64, Option<Observer<'a, N>>)>,
     ) {
-        let mut waiting: [Vec<Seat<'a, N>>; StepKind::COUNT] = std::array::from_fn(|_| Vec::new());
+        let mut waiting: [Vec<BatchJob<'a, N>>; StepKind::COUNT] =
+            std::array::from_fn(|_| Vec::new());
         for (arm, steps, observer) in arms {
             if steps == 0 || arm.divergence.is_some() {
                 continue;
@@ -67,15 +68,15 @@ impl Registers {
             let kind = StepKind::of(arm);
             // A lane has no clock.
             let alone = evaluations < WORTH_A_LANE || arm.steps_with_time(steps) < steps;
-            let seat = Seat::new(arm, steps, observer);
+            let job = BatchJob::new(arm, steps, observer);
             if alone {
-                seat.alone();
+                job.alone();
                 continue;
             }
             let Some(queue) = waiting.get_mut(kind.index()) else {
                 continue;
             };
-            queue.push(seat);
+            queue.push(job);
             if queue.len() == QUEUE {
                 self.run(kind, queue);
             }
@@ -86,15 +87,15 @@ impl Registers {
     }
 
     /// Takes the steps of arms of one kind, who then have left the queue.
-    fn run<const N: usize>(self, kind: StepKind, queue: &mut Vec<Seat<'_, N>>) {
+    fn run<const N: usize>(self, kind: StepKind, queue: &mut Vec<BatchJob<'_, N>>) {
         if queue.len() < 2 {
             // There is no other arm to share a register with.
-            queue.drain(..).for_each(Seat::alone);
+            queue.drain(..).for_each(BatchJob::alone);
             return;
         }
         // The arm that takes longest begins first, so that the last ones end together.
-        queue.sort_by_key(|seat| Reverse(seat.left()));
-        dispatch!(self.level(), simd => Formation::new(simd, queue.drain(..)).run(kind));
+        queue.sort_by_key(|job| Reverse(job.left()));
+        dispatch!(self.level(), simd => BatchRunner::new(simd, queue.drain(..)).run(kind));
     }
 }
 

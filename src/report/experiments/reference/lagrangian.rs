@@ -17,7 +17,7 @@
 
 use super::double_double::DoubleDouble as Real;
 use crate::math::arm::Arm;
-use crate::study::follower::series::{differences, sums};
+use crate::study::taylor::series::{differences, sums};
 
 /// Constants of the equations of motion.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Taylor series of the arm's motion in double-double arithmetic, under constant efforts or under the law at every
 //! instant. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
 //!
-//! The series is the study's (`study::follower::series`, after Jorba and Zou), begun with the acceleration of the
+//! The series is the study's (`study::taylor::series`, after Jorba and Zou), begun with the acceleration of the
 //! Lagrangian in twice the digits.
 //!
 //! **Invariant:** a step never leaves out more than its tolerance by its own estimate; a proof needs a comparison of
@@ -16,7 +16,7 @@ use super::double_double::DoubleDouble as Real;
 use super::lagrangian::{Lagrangian, link_efforts};
 use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
-use crate::study::follower::series::{PowerSeries, differences, sums};
+use crate::study::taylor::series::{PowerSeries, differences, sums};
 
 /// How far a series is taken, and how much it may leave out.
 #[derive(Debug, Clone, Copy)]

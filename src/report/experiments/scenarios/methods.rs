@@ -14,10 +14,10 @@ use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
 use crate::math::simulation::state_after;
 use crate::study::error_estimate::estimate_step;
-use crate::study::follower::Follower;
 use crate::study::linear::Linear;
 use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
+use crate::study::taylor::TaylorReference;
 
 pub(super) const SCENES: [Scenario; 4] = [
     Scenario {
@@ -153,7 +153,7 @@ fn changes() -> Observation {
         mixed.advance(steps);
         mixed.set_method(Method::Rk4);
         mixed.advance(steps);
-        let mut exact = Follower::new(swinging());
+        let mut exact = TaylorReference::new(swinging());
         // Spans of a hundredth of a second, as far as the scheme carries.
         let followed = (0..100).all(|_| exact.follow(mixed.arm(), &[0.0; 3], 0.01));
         if followed {
@@ -233,7 +233,7 @@ fn step_doubling() -> Observation {
 /// The error of a step, against the arm followed to rounding \[rad\].
 fn local_error(arm: &Arm<3>, state: &State<3>, effort: &[f64; 3], method: Method, h: f64) -> f64 {
     let end = state_after(arm, method, state, effort, h);
-    let mut exact = Follower::new(*state);
+    let mut exact = TaylorReference::new(*state);
     if !exact.follow(arm, effort, h) {
         return f64::NAN;
     }

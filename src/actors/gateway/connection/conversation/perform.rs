@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use super::reader::Reader;
 use crate::actors::gateway::connection::transport::Inbound;
 use crate::actors::gateway::messages::{Request, Respond, form_of};
-use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::aside::{WorkKind, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::memory::{SHORT, cover};
 use crate::protocol::catalog::Service;
@@ -150,7 +150,7 @@ impl Reader {
         if length <= SHORT {
             return Some(read());
         }
-        let read = aside(Errand::reading(length), read).await;
+        let read = aside(WorkKind::reading(length), read).await;
         if read.is_none() {
             self.refuse(UNREADABLE);
         }

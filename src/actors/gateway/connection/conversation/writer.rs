@@ -26,7 +26,7 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
             }
         } else if shared.is_done() {
             return timeout(LINGER, output.end()).await.is_ok();
-        } else if !tend(&mut output, shared).await || shared.outgoing.is_stuck() {
+        } else if !send_due_ping(&mut output, shared).await || shared.outgoing.is_stuck() {
             return false;
         } else {
             wait(shared).await;
@@ -35,10 +35,10 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 }
 
 /// Lets the transport say what it has to; false if the client is gone or stalled.
-async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
+async fn send_due_ping<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
     tokio::select! {
         biased;
-        tended = output.tend() => tended.is_some(),
+        tended = output.send_due_ping() => tended.is_some(),
         () = stalled(shared) => false,
     }
 }

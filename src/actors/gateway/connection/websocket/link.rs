@@ -18,7 +18,7 @@ use tokio_tungstenite::tungstenite::error::Error;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::watched::{READ_BUFFER, Watched};
+use super::watched::{MonitoredStream, READ_BUFFER};
 use crate::actors::gateway::connection::shared::Shared;
 use crate::protocol::limits::MAX_FRAME;
 
@@ -31,7 +31,7 @@ const WRITE_BUFFER: usize = 2 * FRAGMENT;
 
 /// Both halves share this; one thread, so plain cells do.
 pub(super) struct Link<S> {
-    pub(super) socket: RefCell<WebSocketStream<Watched<S>>>,
+    pub(super) socket: RefCell<WebSocketStream<MonitoredStream<S>>>,
     /// When the peer last sent or took a byte.
     pub(super) life: Rc<Cell<Instant>>,
     /// Whether the peer is to be asked for a sign of life.
@@ -44,7 +44,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
     pub(super) async fn open(stream: S, behind: Bytes, shared: &Shared) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(
+        let watched = MonitoredStream::new(
             stream,
             behind,
             Rc::clone(&life),

@@ -363,7 +363,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         Some(written)
     }
 
-    async fn tend(&mut self) -> Option<()> {
+    async fn send_due_ping(&mut self) -> Option<()> {
         // Another pong may be due by the time that this one has gone out.
         while self.link.ping_is_due.take() {
             self.link.flush().await?;

@@ -33,7 +33,7 @@ type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 
 /// A stream that notes when its other side last gave a sign of life, and how much it has sent of a message that is not
 /// complete. To send a byte is a sign of life, and so is to take one after a write found no room.
-pub(super) struct Watched<S> {
+pub(super) struct MonitoredStream<S> {
     stream: S,
     /// Bytes that have come before, and are read first.
     behind: Bytes,
@@ -54,7 +54,7 @@ pub(super) struct Watched<S> {
     waiting: Option<ComingPermit>,
 }
 
-impl<S> Watched<S> {
+impl<S> MonitoredStream<S> {
     /// A stream on which `behind` has come so far; `life` is when its other side last gave a sign of life.
     pub(super) fn new(
         stream: S,
@@ -136,7 +136,7 @@ impl<S> Watched<S> {
     }
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
+impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,
@@ -170,7 +170,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Watched<S> {
+impl<S: AsyncWrite + Unpin> AsyncWrite for MonitoredStream<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,

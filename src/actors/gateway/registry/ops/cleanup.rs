@@ -14,7 +14,7 @@ const ENDED_IN_A_ROW: usize = 128;
 impl Registry {
     /// Schedules the next cleanup: at once if there are leftovers, else when the first call's time is over.
     pub(crate) fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.leftovers.is_empty()).then(Instant::now);
+        let left = (!self.pending_cleanup.is_empty()).then(Instant::now);
         let Some(due) = left.or_else(|| self.services.next_deadline()) else {
             return;
         };
@@ -43,11 +43,11 @@ impl Registry {
             if let Some(call) = self.services.take_due(now) {
                 let why = Refusal::TimedOut(call.service.to_string());
                 self.answer_forwarded(&call, &why);
-            } else if let Some(number) = self.leftovers.next_goal() {
+            } else if let Some(number) = self.pending_cleanup.next_goal() {
                 self.end_goal(number);
-            } else if let Some(number) = self.leftovers.next_call() {
+            } else if let Some(number) = self.pending_cleanup.next_call() {
                 self.end_call(number);
-            } else if let Some((client, registration)) = self.leftovers.next_registration() {
+            } else if let Some((client, registration)) = self.pending_cleanup.next_registration() {
                 self.withdraw_one(client, registration);
             } else {
                 return;

@@ -15,7 +15,7 @@ use crate::actors::gateway::encoded::{Made, ToEncode};
 use crate::actors::gateway::messages::{Deliver, Handled, Publish, Tapped, Underway};
 use crate::actors::gateway::registry::state::Registry;
 use crate::actors::gateway::registry::tables::topics::Subscriber;
-use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::aside::{WorkKind, aside};
 use crate::actors::resources::memory::cover_message;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
@@ -24,11 +24,11 @@ use crate::protocol::op::{Compression, Encoding};
 
 /// Holds a publisher back until its message has been offered to the socket of every subscriber.
 #[derive(Default)]
-pub(crate) struct Pace {
+pub(crate) struct Backpressure {
     underway: Option<(Underway, oneshot::Receiver<()>)>,
 }
 
-impl Pace {
+impl Backpressure {
     /// Makes the guard that goes with the message to a subscriber.
     fn underway(&mut self) -> Underway {
         let (underway, _) = self.underway.get_or_insert_with(|| {
@@ -70,7 +70,7 @@ impl Registry {
     pub(crate) fn fan_out(
         &self,
         topic: &str,
-        mut pace: Option<&mut Pace>,
+        mut pace: Option<&mut Backpressure>,
         encode: impl Fn(&str) -> Bytes,
         ctx: &mut Context<Self>,
     ) {
@@ -82,7 +82,7 @@ impl Registry {
             let mut encodings = Vec::new();
             for subscriber in subscribers {
                 if is_sent_plain(subscriber.encoding, &plain) {
-                    let underway = pace.as_deref_mut().map(Pace::underway);
+                    let underway = pace.as_deref_mut().map(Backpressure::underway);
                     deliver(subscriber, name, plain.clone(), underway);
                 } else if !encodings.contains(&subscriber.encoding) {
                     encodings.push(subscriber.encoding);
@@ -90,7 +90,7 @@ impl Registry {
             }
             if !encodings.is_empty() {
                 let message = self.to_encode(name, plain, encodings);
-                let underway = pace.as_deref_mut().map(Pace::underway);
+                let underway = pace.as_deref_mut().map(Backpressure::underway);
                 self.deliver_encoded(message, underway, ctx);
             }
         }
@@ -108,7 +108,9 @@ impl Registry {
         if underway.is_none() || !message.is_long() {
             return self.deliver_made(&spelling, &message.make(), underway.as_ref());
         }
-        let made = aside(Errand::writing(message.plain.len()), move || message.make());
+        let made = aside(WorkKind::writing(message.plain.len()), move || {
+            message.make()
+        });
         ctx.spawn(made.into_actor(self).map(move |made, registry, _| {
             registry.deliver_made(&spelling, &made.unwrap_or_default(), underway.as_ref());
         }));

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use self::fan_out::Pace;
+use self::fan_out::Backpressure;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Handled, Request, Tapped};
 use crate::actors::gateway::registry::refusal::Refusal;
@@ -180,7 +180,7 @@ impl Registry {
         if listener.is_none() && !client.advertised.contains_key(topic) {
             return Handled::at_once();
         }
-        let mut pace = Pace::default();
+        let mut pace = Backpressure::default();
         let encode = |spelling: &str| messages::publish_raw(spelling, msg);
         self.fan_out(topic, Some(&mut pace), encode, ctx);
         let Some(listener) = listener else {
@@ -210,7 +210,7 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) -> Handled {
         let topic = &*lines.topic;
-        let mut pace = Pace::default();
+        let mut pace = Backpressure::default();
         let client = self.clients.get(&from);
         if client.is_some_and(|client| client.advertised.contains_key(topic)) {
             let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);

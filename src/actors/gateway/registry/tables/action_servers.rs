@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use super::kept::KeptEntry;
-use super::numbers::Numbers;
+use super::numbers::NumbersByClient;
 use super::services::{Provider, Services};
 use crate::actors::ConnectionId;
 use crate::protocol::names;
@@ -35,8 +35,8 @@ pub(crate) struct ActionServers {
     /// The servers, by absolute name of the action.
     servers: HashMap<Box<str>, Provider>,
     goals: HashMap<u64, ForwardedGoal>,
-    by_sender: Numbers,
-    by_server: Numbers,
+    by_sender: NumbersByClient,
+    by_server: NumbersByClient,
     goals_made: u64,
 }
 

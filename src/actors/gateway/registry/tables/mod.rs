@@ -5,8 +5,8 @@
 pub(crate) mod action_servers;
 pub(crate) mod census;
 pub(crate) mod kept;
-pub(crate) mod leftovers;
 mod numbers;
+pub(crate) mod pending_cleanup;
 pub(crate) mod services;
 pub(crate) mod tap;
 pub(crate) mod topics;

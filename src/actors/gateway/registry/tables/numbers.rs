@@ -8,9 +8,9 @@ use crate::actors::ConnectionId;
 
 /// Numbers of calls, or of goals, by client.
 #[derive(Default)]
-pub(crate) struct Numbers(HashMap<ConnectionId, BTreeSet<u64>>);
+pub(crate) struct NumbersByClient(HashMap<ConnectionId, BTreeSet<u64>>);
 
-impl Numbers {
+impl NumbersByClient {
     pub(crate) fn add(&mut self, client: ConnectionId, number: u64) {
         self.0.entry(client).or_default().insert(number);
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use tokio::time::Instant;
 
 use super::kept::KeptEntry;
-use super::numbers::Numbers;
+use super::numbers::NumbersByClient;
 use crate::actors::ConnectionId;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::wire::payload::Payload;
@@ -42,8 +42,8 @@ pub(crate) struct Services {
     /// The providers, by absolute name of the service.
     providers: HashMap<Box<str>, Provider>,
     outstanding: BTreeMap<u64, Forwarded>,
-    by_caller: Numbers,
-    by_provider: Numbers,
+    by_caller: NumbersByClient,
+    by_provider: NumbersByClient,
     by_deadline: BTreeSet<(Instant, u64)>,
     calls_made: u64,
 }

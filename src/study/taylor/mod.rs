@@ -44,7 +44,7 @@ const MUCH: f64 = 1e9;
 
 /// A motion that is followed, rounding errors carried along.
 #[derive(Debug, Clone)]
-pub struct Follower<const N: usize> {
+pub struct TaylorReference<const N: usize> {
     state: State<N>,
     carry: State<N>,
     tolerance: f64,
@@ -74,7 +74,7 @@ struct Ahead {
     bound: u64,
 }
 
-impl<const N: usize> Follower<N> {
+impl<const N: usize> TaylorReference<N> {
     /// An arm in the given state, to be followed to rounding.
     #[must_use]
     pub fn new(state: State<N>) -> Self {
@@ -137,7 +137,7 @@ impl<const N: usize> Follower<N> {
         self.go_on(arm, effort, u64::MAX).unwrap_or(false)
     }
 
-    /// Begins a span \[s\], to be followed by [`Follower::go_on`].
+    /// Begins a span \[s\], to be followed by [`TaylorReference::go_on`].
     pub(super) fn begin(&mut self, span: f64) {
         self.ahead = Ahead {
             span,

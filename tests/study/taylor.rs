@@ -2,7 +2,7 @@
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
-use pendularm::study::follower::{Follower, ROUNDING};
+use pendularm::study::taylor::{ROUNDING, TaylorReference};
 use serde_json::Value;
 
 use crate::reference::{array, numbers, stored};
@@ -20,7 +20,7 @@ fn check_stored<const N: usize>(case: &Value) -> f64 {
     let lengths = array::<N>(&case["lengths"]);
     let arm = Arm::new(lengths, array(&case["masses"]), gravity).unwrap();
     let effort = array(&case["tau"]);
-    let mut follower = Follower::new(State {
+    let mut follower = TaylorReference::new(State {
         position: array(&case["q0"]),
         velocity: array(&case["qdot0"]),
     });
@@ -87,7 +87,7 @@ fn growth<const N: usize>(
 ) -> [f64; 2] {
     const CHANGE: f64 = 1e-6;
     let end = |start: State<N>| {
-        let mut follower = Follower::new(start);
+        let mut follower = TaylorReference::new(start);
         assert!(follower.follow(arm, effort, time));
         follower.state().position
     };
@@ -108,7 +108,7 @@ fn check_tolerances<const N: usize>() -> f64 {
     let mut worst = 0.0_f64;
     for _ in 0..60 {
         let (arm, start, effort, time) = any::<N>(&mut rng);
-        let mut exact = Follower::new(start);
+        let mut exact = TaylorReference::new(start);
         let mut way = [0.0; 2];
         for _ in 0..64 {
             let before = *exact.state();
@@ -120,7 +120,7 @@ fn check_tolerances<const N: usize>() -> f64 {
         let growth = growth(&arm, &start, &effort, time);
         let mut work = u64::MAX;
         for tolerance in [1e-12, 1e-9, 1e-6, 1e-3] {
-            let mut follower = Follower::within(start, tolerance);
+            let mut follower = TaylorReference::within(start, tolerance);
             assert!(follower.follow(&arm, &effort, time));
             let off = difference(&follower.state().position, &exact.state().position);
             worst = worst.max(off / (tolerance * (way[0] * growth[0] + way[1] * growth[1])));
@@ -148,7 +148,7 @@ fn beside_twice_the_digits<const N: usize>(arm: &Arm<N>, start: &State<N>, time:
     let truth = ReferenceMotion::of(arm, start, &Law::FREE, time, 1);
     let truth = truth.state(0).unwrap().position;
     let end = |start: State<N>| {
-        let mut follower = Follower::new(start);
+        let mut follower = TaylorReference::new(start);
         (0..16).for_each(|_| assert!(follower.follow(arm, &[0.0; N], time / 16.0)));
         follower.state().position
     };
@@ -197,9 +197,9 @@ fn an_arm_let_go_along_the_horizontal_is_followed_although_its_series_has_gaps()
         let arm = Arm::<3>::default();
         let [off, inherent] = beside_twice_the_digits(&arm, &State::rest(), time);
         assert!(off <= 10.0 * inherent.max(f64::EPSILON), "{time}: {off:e}");
-        let mut rough = Follower::within(State::rest(), 1e-6);
+        let mut rough = TaylorReference::within(State::rest(), 1e-6);
         assert!(rough.follow(&arm, &[0.0; 3], time));
-        let mut exact = Follower::new(State::rest());
+        let mut exact = TaylorReference::new(State::rest());
         assert!(exact.follow(&arm, &[0.0; 3], time));
         let off = difference(&rough.state().position, &exact.state().position);
         // The tip of a falling arm turns by some radians in half a second.
@@ -217,7 +217,7 @@ fn a_wound_up_joint_moves_as_any_other() {
         velocity: [1.0, 2.0],
     };
     let truth = ReferenceMotion::of(&arm, &wound, &Law::FREE, 0.5, 1);
-    let mut follower = Follower::new(wound);
+    let mut follower = TaylorReference::new(wound);
     assert!(follower.follow(&arm, &[0.0; 2], 0.5));
     let off = difference(
         &follower.state().velocity,
@@ -231,15 +231,15 @@ fn a_wound_up_joint_moves_as_any_other() {
 fn a_motion_that_is_too_wild_is_refused_within_bounds() {
     let arm = Arm::<3>::default();
     for spin in [1e9, 1e200, f64::INFINITY, f64::NAN] {
-        let mut follower = Follower::new(State {
+        let mut follower = TaylorReference::new(State {
             position: [0.3, 0.2, 0.1],
             velocity: [spin, 1.0, -spin],
         });
         assert!(!follower.follow(&arm, &[0.0; 3], 1.0), "{spin}");
         assert!(follower.coefficients() < 21_000, "{spin}");
     }
-    let mut rest = Follower::within(State::<3>::at_rest([0.1; 3]), 0.0);
-    let mut rounding = Follower::within(State::<3>::at_rest([0.1; 3]), ROUNDING);
+    let mut rest = TaylorReference::within(State::<3>::at_rest([0.1; 3]), 0.0);
+    let mut rounding = TaylorReference::within(State::<3>::at_rest([0.1; 3]), ROUNDING);
     assert!(rest.follow(&arm, &[1.0; 3], 0.1) && rounding.follow(&arm, &[1.0; 3], 0.1));
     assert_eq!(rest.state(), rounding.state());
 }

@@ -11,7 +11,7 @@ use crate::actors::ConnectionId;
 
 /// All leftovers, one entry for each client that has gone: goals and calls by their numbers.
 #[derive(Default)]
-pub(crate) struct Leftovers {
+pub(crate) struct PendingCleanup {
     goals: VecDeque<BTreeSet<u64>>,
     calls: VecDeque<BTreeSet<u64>>,
     registrations: VecDeque<(ConnectionId, Registrations)>,
@@ -28,7 +28,7 @@ pub(crate) enum Registration {
     ServedAction(Box<str>, KeptEntry),
 }
 
-impl Leftovers {
+impl PendingCleanup {
     pub(crate) fn add(&mut self, goals: BTreeSet<u64>, calls: BTreeSet<u64>) {
         for (left, numbers) in [(&mut self.goals, goals), (&mut self.calls, calls)] {
             if !numbers.is_empty() {

@@ -7,15 +7,15 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "pairs of registers, and the seats of each, are counted from their lanes"
+    reason = "pairs of registers, and the jobs of each, are counted from their lanes"
 )]
 
 use std::vec::Drain;
 
 use fearless_simd::Simd;
 
+use super::job::{BatchJob, StepKind};
 use super::lanes::{Lanes, Moving};
-use super::seat::{Seat, StepKind};
 use crate::math::number::{Number, Wide};
 
 /// Registers that do each operation one behind the other.
@@ -24,31 +24,31 @@ const K: usize = 2;
 pub(super) const PAIRS: usize = 2;
 
 /// A few pairs' worth of arms of one kind, and those that wait for a lane.
-pub(super) struct Formation<'q, 'a, S: Simd, const N: usize> {
+pub(super) struct BatchRunner<'q, 'a, S: Simd, const N: usize> {
     pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     /// The arm in each lane, pair after pair.
-    seats: Vec<Option<Seat<'a, N>>>,
-    waiting: Drain<'q, Seat<'a, N>>,
+    jobs: Vec<Option<BatchJob<'a, N>>>,
+    waiting: Drain<'q, BatchJob<'a, N>>,
 }
 
-impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
+impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
     /// Gives as many arms a lane as there are.
     #[inline(always)]
-    pub(super) fn new(simd: S, mut waiting: Drain<'q, Seat<'a, N>>) -> Self {
+    pub(super) fn new(simd: S, mut waiting: Drain<'q, BatchJob<'a, N>>) -> Self {
         let mut pairs = [Lanes::resting(Wide::<S, K>::splat(simd, 0.0)); PAIRS];
-        let mut seats = Vec::with_capacity(PAIRS * Wide::<S, K>::LANES);
+        let mut jobs = Vec::with_capacity(PAIRS * Wide::<S, K>::LANES);
         for lanes in &mut pairs {
             for lane in 0..Wide::<S, K>::LANES {
-                let mut seat = waiting.next();
-                if let Some(seat) = &mut seat {
-                    lanes.seat(lane, seat);
+                let mut job = waiting.next();
+                if let Some(job) = &mut job {
+                    lanes.place(lane, job);
                 }
-                seats.push(seat);
+                jobs.push(job);
             }
         }
         Self {
             pairs,
-            seats,
+            jobs,
             waiting,
         }
     }
@@ -57,7 +57,7 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
     #[inline(always)]
     pub(super) fn run(mut self, kind: StepKind) {
         while let Some(steps) = self.until_look() {
-            if kind.weighs {
+            if kind.has_gravity {
                 self.take_steps::<true>(kind, steps);
             } else {
                 self.take_steps::<false>(kind, steps);
@@ -68,28 +68,27 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
 
     /// How many steps all arms take before one of them is looked at.
     fn until_look(&self) -> Option<u64> {
-        self.seats.iter().flatten().map(Seat::until_look).min()
+        self.jobs.iter().flatten().map(BatchJob::until_look).min()
     }
 
     #[inline(always)]
-    fn take_steps<const WEIGHS: bool>(&mut self, kind: StepKind, steps: u64) {
-        let mut seats = self.seats.chunks(Wide::<S, K>::LANES);
+    fn take_steps<const HAS_GRAVITY: bool>(&mut self, kind: StepKind, steps: u64) {
+        let mut jobs = self.jobs.chunks(Wide::<S, K>::LANES);
         let taken: [bool; PAIRS] = [(); PAIRS].map(|()| {
-            seats
-                .next()
-                .is_some_and(|seats| seats.iter().any(Option::is_some))
+            jobs.next()
+                .is_some_and(|jobs| jobs.iter().any(Option::is_some))
         });
         for step in 0..steps {
             for (index, lanes) in self.pairs.iter_mut().enumerate() {
                 if !taken[index] {
                     continue;
                 }
-                let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
+                let mut next = lanes.next::<HAS_GRAVITY>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
                     // This is moved out of the way, so that nothing else has to be in memory.
                     let mut parted = next;
                     let first = index * Wide::<S, K>::LANES;
-                    part(lanes, &mut parted, &mut self.seats[first..], step);
+                    part(lanes, &mut parted, &mut self.jobs[first..], step);
                     next = parted;
                 }
                 lanes.moving = next;
@@ -99,29 +98,29 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
 
     /// Counts the steps, shows where they led to, has arms leave that are done, and gives their lanes to the next.
     fn look(&mut self, steps: u64) {
-        let chunks = self.seats.chunks_mut(Wide::<S, K>::LANES);
-        for (lanes, seats) in self.pairs.iter_mut().zip(chunks) {
-            for (lane, place) in seats.iter_mut().enumerate() {
-                if let Some(seat) = place {
-                    let push_ends = seat.count(steps);
-                    if seat.is_done(|| lanes.moving.state(lane)) {
-                        lanes.moving.write(lane, seat.arm);
-                        seat.end(false);
+        let chunks = self.jobs.chunks_mut(Wide::<S, K>::LANES);
+        for (lanes, jobs) in self.pairs.iter_mut().zip(chunks) {
+            for (lane, place) in jobs.iter_mut().enumerate() {
+                if let Some(job) = place {
+                    let push_ends = job.count(steps);
+                    if job.is_done(|| lanes.moving.state(lane)) {
+                        lanes.moving.write(lane, job.arm);
+                        job.end(false);
                         lanes.rest(lane);
                         *place = None;
                     } else {
                         if push_ends {
                             lanes.end_push(lane);
                         }
-                        if seat.ends_period() {
-                            lanes.begin_period(lane, seat);
+                        if job.ends_period() {
+                            lanes.begin_period(lane, job);
                         }
                     }
                 }
                 if place.is_none()
                     && let Some(mut next) = self.waiting.next()
                 {
-                    lanes.seat(lane, &mut next);
+                    lanes.place(lane, &mut next);
                     *place = Some(next);
                 }
             }
@@ -135,16 +134,16 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
 fn part<T: Number, const N: usize>(
     lanes: &mut Lanes<T, N>,
     next: &mut Moving<T, N>,
-    seats: &mut [Option<Seat<'_, N>>],
+    jobs: &mut [Option<BatchJob<'_, N>>],
     step: u64,
 ) {
-    for (lane, place) in (0..T::LANES).zip(seats) {
+    for (lane, place) in (0..T::LANES).zip(jobs) {
         if !next.is_finite(lane)
-            && let Some(mut seat) = place.take()
+            && let Some(mut job) = place.take()
         {
-            seat.count(step);
-            lanes.moving.write(lane, seat.arm);
-            seat.end(true);
+            job.count(step);
+            lanes.moving.write(lane, job.arm);
+            job.end(true);
             lanes.rest(lane);
             next.set(lane, &Moving::resting(0.0));
         }

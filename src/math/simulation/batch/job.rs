@@ -17,7 +17,7 @@ pub(super) struct StepKind {
     /// Whether the control law runs in every step.
     pub(super) controlled: bool,
     /// Whether the dynamics look at the first angle.
-    pub(super) weighs: bool,
+    pub(super) has_gravity: bool,
 }
 
 impl StepKind {
@@ -28,17 +28,17 @@ impl StepKind {
         Self {
             method: arm.method,
             controlled: arm.pid.is_enabled() && arm.hold.every_step,
-            weighs: !leaves_out_first_angle(&arm.arm),
+            has_gravity: !leaves_out_first_angle(&arm.arm),
         }
     }
 
     pub(super) fn all() -> impl Iterator<Item = Self> {
         Method::ALL.into_iter().flat_map(|method| {
             [(false, false), (false, true), (true, false), (true, true)].map(
-                |(controlled, weighs)| Self {
+                |(controlled, has_gravity)| Self {
                     method,
                     controlled,
-                    weighs,
+                    has_gravity,
                 },
             )
         })
@@ -46,7 +46,7 @@ impl StepKind {
 
     /// Its place in [`StepKind::all`].
     pub(super) fn index(self) -> usize {
-        4 * self.method as usize + 2 * usize::from(self.controlled) + usize::from(self.weighs)
+        4 * self.method as usize + 2 * usize::from(self.controlled) + usize::from(self.has_gravity)
     }
 }
 
@@ -54,7 +54,7 @@ impl StepKind {
 pub(super) type Observer<'a, const N: usize> = Box<dyn FnMut(&State<N>) -> ControlFlow<()> + 'a>;
 
 /// An arm on its way.
-pub(super) struct Seat<'a, const N: usize> {
+pub(super) struct BatchJob<'a, const N: usize> {
     pub(super) arm: &'a mut Simulation<N>,
     /// Steps that have been taken, and those still to be taken.
     taken: u64,
@@ -80,7 +80,7 @@ struct HeldSteps<const N: usize> {
     ends: bool,
 }
 
-impl<'a, const N: usize> Seat<'a, N> {
+impl<'a, const N: usize> BatchJob<'a, N> {
     /// An arm that is to take so many steps, one at least.
     pub(super) fn new(
         arm: &'a mut Simulation<N>,
