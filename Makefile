@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run test conformance test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -34,6 +34,10 @@ test: ## Run every test that needs Rust alone, but the slow ones
 	$(CARGO) --config profile.dev.package.pendularm.opt-level=0 test --locked --lib
 	$(CARGO) test --locked --test '*'
 	$(CARGO) test --locked --doc
+
+conformance: ## Try the specification's rules against any server of the protocol: ADDR=127.0.0.1:9095; ARGS="--category pid" or "--rule reset"
+	@echo "make conformance: a rule a line, some 40 s; exit status 0 if every rule holds"
+	@$(CARGO) run --quiet --locked -p pendularm-conformance -- "$(or $(ADDR),127.0.0.1:9095)" $(ARGS)
 
 test-slow: ## Run the tests of faults that take a minute or two; ARGS=faults_slow:: picks some; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"

@@ -1,0 +1,205 @@
+//! The suite of the specification against our own program: every rule holds, and every rule can fail.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    unreachable_pub,
+    reason = "a test that panics has failed"
+)]
+
+mod faults;
+mod program;
+mod proxy;
+
+use std::collections::BTreeSet;
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pendularm_conformance::bench::Found;
+use pendularm_conformance::{Row, Rule, Selection, arm, rules, run, totals};
+use serde_json::Value;
+
+use faults::{FAULTS, Planted};
+use program::Program;
+use proxy::{Fault, Proxy, Side};
+
+/// Programs that are tried at once; a rule waits more than it computes.
+const WORKERS: usize = 8;
+
+fn all_hold(links: usize) {
+    let program = Program::start(links);
+    // A run beside other tests may take longer than one by itself.
+    let selection = Selection { time: Duration::from_secs(300), ..Selection::default() };
+    let rows = run(&program.address, &selection, |_| {}).unwrap();
+    let failing: Vec<String> = rows.iter().filter(|row| !row.holds()).map(Row::to_string).collect();
+    assert!(failing.is_empty(), "{}\n{}", failing.join("\n"), totals(&rows));
+    assert!(rows.len() > 130, "{} rules alone", rows.len());
+}
+
+#[test]
+fn every_rule_holds_for_2_links() {
+    all_hold(2);
+}
+
+#[test]
+fn every_rule_holds_for_3_links() {
+    all_hold(3);
+}
+
+/// The outcome of a rule against a server with a fault: nothing if it fails for the fault.
+fn escapes(program: &Program, found: &Found, planted: &Planted, links: usize) -> Option<String> {
+    let proxy = Proxy::start(&program.address, (planted.fault)(links));
+    let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
+    let rows = run(&proxy.address, &selection, |_| {}).unwrap_or_default();
+    // Past the proxy: the next fault finds a server as it was started.
+    found.restore(&program.address);
+    match rows.as_slice() {
+        [row] => match &row.got {
+            Err(why) if !why.starts_with("while preparing") && !why.starts_with("not tried") => {
+                println!("{links} links, {}: {}: {why}", planted.rule, planted.says);
+                None
+            }
+            got => Some(format!("{}: {}: {got:?}", planted.rule, planted.says)),
+        },
+        rows => Some(format!("{}: {} rows", planted.rule, rows.len())),
+    }
+}
+
+fn each_fails(links: usize) {
+    let rules: Vec<Rule> = rules::all().filter(|rule| rule.applies_to(links)).collect();
+    let ids: BTreeSet<&str> = rules.iter().map(|rule| rule.id).collect();
+    let planted: Vec<&Planted> = FAULTS.iter().filter(|planted| ids.contains(planted.rule)).collect();
+    let covered: BTreeSet<&str> = planted.iter().map(|planted| planted.rule).collect();
+    let without: Vec<_> = ids.difference(&covered).collect();
+    assert!(without.is_empty(), "rules without a fault: {without:?}");
+    let next = AtomicUsize::new(0);
+    let escaped: Vec<String> = thread::scope(|scope| {
+        let work = || {
+            let program = Program::start(links);
+            let found = Found::at(&program.address).unwrap();
+            let mut escaped = Vec::new();
+            while let Some(planted) = planted.get(next.fetch_add(1, Ordering::Relaxed)) {
+                escaped.extend(escapes(&program, &found, planted, links));
+            }
+            escaped
+        };
+        let workers: Vec<_> = (0..WORKERS).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
+    });
+    assert!(escaped.is_empty(), "{} of {} faults escape:\n{}", escaped.len(), planted.len(), escaped.join("\n"));
+}
+
+#[test]
+fn every_rule_fails_for_a_planted_fault_with_2_links() {
+    each_fails(2);
+}
+
+#[test]
+fn every_rule_fails_for_a_planted_fault_with_3_links() {
+    each_fails(3);
+}
+
+#[test]
+fn every_fault_is_for_a_rule() {
+    let ids: BTreeSet<&str> = rules::all().map(|rule| rule.id).collect();
+    let strange: Vec<&str> = FAULTS.iter().map(|planted| planted.rule).filter(|rule| !ids.contains(rule)).collect();
+    assert!(strange.is_empty(), "{strange:?}");
+    assert_eq!(ids.len(), rules::all().count(), "two rules have one id");
+}
+
+#[test]
+fn a_server_that_says_nothing_is_reported_soon() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let began = Instant::now();
+    let why = run(&address, &Selection::default(), |_| {}).unwrap_err();
+    assert!(why.contains("gave no answer"), "{why}");
+    assert!(began.elapsed() < Duration::from_secs(30));
+}
+
+/// As a server that is being written: the rules of the other sections can be tried.
+#[test]
+fn services_that_never_answer_fail_their_own_rules_alone() {
+    let program = Program::start(2);
+    let fault: Fault = Box::new(|_, _, frame| {
+        let service = frame["service"].as_str().unwrap_or_default();
+        if service.starts_with("/ik_") { vec![] } else { vec![frame] }
+    });
+    let proxy = Proxy::start(&program.address, fault);
+    let selection = Selection { rule: Some("reset".to_owned()), ..Selection::default() };
+    let rows = run(&proxy.address, &selection, |_| {}).unwrap();
+    assert!(rows.len() == 5 && rows.iter().all(Row::holds), "{rows:?}");
+}
+
+#[test]
+fn a_port_without_a_server_is_reported() {
+    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let why = run(&address, &Selection::default(), |_| {}).unwrap_err();
+    assert!(why.contains("no connection"), "{why}");
+}
+
+#[test]
+fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
+    let program = Program::start(2);
+    let mut asked = 0;
+    let fault: Fault = Box::new(move |side, _, mut frame| {
+        if side == Side::Server {
+            asked += 1;
+            for (at, name) in ["values", "result", "status", "msg"].into_iter().enumerate() {
+                // The first answers say how many links there are.
+                if asked > 20
+                    && let Some(member) = frame.get_mut(name)
+                {
+                    *member = [Value::Null, 7.into(), "x".into(), Value::Array(vec![])][(asked + at) % 4].clone();
+                }
+            }
+        }
+        vec![frame]
+    });
+    let proxy = Proxy::start(&program.address, fault);
+    let selection = Selection { category: Some("pid".to_owned()), ..Selection::default() };
+    let rows = run(&proxy.address, &selection, |_| {}).unwrap();
+    let holding: Vec<String> = rows.iter().filter(|row| row.holds()).map(Row::to_string).collect();
+    assert!(!rows.is_empty() && holding.len() < 3, "{}", holding.join("\n"));
+}
+
+/// The suite's own formulas against 50-digit values that were computed from the Lagrangian.
+#[test]
+fn the_suites_own_arm_agrees_with_the_reference_values() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/dynamics.json");
+    let data: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let list = |value: &Value| value.as_array().unwrap().iter().map(|one| one.as_f64().unwrap()).collect::<Vec<f64>>();
+    let mut tried = 0;
+    for case in data["cases"].as_array().unwrap() {
+        let own = arm::Arm { masses: list(&case["masses"]), lengths: list(&case["lengths"]), gravity: case["gravity"].as_f64().unwrap() };
+        let state = arm::State { position: list(&case["q"]), velocity: list(&case["qdot"]) };
+        // The data say how much a rounding of the inputs may change; 32 roundings are allowed.
+        let near = |name: &str, got: f64, expected: &Value, sensitivity: &Value| {
+            let (expected, sensitivity) = (expected.as_f64().unwrap(), sensitivity.as_f64().unwrap());
+            let error = (got - expected).abs();
+            assert!(error <= 32.0 * f64::EPSILON * (sensitivity + expected.abs()), "{name}: {got} instead of {expected} in {}", case["id"]);
+        };
+        for (joint, load) in own.gravity_load(&state.position).iter().enumerate() {
+            near("gravity load", *load, &case["G"][joint], &case["sens_G"][joint]);
+        }
+        near("kinetic energy", own.kinetic(&state), &case["kinetic"], &case["sens_kinetic"]);
+        near("potential energy", own.potential(&state.position), &case["potential"], &case["sens_potential"]);
+        // The data have accelerations with an effort; without one, M q'' + h + G must vanish.
+        let free = own.free_acceleration(&state.position, &state.velocity);
+        for (joint, row) in case["M"].as_array().unwrap().iter().enumerate() {
+            let terms: Vec<f64> = list(row).iter().zip(&free).map(|(inertia, acceleration)| inertia * acceleration).collect();
+            let (h, load) = (list(&case["h"])[joint], list(&case["G"])[joint]);
+            let size = terms.iter().map(|term| term.abs()).sum::<f64>() + h.abs() + load.abs();
+            let rest = terms.iter().sum::<f64>() + h + load;
+            let condition = case["cond2_abs_scaled"].as_f64().unwrap();
+            assert!(rest.abs() <= 1e-9 * condition * size, "equation of motion: {rest} of {size} in {}", case["id"]);
+        }
+        tried += 1;
+    }
+    assert!(tried > 10, "{tried} cases");
+}

@@ -1,0 +1,531 @@
+//! Shared by the rules: a connection to an arm in a known state, and requests to it.
+//!
+//! The known state: running, PID off, `rk4` at 1 ms, gravity 9.81, links of 1 m and 1 kg, no goal, no trial, just reset.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::arm::{Arm, State};
+use crate::method::step;
+use crate::peer::{Answer, Peer, Trouble, is_message};
+use crate::values::{boolean, largest, list, minus, must, near, number, numbers, numbers_of, text};
+
+/// The longest wait for a message on a topic that is published continuously.
+const SOON: Duration = Duration::from_secs(3);
+/// Standard gravity of the specification.
+pub const GRAVITY: f64 = 9.81;
+
+/// The server's answers before anything was changed.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// How many links it has.
+    pub links: usize,
+    /// `/arm_sim/set_params {}`.
+    pub params: Result<Value, String>,
+    /// `/arm_sim/set_integrator {}`.
+    pub integrator: Result<Value, String>,
+    /// `/arm_sim/pause {}`.
+    pub pause: Result<Value, String>,
+    /// `/pid_controller/enable {}`.
+    pub enable: Result<Value, String>,
+    /// `/pid_controller/set_gains {}`.
+    pub gains: Result<Value, String>,
+    /// A message on `/joint_states`.
+    pub state: Result<Joints, String>,
+    /// Services of the preparation that give no answer at all; they are left out of it.
+    pub silent: Vec<&'static str>,
+}
+
+/// Services that end a trial and a goal.
+const ENDING: [&str; 2] = ["/ik_trial/stop", "/ik_action/cancel_goal"];
+
+impl Found {
+    /// Asks the server at an address.
+    ///
+    /// # Errors
+    /// If it cannot be reached, or neither parameters nor joint states say how many links it has.
+    pub fn at(address: &str) -> Result<Self, String> {
+        let mut bench = Bench { peer: Peer::connect(address)?, links: 0, found: None };
+        let params = bench.accepted("/arm_sim/set_params", &json!({}));
+        let state = bench.watch("/joint_states").and_then(|()| bench.message("/joint_states", SOON)).and_then(|msg| Joints::read(&msg));
+        let by_params = params.as_ref().ok().and_then(|values| numbers(values, "masses").ok()).map(|masses| masses.len());
+        let links = by_params.or_else(|| state.as_ref().ok().map(|state| state.position.len()));
+        let links = match links {
+            Some(links) if links == 2 || links == 3 => links,
+            Some(links) => return Err(format!("the server at {address} has {links} links; the specification has 2 or 3")),
+            None => return Err(format!("the server at {address} tells no number of links: {}", params.err().unwrap_or_default())),
+        };
+        let mut found = Self {
+            links,
+            params,
+            state,
+            integrator: bench.accepted("/arm_sim/set_integrator", &json!({})),
+            pause: bench.accepted("/arm_sim/pause", &json!({})),
+            enable: bench.accepted("/pid_controller/enable", &json!({})),
+            gains: bench.accepted("/pid_controller/set_gains", &json!({})),
+            silent: Vec::new(),
+        };
+        // A rejection is an answer.
+        found.silent = ENDING.into_iter().filter(|service| bench.peer.call(service, &json!({})).is_err()).collect();
+        Ok(found)
+    }
+
+    /// Gives the server its settings back, as far as it takes them.
+    pub fn restore(&self, address: &str) {
+        let Ok(mut bench) = Bench::prepared(address, self) else {
+            return;
+        };
+        let settings = [
+            ("/arm_sim/set_params", &self.params),
+            ("/arm_sim/set_integrator", &self.integrator),
+            ("/pid_controller/set_gains", &self.gains),
+            ("/pid_controller/enable", &self.enable),
+            ("/arm_sim/pause", &self.pause),
+        ];
+        for (service, values) in settings {
+            if let Ok(values) = values {
+                // A server that refuses has failed its rule already.
+                let _ = bench.peer.call(service, values);
+            }
+        }
+    }
+}
+
+/// A message on `/joint_states`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joints {
+    /// Time of the header [s].
+    pub stamp: f64,
+    /// One name for each joint.
+    pub name: Vec<String>,
+    /// Joint angles [rad].
+    pub position: Vec<f64>,
+    /// Their rates [rad/s].
+    pub velocity: Vec<f64>,
+    /// Joint efforts [N m].
+    pub effort: Vec<f64>,
+}
+
+impl Joints {
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// With the member that is missing or wrong.
+    pub fn read(msg: &Value) -> Result<Self, String> {
+        let names = msg.pointer("/name").and_then(Value::as_array).ok_or("no array name in /joint_states")?;
+        let name: Option<Vec<String>> = names.iter().map(|name| name.as_str().map(str::to_owned)).collect();
+        let nanosec = number(msg, "header/stamp/nanosec").or_else(|_| number(msg, "header/stamp/nsecs"))?;
+        let sec = number(msg, "header/stamp/sec").or_else(|_| number(msg, "header/stamp/secs"))?;
+        Ok(Self {
+            stamp: sec + 1e-9 * nanosec,
+            name: name.ok_or("an entry of name in /joint_states is no text")?,
+            position: numbers(msg, "position")?,
+            velocity: numbers(msg, "velocity")?,
+            effort: numbers(msg, "effort")?,
+        })
+    }
+
+    /// Angles and rates.
+    #[must_use]
+    pub fn state(&self) -> State {
+        State { position: self.position.clone(), velocity: self.velocity.clone() }
+    }
+}
+
+/// A connection to a prepared arm.
+#[derive(Debug)]
+pub struct Bench {
+    /// The connection.
+    pub peer: Peer,
+    /// How many links the arm has.
+    pub links: usize,
+    found: Option<Found>,
+}
+
+impl Bench {
+    /// Connects and puts the arm into the known state.
+    ///
+    /// # Errors
+    /// If the server cannot be reached or does not answer.
+    pub fn prepared(address: &str, found: &Found) -> Result<Self, String> {
+        let links = found.links;
+        let mut bench = Self { peer: Peer::connect(address)?, links, found: Some(found.clone()) };
+        let arm = Arm::of(links, GRAVITY);
+        let calls = [
+            (ENDING[0], json!({})),
+            (ENDING[1], json!({})),
+            ("/arm_sim/pause", json!({"data": false})),
+            ("/pid_controller/enable", json!({"data": false})),
+            ("/arm_sim/set_integrator", json!({"method": "rk4", "timestep": 0.001})),
+            ("/arm_sim/set_params", json!({"gravity": arm.gravity, "masses": arm.masses, "lengths": arm.lengths})),
+            ("/arm_sim/reset", json!({})),
+        ];
+        // The results have rules of their own.
+        for (service, args) in calls.iter().filter(|(service, _)| !found.silent.contains(service)) {
+            bench.peer.call(service, args)?;
+        }
+        Ok(bench)
+    }
+
+    /// A second connection, to the same server; it changes nothing.
+    ///
+    /// # Errors
+    /// If the server cannot be reached.
+    pub fn another(&self) -> Result<Self, String> {
+        let address = self.peer.address()?;
+        Ok(Self { peer: Peer::connect(&address)?, links: self.links, found: self.found.clone() })
+    }
+
+    /// The server's answers before anything was changed.
+    ///
+    /// # Errors
+    /// If the server was not asked.
+    pub fn found(&self) -> Result<&Found, String> {
+        self.found.as_ref().ok_or_else(|| "the server has not been asked".to_owned())
+    }
+
+    /// The values of an accepted call.
+    ///
+    /// # Errors
+    /// If it is rejected or not answered.
+    pub fn accepted(&mut self, service: &str, args: &Value) -> Result<Value, String> {
+        let Answer { values, result, status, .. } = self.peer.call(service, args)?;
+        must(result, || format!("{service} {args} is rejected: {status}"))?;
+        Ok(values)
+    }
+
+    /// The answer to a call that must be rejected with a reason.
+    ///
+    /// # Errors
+    /// If it is accepted, rejected without a reason, or not answered.
+    pub fn rejected(&mut self, service: &str, args: &Value) -> Result<Answer, String> {
+        let answer = self.peer.call(service, args)?;
+        must(!answer.result, || format!("{service} {args} is accepted"))?;
+        must(!answer.status.is_empty(), || format!("{service} {args} is rejected with an empty status"))?;
+        must(answer.frame.get("result") == Some(&Value::Bool(false)), || format!("{service} {args}: no result"))?;
+        Ok(answer)
+    }
+
+    /// Subscribes to a topic.
+    ///
+    /// # Errors
+    /// If the connection has ended.
+    pub fn watch(&mut self, topic: &str) -> Result<(), String> {
+        self.peer.send(&json!({"op": "subscribe", "id": format!("watch {topic}"), "topic": topic}))
+    }
+
+    /// The next message on a topic.
+    ///
+    /// # Errors
+    /// If none comes in time.
+    pub fn message(&mut self, topic: &str, within: Duration) -> Result<Value, String> {
+        self.message_that(topic, within, "a message", |_| true)
+    }
+
+    /// The next message on a topic that is as it should be; others are left.
+    ///
+    /// # Errors
+    /// If none comes in time.
+    pub fn message_that(&mut self, topic: &str, within: Duration, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
+        let holds = |frame: &Value| is_message(frame, topic) && frame.get("msg").is_some_and(&is_it);
+        match self.peer.find(Instant::now() + within, holds) {
+            Ok(mut frame) => Ok(frame.get_mut("msg").map(Value::take).unwrap_or_default()),
+            Err(Trouble::Silence) => Err(format!("{name} did not come on {topic} within {:.1} s", within.as_secs_f64())),
+            Err(Trouble::Broken(why)) => Err(why),
+        }
+    }
+
+    /// All messages on a topic that come in a time.
+    ///
+    /// # Errors
+    /// If the connection ends.
+    pub fn messages_for(&mut self, topic: &str, time: Duration) -> Result<Vec<Value>, String> {
+        let until = Instant::now() + time;
+        let mut found = Vec::new();
+        loop {
+            match self.peer.find(until, |frame| is_message(frame, topic)) {
+                Ok(mut frame) => found.push(frame.get_mut("msg").map(Value::take).unwrap_or_default()),
+                Err(Trouble::Silence) => return Ok(found),
+                Err(Trouble::Broken(why)) => return Err(why),
+            }
+        }
+    }
+
+    /// Forgets the messages on a topic that have come.
+    pub fn forget(&mut self, topic: &str) {
+        self.peer.forget(|frame| is_message(frame, topic));
+    }
+
+    /// The next joint states, in order.
+    ///
+    /// # Errors
+    /// If none come in time or they are malformed.
+    pub fn joints(&mut self) -> Result<Joints, String> {
+        let msg = self.message("/joint_states", SOON)?;
+        let joints = Joints::read(&msg)?;
+        let lengths = [joints.position.len(), joints.velocity.len(), joints.effort.len()];
+        must(lengths == [self.links; 3], || format!("position, velocity and effort have {lengths:?} entries for {} joints", self.links))?;
+        Ok(joints)
+    }
+
+    /// Joint states from after everything that this connection has sent; starts to listen where it does not yet.
+    ///
+    /// # Errors
+    /// As [`Bench::joints`].
+    pub fn fresh(&mut self) -> Result<Joints, String> {
+        self.watch("/joint_states")?;
+        // A call that changes nothing. Messages before its answer may be older than this connection's requests.
+        self.peer.call("/arm_sim/set_integrator", &json!({}))?;
+        self.forget("/joint_states");
+        self.joints()?;
+        self.joints()
+    }
+
+    /// All joint states of a time.
+    ///
+    /// # Errors
+    /// As [`Bench::joints`].
+    pub fn joints_for(&mut self, seconds: f64) -> Result<Vec<Joints>, String> {
+        self.fresh()?;
+        let until = Instant::now() + Duration::from_secs_f64(seconds);
+        let mut found = vec![self.joints()?];
+        while Instant::now() < until {
+            found.push(self.joints()?);
+        }
+        Ok(found)
+    }
+
+    /// Joint states until the arm has been at rest for a while; the last ones.
+    ///
+    /// # Errors
+    /// If it is not at rest within some seconds.
+    pub fn at_rest(&mut self) -> Result<Joints, String> {
+        self.fresh()?;
+        let end = Instant::now() + Duration::from_secs(8);
+        let mut since = Instant::now();
+        loop {
+            let joints = self.joints()?;
+            if largest(&joints.velocity) > 3e-3 {
+                since = Instant::now();
+            } else if since.elapsed() > Duration::from_millis(200) {
+                return Ok(joints);
+            }
+            must(Instant::now() < end, || format!("the arm does not come to rest; velocity {}", list(&joints.velocity)))?;
+        }
+    }
+
+    /// Sets masses, lengths and gravity.
+    ///
+    /// # Errors
+    /// If they are rejected.
+    pub fn set_arm(&mut self, arm: &Arm) -> Result<(), String> {
+        let args = json!({"gravity": arm.gravity, "masses": arm.masses, "lengths": arm.lengths});
+        self.accepted("/arm_sim/set_params", &args).map(drop)
+    }
+
+    /// Sets gravity alone.
+    ///
+    /// # Errors
+    /// If it is rejected.
+    pub fn set_gravity(&mut self, gravity: f64) -> Result<(), String> {
+        self.accepted("/arm_sim/set_params", &json!({"gravity": gravity})).map(drop)
+    }
+
+    /// The arm that the server says it has.
+    ///
+    /// # Errors
+    /// If it does not say so.
+    pub fn arm(&mut self) -> Result<Arm, String> {
+        let values = self.accepted("/arm_sim/set_params", &json!({}))?;
+        Ok(Arm {
+            masses: numbers_of(&values, "masses", self.links)?,
+            lengths: numbers_of(&values, "lengths", self.links)?,
+            gravity: number(&values, "gravity")?,
+        })
+    }
+
+    /// Sets gains, the same for every joint.
+    ///
+    /// # Errors
+    /// If they are rejected.
+    pub fn set_gains(&mut self, kp: f64, ki: f64, kd: f64) -> Result<(), String> {
+        let args = json!({"kp": self.each(kp), "ki": self.each(ki), "kd": self.each(kd)});
+        self.accepted("/pid_controller/set_gains", &args).map(drop)
+    }
+
+    /// Sets gains that hold the arm of 1 m and 1 kg links; `integral` says whether with the integral term.
+    ///
+    /// # Errors
+    /// If they are rejected.
+    pub fn set_holding_gains(&mut self, integral: bool) -> Result<(), String> {
+        let (kp, kd): (&[f64], &[f64]) =
+            if self.links == 2 { (&[200.0, 60.0], &[50.0, 10.0]) } else { (&[400.0, 150.0, 40.0], &[90.0, 35.0, 7.0]) };
+        let ki: Vec<f64> = kp.iter().map(|kp| if integral { 1.5 * kp } else { 0.0 }).collect();
+        self.accepted("/pid_controller/set_gains", &json!({"kp": kp, "ki": ki, "kd": kd})).map(drop)
+    }
+
+    /// Switches the controller.
+    ///
+    /// # Errors
+    /// If that is rejected.
+    pub fn enable(&mut self, on: bool) -> Result<(), String> {
+        self.accepted("/pid_controller/enable", &json!({"data": on})).map(drop)
+    }
+
+    /// Stops or continues the simulation.
+    ///
+    /// # Errors
+    /// If that is rejected.
+    pub fn pause(&mut self, on: bool) -> Result<(), String> {
+        self.accepted("/arm_sim/pause", &json!({"data": on})).map(drop)
+    }
+
+    /// Resets and returns the starting pose.
+    ///
+    /// # Errors
+    /// If there is none in the answer.
+    pub fn reset(&mut self) -> Result<Vec<f64>, String> {
+        let values = self.accepted("/arm_sim/reset", &json!({}))?;
+        numbers_of(&values, "position", self.links)
+    }
+
+    /// Sends points of a trajectory.
+    ///
+    /// # Errors
+    /// If the connection has ended.
+    pub fn command(&mut self, points: &Value) -> Result<(), String> {
+        let names: Vec<String> = (1..=self.links).map(|joint| format!("joint{joint}")).collect();
+        let header = json!({"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""});
+        self.peer.send(&json!({"op": "advertise", "topic": "/joint_trajectory", "type": "trajectory_msgs/msg/JointTrajectory"}))?;
+        let msg = json!({"header": header, "joint_names": names, "points": points});
+        self.peer.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg}))
+    }
+
+    /// Commands one position, at rest there.
+    ///
+    /// # Errors
+    /// If the connection has ended.
+    pub fn hold(&mut self, position: &[f64]) -> Result<(), String> {
+        self.command(&json!([point(position, &self.each(0.0))]))
+    }
+
+    /// The same value for every joint.
+    #[must_use]
+    pub fn each(&self, value: f64) -> Vec<f64> {
+        vec![value; self.links]
+    }
+
+    /// Without gravity, at rest in the starting pose, with the controller on: the pose.
+    ///
+    /// # Errors
+    /// If a call is rejected.
+    pub fn float(&mut self, kp: f64, ki: f64, kd: f64) -> Result<Vec<f64>, String> {
+        self.set_gravity(0.0)?;
+        self.set_gains(kp, ki, kd)?;
+        let pose = self.reset()?;
+        self.enable(true)?;
+        Ok(pose)
+    }
+
+    /// Pushes the arm by the controller for a moment, then leaves it to itself: it swings.
+    ///
+    /// # Errors
+    /// If a call is rejected.
+    pub fn swing(&mut self) -> Result<(), String> {
+        self.set_gains(20.0, 0.0, 0.0)?;
+        let pose = self.reset()?;
+        self.hold(&shifted(&pose, 1.0))?;
+        self.enable(true)?;
+        std::thread::sleep(Duration::from_millis(250));
+        self.enable(false)
+    }
+
+    /// Passes if the published states of the uncontrolled arm are those that this crate's own arm has after whole
+    /// steps from the first one. Returns the number of steps followed.
+    ///
+    /// # Errors
+    /// With the first state that is none of them.
+    pub fn follows(&mut self, arm: &Arm, method: &str, dt: f64) -> Result<usize, String> {
+        let states = self.joints_for(0.4)?;
+        let mut own = states.first().map(Joints::state).ok_or("no joint states")?;
+        let mut steps = 0;
+        for joints in states.iter().skip(1) {
+            let limit = steps + 200;
+            loop {
+                let error = largest(&minus(&joints.position, &own.position)).max(largest(&minus(&joints.velocity, &own.velocity)));
+                if error <= 1e-6 {
+                    break;
+                }
+                must(steps < limit, || format!("after {steps} steps: {} is no state of {method} at {dt} s", list(&joints.position)))?;
+                own = step(method, &own, 0.0, dt, |_, q, v| arm.free_acceleration(q, v));
+                steps += 1;
+            }
+        }
+        must(steps > 0, || "the arm does not move".to_owned())?;
+        Ok(steps)
+    }
+
+    /// Calls `/arm_sim/integration_step`: times, positions and velocities.
+    ///
+    /// # Errors
+    /// If it is rejected, or an array is missing or of another length.
+    pub fn integrate(&mut self, function: &str, [x0, xdot0, dt]: [f64; 3], steps: u32, method: &str) -> Result<[Vec<f64>; 3], String> {
+        let args = json!({"function": function, "x0": x0, "xdot0": xdot0, "dt": dt, "steps": steps, "integrator": method});
+        let values = self.accepted("/arm_sim/integration_step", &args)?;
+        let count = usize::try_from(steps).unwrap_or(usize::MAX).saturating_add(1);
+        let read = |name| numbers_of(&values, name, count);
+        Ok([read("times")?, read("positions")?, read("velocities")?])
+    }
+
+    /// Whether the controller is on.
+    ///
+    /// # Errors
+    /// If the server does not say.
+    pub fn is_enabled(&mut self) -> Result<bool, String> {
+        boolean(&self.accepted("/pid_controller/enable", &json!({}))?, "data")
+    }
+
+    /// Sends a goal; its id.
+    ///
+    /// # Errors
+    /// If it is rejected or has no id.
+    pub fn send_goal(&mut self, goal: &Value) -> Result<String, String> {
+        let values = self.accepted("/ik_action/send_goal", goal)?;
+        let id = text(&values, "goal_id")?;
+        must(!id.is_empty(), || "goal_id is empty".to_owned())?;
+        Ok(id.to_owned())
+    }
+}
+
+/// A point of a trajectory.
+#[must_use]
+pub fn point(positions: &[f64], velocities: &[f64]) -> Value {
+    json!({"positions": positions, "velocities": velocities, "accelerations": [], "time_from_start": {"sec": 0, "nanosec": 0}})
+}
+
+/// A pose with the same angle added to every joint.
+#[must_use]
+pub fn shifted(pose: &[f64], by: f64) -> Vec<f64> {
+    pose.iter().map(|angle| angle + by).collect()
+}
+
+/// Passes if two sets of values are the same numbers, texts and booleans.
+///
+/// # Errors
+/// With the first member that differs.
+pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), String> {
+    for name in members {
+        let (one, other) = (before.get(name), after.get(name));
+        let is_same = match (numbers(before, name), numbers(after, name)) {
+            (Ok(one), Ok(other)) => near(name, &other, &one, 1e-12).is_ok(),
+            _ => match (number(before, name), number(after, name)) {
+                (Ok(one), Ok(other)) => near(name, &[other], &[one], 1e-12).is_ok(),
+                _ => one.is_some() && one == other,
+            },
+        };
+        let show = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), ToString::to_string);
+        must(is_same, || format!("{name} was {} and is {}", show(one), show(other)))?;
+    }
+    Ok(())
+}

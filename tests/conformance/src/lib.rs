@@ -1,0 +1,191 @@
+//! The specification's own tests: black box, over TCP, against any server of the protocol.
+//!
+//! A rule is a sentence of the specification, the expected outcome, and a function that checks it. The files in
+//! `rules/` follow the sections of the specification. Reference values come from formulas in this crate (`arm.rs`,
+//! `method.rs`), from closed forms and from conservation laws, never from a server.
+
+pub mod arm;
+pub mod bench;
+pub mod method;
+pub mod peer;
+pub mod rules;
+pub mod values;
+
+use std::fmt::{self, Write as _};
+use std::time::{Duration, Instant};
+
+use bench::{Bench, Found};
+
+/// The specification's categories of grading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Category {
+    /// `/arm_sim/integration_step`.
+    Integrators,
+    /// Gains, switching on and off, convergence.
+    Pid,
+    /// Gravity load, coupling, and the contract of topics and services.
+    Dynamics,
+    /// `/ik/solve`, and the contract of goals and trials.
+    Kinematics,
+}
+
+impl Category {
+    /// All of them, in the specification's order.
+    pub const ALL: [Self; 4] = [Self::Integrators, Self::Pid, Self::Dynamics, Self::Kinematics];
+}
+
+impl fmt::Display for Category {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.pad(match self {
+            Self::Integrators => "Integrators",
+            Self::Pid => "PID control",
+            Self::Dynamics => "Dynamics and service contract",
+            Self::Kinematics => "Inverse kinematics",
+        })
+    }
+}
+
+/// The arms that a rule is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Links {
+    /// 2 and 3 links.
+    Any,
+    /// 2 links alone.
+    Two,
+    /// 3 links alone.
+    Three,
+}
+
+impl Links {
+    fn include(self, links: usize) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Two => links == 2,
+            Self::Three => links == 3,
+        }
+    }
+}
+
+/// The outcome of a check: a description of the answer, as a success or as a failure.
+pub type Got = Result<String, String>;
+
+/// A rule of the specification.
+#[derive(Debug, Clone, Copy)]
+pub struct Rule {
+    /// The section of the specification and a number in it.
+    pub id: &'static str,
+    /// The category that it counts for.
+    pub category: Category,
+    /// The arms that it is for.
+    pub links: Links,
+    /// The rule in plain words.
+    pub says: &'static str,
+    /// The expected outcome.
+    pub expected: &'static str,
+    /// Checks it.
+    pub check: fn(&mut Bench) -> Got,
+}
+
+impl Rule {
+    /// Whether the rule is for an arm of so many links.
+    #[must_use]
+    pub fn applies_to(&self, links: usize) -> bool {
+        self.links.include(links)
+    }
+}
+
+/// A rule that has been tried.
+#[derive(Debug)]
+pub struct Row {
+    /// The rule.
+    pub rule: Rule,
+    /// The outcome.
+    pub got: Got,
+    /// How long it took.
+    pub took: Duration,
+}
+
+impl Row {
+    /// Whether the rule holds.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.got.is_ok()
+    }
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (mark, got) = match &self.got {
+            Ok(got) => ("ok  ", got),
+            Err(got) => ("FAIL", got),
+        };
+        write!(out, "{mark} {:<18} {} | expected: {} | got: {got}", self.rule.id, self.rule.says, self.rule.expected)
+    }
+}
+
+/// Which rules to try, and for how long.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// The longest time of a whole run; rules that are not tried by then fail.
+    pub time: Duration,
+    /// A category whose name contains this text.
+    pub category: Option<String>,
+    /// Rules whose id starts with this text.
+    pub rule: Option<String>,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self { time: Duration::from_secs(60), category: None, rule: None }
+    }
+}
+
+impl Selection {
+    fn includes(&self, rule: &Rule) -> bool {
+        let name = rule.category.to_string().to_lowercase();
+        self.category.as_ref().is_none_or(|part| name.contains(&part.to_lowercase()))
+            && self.rule.as_ref().is_none_or(|start| rule.id == start || rule.id.starts_with(&format!("{start}-")))
+    }
+}
+
+/// Tries the selected rules one after another against the server at `address`, and tells each result as it comes.
+/// Afterwards the server has the settings that it had before.
+///
+/// # Errors
+/// If the server cannot be reached or does not say how many links it has.
+pub fn run(address: &str, selection: &Selection, mut tell: impl FnMut(&Row)) -> Result<Vec<Row>, String> {
+    let began = Instant::now();
+    let found = Found::at(address)?;
+    let mut rows = Vec::new();
+    for rule in rules::all() {
+        if !selection.includes(&rule) || !rule.applies_to(found.links) {
+            continue;
+        }
+        let start = Instant::now();
+        let got = if began.elapsed() < selection.time {
+            Bench::prepared(address, &found).map_err(|why| format!("while preparing: {why}")).and_then(|mut bench| (rule.check)(&mut bench))
+        } else {
+            Err(format!("not tried: the run had taken {} s", selection.time.as_secs()))
+        };
+        let row = Row { rule, got, took: start.elapsed() };
+        tell(&row);
+        rows.push(row);
+    }
+    found.restore(address);
+    Ok(rows)
+}
+
+/// The totals, one line a category.
+#[must_use]
+pub fn totals(rows: &[Row]) -> String {
+    let mut text = String::new();
+    for category in Category::ALL {
+        let here = rows.iter().filter(|row| row.rule.category == category);
+        let (holding, all) = here.fold((0, 0), |(holding, all), row| (holding + usize::from(row.holds()), all + 1));
+        // A `String` takes every line.
+        let _ = writeln!(text, "{category:<30} {holding:>3} of {all:>3}");
+    }
+    let holding = rows.iter().filter(|row| row.holds()).count();
+    let _ = write!(text, "{:<30} {holding:>3} of {:>3}", "All", rows.len());
+    text
+}

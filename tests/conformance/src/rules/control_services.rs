@@ -1,0 +1,361 @@
+//! "Simulation-control services".
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::arm::Arm;
+use crate::bench::{Bench, GRAVITY, point, same, shifted};
+use crate::values::{boolean, fine, largest, list, must, near, number, numbers_of};
+use crate::{Category, Got, Links, Rule};
+
+const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
+    Rule { id, category: Category::Dynamics, links: Links::Any, says, expected, check }
+}
+
+/// The rules of this part.
+pub const RULES: &[Rule] = &[
+    rule("set_integrator-1", "Each method is accepted and read back", "the four names", methods),
+    rule("set_integrator-2", "method and timestep are optional and apply alone", "the other one stays", fields_alone),
+    rule("set_integrator-3", "An empty request changes nothing", "the same values twice", |bench| {
+        is_query(bench, SET_INTEGRATOR, &["method", "timestep"])
+    }),
+    rule("set_integrator-4", "An unknown method is rejected", "result false, a status, and the method as before", unknown_method),
+    rule("set_integrator-5", "A timestep of 0 or less is rejected", "result false, a status, and the timestep as before", bad_timestep),
+    rule("set_integrator-6", "The live arm steps by euler", "its states are those of euler at 0.01 s", |bench| steps_by(bench, "euler")),
+    rule("set_integrator-7", "The live arm steps by midpoint", "its states are those of midpoint at 0.01 s", |bench| {
+        steps_by(bench, "midpoint")
+    }),
+    rule("set_integrator-8", "The live arm steps by verlet", "its states are those of verlet at 0.01 s", |bench| steps_by(bench, "verlet")),
+    rule("set_integrator-9", "The live arm steps by rk4", "its states are those of rk4 at 0.01 s", |bench| steps_by(bench, "rk4")),
+    rule("set_params-1", "Gravity is 9.81 at the start", "9.81", default_gravity),
+    rule(
+        "set_params-2",
+        "An empty request returns gravity, masses and lengths and changes nothing",
+        "one positive mass and length per link, the same values twice",
+        query_params,
+    ),
+    rule("set_params-3", "Each field is optional and applies alone", "the other fields stay", params_alone),
+    rule(
+        "set_params-4",
+        "masses or lengths of the wrong length are rejected, valid fields apply",
+        "result false, old arrays, new gravity",
+        wrong_length,
+    ),
+    rule(
+        "set_params-5",
+        "A mass or length of 0 or less is rejected, valid fields apply",
+        "result false, old arrays, new gravity",
+        not_positive,
+    ),
+    rule("set_params-6", "Negative gravity is rejected, valid fields apply", "result false, old gravity, new masses", negative_gravity),
+    rule("set_params-7", "A rejected request returns the current parameters", "gravity, masses and lengths as they are", rejected_echo),
+    rule("set_params-8", "The live arm has the new parameters", "its states are those of the new arm", live_params),
+    rule("set_params-9", "Gravity 0 is accepted and the arm stays at rest", "no motion in 0.4 s with the controller off", no_gravity),
+    rule("pause-1", "/joint_states is published with a frozen state while paused", "messages with one and the same state", frozen),
+    rule("pause-2", "Other services work while paused", "accepted calls", works_while_paused),
+    rule("pause-3", "The simulation continues from the frozen state", "states that follow from it in whole steps", continues),
+    rule("pause-4", "An empty request returns the state and changes nothing", "data true when paused, false when not", query_pause),
+    rule("pause-5", "The integral does not advance while paused", "the same effort after a pause of 1 s", integral_waits),
+    rule(
+        "reset-1",
+        "The arm returns to one fixed pose, which the answer has",
+        "the same position and velocity from different states",
+        fixed_pose,
+    ),
+    rule("reset-2", "/joint_states shows that pose", "the position of the answer", shows_pose),
+    rule("reset-3", "The setpoint is reset too", "no effort and no motion after it", resets_setpoint),
+    rule("reset-4", "The integral is reset too", "no effort after it", resets_integral),
+    rule("reset-5", "The simulation clock starts at zero", "a stamp below 1 s, or wall time in the stamps", zero_clock),
+];
+
+const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
+const SET_PARAMS: &str = "/arm_sim/set_params";
+const PARAMS: [&str; 3] = ["gravity", "masses", "lengths"];
+
+/// A gain of the integral that hardly moves the arm while the error is 1 rad.
+const SMALL: f64 = 0.005;
+
+/// Passes if `{}` is accepted twice and returns the same values.
+pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Got {
+    let before = bench.accepted(service, &json!({}))?;
+    let after = bench.accepted(service, &json!({}))?;
+    same(&before, &after, members)?;
+    Ok(after.to_string())
+}
+
+fn methods(bench: &mut Bench) -> Got {
+    for method in crate::method::METHODS {
+        bench.accepted(SET_INTEGRATOR, &json!({"method": method, "timestep": 0.002}))?;
+        let values = bench.accepted(SET_INTEGRATOR, &json!({}))?;
+        same(&json!({"method": method, "timestep": 0.002}), &values, &["method", "timestep"])?;
+    }
+    Ok("all four".to_owned())
+}
+
+fn fields_alone(bench: &mut Bench) -> Got {
+    let values = bench.accepted(SET_INTEGRATOR, &json!({"method": "verlet"}))?;
+    same(&json!({"method": "verlet", "timestep": 0.001}), &values, &["method", "timestep"])?;
+    let values = bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.003}))?;
+    same(&json!({"method": "verlet", "timestep": 0.003}), &values, &["method", "timestep"])?;
+    Ok(values.to_string())
+}
+
+fn unknown_method(bench: &mut Bench) -> Got {
+    let status = bench.rejected(SET_INTEGRATOR, &json!({"method": "leapfrog"}))?.status;
+    let values = bench.accepted(SET_INTEGRATOR, &json!({}))?;
+    same(&json!({"method": "rk4"}), &values, &["method"])?;
+    Ok(status)
+}
+
+fn bad_timestep(bench: &mut Bench) -> Got {
+    bench.rejected(SET_INTEGRATOR, &json!({"timestep": 0}))?;
+    let status = bench.rejected(SET_INTEGRATOR, &json!({"timestep": -0.001}))?.status;
+    let values = bench.accepted(SET_INTEGRATOR, &json!({}))?;
+    same(&json!({"timestep": 0.001}), &values, &["timestep"])?;
+    Ok(status)
+}
+
+fn steps_by(bench: &mut Bench, method: &str) -> Got {
+    bench.swing()?;
+    bench.accepted(SET_INTEGRATOR, &json!({"method": method, "timestep": 0.01}))?;
+    let arm = Arm::of(bench.links, GRAVITY);
+    let steps = bench.follows(&arm, method, 0.01)?;
+    Ok(format!("{steps} steps of {method}"))
+}
+
+fn default_gravity(bench: &mut Bench) -> Got {
+    let values = bench.found()?.params.clone()?;
+    let gravity = number(&values, "gravity")?;
+    near("gravity", &[gravity], &[GRAVITY], 1e-9)?;
+    Ok(gravity.to_string())
+}
+
+fn query_params(bench: &mut Bench) -> Got {
+    let arm = bench.arm()?;
+    let is_positive = arm.masses.iter().chain(&arm.lengths).all(|value| *value > 0.0);
+    must(is_positive, || format!("masses {}, lengths {}", list(&arm.masses), list(&arm.lengths)))?;
+    is_query(bench, SET_PARAMS, &PARAMS)
+}
+
+fn params_alone(bench: &mut Bench) -> Got {
+    let mut expected = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(1.0)});
+    let changes = [("gravity", json!(5.0)), ("masses", json!(bench.each(1.5))), ("lengths", json!(bench.each(0.75)))];
+    for (name, value) in changes {
+        let mut request = json!({});
+        for object in [&mut request, &mut expected] {
+            if let Some(members) = object.as_object_mut() {
+                members.insert(name.to_owned(), value.clone());
+            }
+        }
+        let values = bench.accepted(SET_PARAMS, &request)?;
+        same(&expected, &values, &PARAMS)?;
+    }
+    Ok("each field alone".to_owned())
+}
+
+/// Passes if each request is rejected, and the parameters are then as expected.
+fn rejects_params(bench: &mut Bench, requests: &[Value], expected: &Value) -> Got {
+    let mut status = String::new();
+    for request in requests {
+        bench.set_gravity(GRAVITY)?;
+        status = bench.rejected(SET_PARAMS, request)?.status;
+        let values = bench.accepted(SET_PARAMS, &json!({}))?;
+        same(expected, &values, &PARAMS)?;
+    }
+    Ok(status)
+}
+
+fn wrong_length(bench: &mut Bench) -> Got {
+    let long = vec![1.0; bench.links + 1];
+    let requests = [
+        json!({"gravity": 2.5, "masses": [1.0]}),
+        json!({"gravity": 2.5, "masses": long}),
+        json!({"gravity": 2.5, "lengths": [2.0]}),
+        json!({"gravity": 2.5, "lengths": long}),
+    ];
+    let expected = json!({"gravity": 2.5, "masses": bench.each(1.0), "lengths": bench.each(1.0)});
+    rejects_params(bench, &requests, &expected)
+}
+
+fn not_positive(bench: &mut Bench) -> Got {
+    let with = |bad: f64| [bad, 1.0, 1.0].into_iter().take(bench.links).collect::<Vec<f64>>();
+    let requests = [
+        json!({"gravity": 2.5, "masses": with(0.0)}),
+        json!({"gravity": 2.5, "masses": with(-1.0)}),
+        json!({"gravity": 2.5, "lengths": with(0.0)}),
+        json!({"gravity": 2.5, "lengths": with(-1.0)}),
+    ];
+    let expected = json!({"gravity": 2.5, "masses": bench.each(1.0), "lengths": bench.each(1.0)});
+    rejects_params(bench, &requests, &expected)
+}
+
+fn negative_gravity(bench: &mut Bench) -> Got {
+    let request = json!({"gravity": -9.81, "masses": bench.each(2.0)});
+    let expected = json!({"gravity": 9.81, "masses": bench.each(2.0), "lengths": bench.each(1.0)});
+    rejects_params(bench, &[request], &expected)
+}
+
+fn rejected_echo(bench: &mut Bench) -> Got {
+    let answer = bench.rejected(SET_PARAMS, &json!({"gravity": -1.0, "lengths": bench.each(0.5)}))?;
+    let expected = json!({"gravity": 9.81, "masses": bench.each(1.0), "lengths": bench.each(0.5)});
+    same(&expected, &answer.values, &PARAMS)?;
+    Ok(answer.values.to_string())
+}
+
+/// An arm whose links are all different.
+pub(crate) fn uneven(links: usize) -> Arm {
+    let take = |values: [f64; 3]| values.into_iter().take(links).collect();
+    Arm { masses: take([1.4, 0.9, 0.6]), lengths: take([0.8, 1.1, 0.7]), gravity: 6.5 }
+}
+
+fn live_params(bench: &mut Bench) -> Got {
+    let arm = uneven(bench.links);
+    bench.set_arm(&arm)?;
+    bench.swing()?;
+    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
+    let steps = bench.follows(&arm, "rk4", 0.005)?;
+    Ok(format!("{steps} steps of that arm"))
+}
+
+fn no_gravity(bench: &mut Bench) -> Got {
+    bench.set_gravity(0.0)?;
+    let pose = bench.reset()?;
+    for joints in bench.joints_for(0.4)? {
+        near("position", &joints.position, &pose, 1e-9)?;
+    }
+    Ok("at rest".to_owned())
+}
+
+fn frozen(bench: &mut Bench) -> Got {
+    bench.swing()?;
+    bench.pause(true)?;
+    let states = bench.joints_for(0.4)?;
+    let first = states.first().ok_or("no joint states")?;
+    must(largest(&first.velocity) > 0.0, || "the arm was at rest before".to_owned())?;
+    for joints in &states {
+        near("position", &joints.position, &first.position, 1e-12)?;
+        near("velocity", &joints.velocity, &first.velocity, 1e-12)?;
+    }
+    Ok(format!("{} messages with one state", states.len()))
+}
+
+fn works_while_paused(bench: &mut Bench) -> Got {
+    bench.pause(true)?;
+    bench.accepted(SET_PARAMS, &json!({"gravity": 3.0}))?;
+    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.002}))?;
+    bench.set_gains(1.0, 0.0, 0.0)?;
+    bench.enable(true)?;
+    bench.integrate("t", [0.0, 0.0, 0.1], 2, "rk4")?;
+    bench.accepted("/ik/solve", &json!({"x": 1.0, "y": 0.5}))?;
+    bench.reset()?;
+    Ok("7 accepted calls".to_owned())
+}
+
+fn continues(bench: &mut Bench) -> Got {
+    bench.swing()?;
+    bench.accepted(SET_INTEGRATOR, &json!({"timestep": 0.005}))?;
+    bench.pause(true)?;
+    let frozen = bench.fresh()?;
+    sleep(Duration::from_millis(700));
+    let resumed = Instant::now();
+    bench.pause(false)?;
+    let after = bench.fresh()?;
+    // The arm can have moved for as long as it has been running again, with some room for its clock, not for longer.
+    let limit = (resumed.elapsed().as_secs_f64() + 0.2) / 0.005;
+    let arm = Arm::of(bench.links, GRAVITY);
+    let (mut own, mut steps) = (frozen.state(), 0);
+    while f64::from(steps) < limit {
+        if near("position", &after.position, &own.position, 1e-6).is_ok() {
+            must(steps > 0, || "the arm does not move again".to_owned())?;
+            return Ok(format!("{steps} steps after the frozen state"));
+        }
+        own = crate::method::step("rk4", &own, 0.0, 0.005, |_, q, v| arm.free_acceleration(q, v));
+        steps += 1;
+    }
+    Err(format!("{} does not follow from {} in {limit:.0} steps", list(&after.position), list(&frozen.position)))
+}
+
+fn query_pause(bench: &mut Bench) -> Got {
+    for paused in [true, false] {
+        bench.pause(paused)?;
+        for _ in 0..2 {
+            let data = boolean(&bench.accepted("/arm_sim/pause", &json!({}))?, "data")?;
+            must(data == paused, || format!("data {data} after data {paused}"))?;
+        }
+    }
+    Ok("data as it was set".to_owned())
+}
+
+fn integral_waits(bench: &mut Bench) -> Got {
+    let pose = bench.float(0.0, SMALL, 0.0)?;
+    bench.hold(&shifted(&pose, 1.0))?;
+    sleep(Duration::from_millis(500));
+    bench.pause(true)?;
+    let before = bench.fresh()?.effort;
+    sleep(Duration::from_secs(1));
+    bench.pause(false)?;
+    let after = bench.fresh()?.effort;
+    let grew = before.iter().zip(&after).all(|(before, after)| *before > 0.0 && *after < 1.7 * before);
+    must(grew, || format!("{} before, {} after", fine(&before), fine(&after)))?;
+    Ok(format!("{} before, {} after", fine(&before), fine(&after)))
+}
+
+fn fixed_pose(bench: &mut Bench) -> Got {
+    let mut answers = Vec::new();
+    for milliseconds in [0, 300] {
+        bench.swing()?;
+        sleep(Duration::from_millis(milliseconds));
+        let values = bench.accepted("/arm_sim/reset", &json!({}))?;
+        answers.push((numbers_of(&values, "position", bench.links)?, numbers_of(&values, "velocity", bench.links)?));
+    }
+    if let [(first, rate), (second, other)] = answers.as_slice() {
+        near("position", second, first, 1e-12)?;
+        near("velocity", other, rate, 1e-12)?;
+        return Ok(list(first));
+    }
+    Err("no answers".to_owned())
+}
+
+fn shows_pose(bench: &mut Bench) -> Got {
+    bench.swing()?;
+    bench.pause(true)?;
+    let pose = bench.reset()?;
+    let joints = bench.fresh()?;
+    near("position", &joints.position, &pose, 1e-9)?;
+    Ok(list(&joints.position))
+}
+
+fn resets_setpoint(bench: &mut Bench) -> Got {
+    let pose = bench.float(0.5, 0.0, 0.5)?;
+    bench.command(&json!([point(&shifted(&pose, 1.0), &bench.each(0.5))]))?;
+    sleep(Duration::from_millis(300));
+    bench.reset()?;
+    for joints in bench.joints_for(0.2)? {
+        near("effort", &joints.effort, &bench.each(0.0), 1e-6)?;
+        near("position", &joints.position, &pose, 1e-6)?;
+    }
+    Ok("no effort".to_owned())
+}
+
+fn resets_integral(bench: &mut Bench) -> Got {
+    let pose = bench.float(0.0, SMALL, 0.0)?;
+    bench.hold(&shifted(&pose, 1.0))?;
+    sleep(Duration::from_millis(700));
+    let before = bench.fresh()?.effort;
+    must(before.iter().all(|effort| *effort > 0.2 * SMALL), || format!("the integral does not grow: effort {}", fine(&before)))?;
+    bench.reset()?;
+    let after = bench.fresh()?.effort;
+    must(largest(&after) < 0.01 * SMALL, || format!("effort {} after {}", fine(&after), fine(&before)))?;
+    Ok(format!("effort {} after {}", fine(&after), fine(&before)))
+}
+
+fn zero_clock(bench: &mut Bench) -> Got {
+    sleep(Duration::from_millis(1200));
+    bench.reset()?;
+    let stamp = bench.fresh()?.stamp;
+    // Wall time counts from 1970.
+    must(!(1.0..1e9).contains(&stamp), || format!("{stamp} s"))?;
+    Ok(format!("{stamp:.3} s"))
+}

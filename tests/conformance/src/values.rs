@@ -1,0 +1,116 @@
+//! Reading answers and comparing numbers; every failure is a sentence.
+
+use serde_json::Value;
+
+use crate::peer::beginning;
+
+/// The member at a path such as `points/0/positions`.
+///
+/// # Errors
+/// If there is none.
+pub fn member<'a>(value: &'a Value, path: &str) -> Result<&'a Value, String> {
+    value.pointer(&format!("/{path}")).ok_or_else(|| format!("no {path} in {}", beginning(&value.to_string())))
+}
+
+/// The finite number at a path.
+///
+/// # Errors
+/// If there is none.
+pub fn number(value: &Value, path: &str) -> Result<f64, String> {
+    let found = member(value, path)?;
+    found.as_f64().filter(|number| number.is_finite()).ok_or_else(|| format!("{path} is no number: {}", beginning(&found.to_string())))
+}
+
+/// The boolean at a path.
+///
+/// # Errors
+/// If there is none.
+pub fn boolean(value: &Value, path: &str) -> Result<bool, String> {
+    let found = member(value, path)?;
+    found.as_bool().ok_or_else(|| format!("{path} is no boolean: {}", beginning(&found.to_string())))
+}
+
+/// The text at a path.
+///
+/// # Errors
+/// If there is none.
+pub fn text<'a>(value: &'a Value, path: &str) -> Result<&'a str, String> {
+    let found = member(value, path)?;
+    found.as_str().ok_or_else(|| format!("{path} is no text: {}", beginning(&found.to_string())))
+}
+
+/// The array of finite numbers at a path.
+///
+/// # Errors
+/// If there is none.
+pub fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, String> {
+    let found = member(value, path)?;
+    let entries = found.as_array().ok_or_else(|| format!("{path} is no array: {}", beginning(&found.to_string())))?;
+    let mut numbers = Vec::with_capacity(entries.len());
+    for (at, entry) in entries.iter().enumerate() {
+        let number = entry.as_f64().filter(|number| number.is_finite());
+        numbers.push(number.ok_or_else(|| format!("{path}[{at}] is no number: {}", beginning(&entry.to_string())))?);
+    }
+    Ok(numbers)
+}
+
+/// The array of `count` finite numbers at a path.
+///
+/// # Errors
+/// If there is none, or one of another length.
+pub fn numbers_of(value: &Value, path: &str, count: usize) -> Result<Vec<f64>, String> {
+    let found = numbers(value, path)?;
+    if found.len() == count { Ok(found) } else { Err(format!("{path} has {} entries instead of {count}", found.len())) }
+}
+
+/// Passes if both have one length and no entry differs by more than `tolerance`, relative to 1 plus its size.
+///
+/// # Errors
+/// With the first entry that differs.
+pub fn near(name: &str, got: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
+    if got.len() != expected.len() {
+        return Err(format!("{name} has {} entries instead of {}", got.len(), expected.len()));
+    }
+    for (at, (one, other)) in got.iter().zip(expected).enumerate() {
+        // `NaN` is not near to anything.
+        let is_near = (one - other).abs() <= tolerance * (1.0 + other.abs());
+        if !is_near {
+            return Err(format!("{name}[{at}] is {one:.9} instead of {other:.9}"));
+        }
+    }
+    Ok(())
+}
+
+/// Passes if the condition holds.
+///
+/// # Errors
+/// With the sentence if not.
+pub fn must(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(otherwise()) }
+}
+
+/// The largest absolute value; infinite if one is not a number.
+#[must_use]
+pub fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |largest: f64, value| if value.is_nan() { f64::INFINITY } else { largest.max(value.abs()) })
+}
+
+/// Entry by entry.
+#[must_use]
+pub fn minus(left: &[f64], right: &[f64]) -> Vec<f64> {
+    left.iter().zip(right).map(|(left, right)| left - right).collect()
+}
+
+/// Numbers for a reader.
+#[must_use]
+pub fn list(values: &[f64]) -> String {
+    let shown: Vec<String> = values.iter().map(|value| format!("{value:.4}")).collect();
+    format!("[{}]", shown.join(", "))
+}
+
+/// Small numbers for a reader.
+#[must_use]
+pub fn fine(values: &[f64]) -> String {
+    let shown: Vec<String> = values.iter().map(|value| format!("{value:.3e}")).collect();
+    format!("[{}]", shown.join(", "))
+}
