@@ -81,6 +81,55 @@ fn a_message_that_does_not_end_is_given_up_after_a_minute() {
     });
 }
 
+/// One read brings a message, a ping, and the first bytes of the message that does not end; or a message alone, in
+/// parts, after which the client may be silent.
+#[test]
+fn a_message_that_begins_behind_another_has_its_minute_too() {
+    in_virtual_time(async {
+        let message = json!({"op": "unsubscribe", "topic": "/t"}).to_string();
+        let (begin, end) = message.as_bytes().split_at(5);
+        let mut whole = [frame_head(0x01, begin.len()), begin.to_vec()].concat();
+        whole.extend(
+            [
+                frame_head(0x89, 0),
+                frame_head(0x80, end.len()),
+                end.to_vec(),
+            ]
+            .concat(),
+        );
+        for (behind, is_late) in [
+            (frame_head(0x81, 70_000), true),
+            (Vec::new(), false),
+            (frame_head(0x89, 0), false),
+        ] {
+            let gateway = Gateway::bare().await;
+            let mut socket = open(&gateway, WIDE).await;
+            let bytes = [whole.as_slice(), &behind].concat();
+            socket.stream().write_all(&bytes).await.unwrap();
+            let began = Instant::now();
+            // A sign of life for each ping: a byte of the message, or else a pong.
+            let life = if is_late {
+                vec![b' ']
+            } else {
+                frame_head(0x8a, 0)
+            };
+            let answered = async {
+                while let Ok(event @ (Event::Ping(_) | Event::Pong(_))) = socket.next_event().await
+                {
+                    if matches!(event, Event::Ping(_)) {
+                        socket.stream().write_all(&life).await.unwrap();
+                    }
+                }
+            };
+            let ended = timeout(2 * FRAME_TIME, answered).await;
+            assert_eq!(ended.is_ok(), is_late, "{behind:?}");
+            if is_late {
+                assert_elapsed(began, FRAME_TIME);
+            }
+        }
+    });
+}
+
 /// Its first part has come with the last byte of the message before it.
 #[test]
 fn at_the_runtimes_end_the_client_gets_what_it_is_owed_and_a_close_frame() {

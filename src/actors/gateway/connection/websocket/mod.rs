@@ -214,7 +214,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
 
     /// A message has come.
     fn begin(&mut self, message: Bytes, chunk: &mut BytesMut) {
-        self.link.socket.borrow_mut().get_mut().complete();
         self.spent = (message.len() > SHORT).then(|| message.clone());
         self.take(OneLine::new(message), chunk);
     }
@@ -265,10 +264,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
                 Some(Ok(Message::Binary(bytes))) => self.begin(bytes, chunk),
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
                 // it.
-                Some(Ok(control)) => {
-                    let mut socket = self.link.socket.borrow_mut();
-                    socket.get_mut().control(control.len());
-                }
+                Some(Ok(_)) => self.link.socket.borrow_mut().get_mut().control(),
                 // The peer has closed, and takes no answers any more.
                 None => return Err(io::ErrorKind::ConnectionAborted.into()),
                 Some(Err(error)) => {
