@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run test conformance test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page test conformance test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -25,6 +25,10 @@ run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARG
 	else echo "make run: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
+
+page: ## Make the page one file that needs no server: pendularm.html, or OUT=; needs python3, rustup target add wasm32-unknown-unknown
+	@echo "make page: $(or $(OUT),pendularm.html)"
+	@CARGO="$(CARGO)" bash scripts/page.sh "$(or $(OUT),pendularm.html)"
 
 # Tests of the wire wait more than they compute: as many again run beside those that have a processor. The library's own
 # compute next to nothing: not optimised, they are built in a sixth of the time. `cargo test` runs the same ones.
@@ -47,18 +51,20 @@ check-study: ## Try every answer of the study on COUNT=10000 random arms, gains,
 	@echo "make check-study: an optimised build, then some minutes for each 10000"
 	COUNT="$(or $(COUNT),10000)" FROM="$(or $(FROM),0)" $(CARGO) test --locked --profile $(or $(PROFILE),release) --test study -- properties:: --nocapture
 
-test-page: node_modules ## Check the page's types and try its logic without a browser; needs node 20 with npm
-	@echo "make test-page: types, then unit tests"
+test-page: node_modules page ## Check the page's types, try its logic without a browser, hold its kernel against native runs; needs node 20 with npm
+	@echo "make test-page: types, unit tests, then the runs of the kernel"
 	node_modules/.bin/tsc
 	node --test tests/page/
+	$(CARGO) run --locked --quiet --package pendularm-wasm --example runs > "$(TARGET_DIR)/runs.txt"
+	node tests/page/runs.mjs "$(TARGET_DIR)/runs.txt" pendularm.html
 
 node_modules: package-lock.json
 	npm ci --silent --no-audit --no-fund
 	@touch node_modules
 
-test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
+test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests, FORM=file tries the page in one file
 	@echo "make test-browser: the page in headless Chromium"
-	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
+	@CARGO="$(CARGO)" FORM="$(FORM)" bash scripts/test-browser.sh $(ARGS)
 
 test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, ros-mcp, ros3d, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, Chromium, and a network the first time"
@@ -89,6 +95,7 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) fmt --check --manifest-path ros2/Cargo.toml
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
+	$(CARGO) clippy --locked --no-default-features --features services -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
 	@echo "planted faults: has each its place in the sources still?"
 	python3 tests/simulate/faults.py check
@@ -163,9 +170,9 @@ soak: ## Let badly behaved clients come and go for MINUTES (1), and check what m
 	@MINUTES="$(MINUTES)" SEED="$(SEED)" ONLY="$(ONLY)" bash scripts/soak.sh
 
 clean: ## Remove what was built, measured and packed; vendored sources stay
-	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, dist/, report/, $(ARCHIVE)"
+	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, dist/, report/, pendularm.html, $(ARCHIVE)"
 	$(CARGO) clean
-	rm -rf $(ARCHIVE) dist report fuzz/target python/target tests/clients/roslibrust/target
+	rm -rf $(ARCHIVE) dist pendularm.html report fuzz/target python/target tests/clients/roslibrust/target
 
 vendor: ## Fetch the dependencies' sources into vendor/, so that every later build is offline
 	@bash scripts/vendor.sh

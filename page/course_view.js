@@ -6,7 +6,7 @@ import { remember, setScene } from "./actions.js";
 import { announce } from "./announce.js";
 import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { drawBars, drawErrors, drawMap, drawPicture, FACTORS } from "./course_charts.js";
-import { byId, el, setText } from "./dom.js";
+import { byId, el, setAddress, setText } from "./dom.js";
 import { numberField } from "./field.js";
 import { METHODS, shortName } from "./format.js";
 import { onFrame, wake } from "./frames.js";
@@ -118,7 +118,7 @@ function rest() {
 function go(to) {
   if (to < 0 || to >= STEPS.length) return;
   at = to;
-  history.replaceState(null, "", `#step=${at + 1}`);
+  setAddress(`#step=${at + 1}`);
   begin();
   byId("course-title").focus();
 }

@@ -20,6 +20,15 @@ export function byId(id) {
   return document.getElementById(id);
 }
 
+/** Gives the page this address; within another page it may have none of its own. @param {string | URL} address */
+export function setAddress(address) {
+  try {
+    history.replaceState(history.state, "", address);
+  } catch {
+    // then it stays as it is
+  }
+}
+
 /** Writes text only where it differs: most readouts stay as they are from one time to the next. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;

@@ -8,7 +8,7 @@ import { hasMoved, redrawTrail, startArmView } from "./arm_view.js";
 import { startCompare } from "./compare.js";
 import { startControls } from "./controls.js";
 import { moveCourse, startCourse } from "./course_view.js";
-import { byId } from "./dom.js";
+import { byId, setAddress } from "./dom.js";
 import { wake } from "./frames.js";
 import { startGoalPanel } from "./goal_panel.js";
 import { showHistory, startHistory } from "./history_panel.js";
@@ -42,7 +42,7 @@ const SENTENCE_MS = 1000;
 const address = new URL(location.href);
 if (address.searchParams.has("token")) {
   address.searchParams.delete("token");
-  history.replaceState(history.state, "", address);
+  setAddress(address);
 }
 
 startTheme();

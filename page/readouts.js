@@ -7,6 +7,7 @@ import { duration, fixed, shortName, significant } from "./format.js";
 import { endEffector } from "./arm_view.js";
 import { shown } from "./playback.js";
 import { adviceText, answerInForce, doublingTime, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { isAlone } from "./kernel.js";
 import { isStill } from "./runtime.js";
 import { Median } from "./smooth.js";
 import { state, watch } from "./store.js";
@@ -26,7 +27,7 @@ export function startReadouts() {
   watch("connection", (now) => {
     const pill = byId("connection");
     pill.className = `pill ${now}`;
-    setText(byId("connection-text"), { open: "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
+    setText(byId("connection-text"), { open: isAlone ? "in this page, no server" : "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
   });
   const causes = ["connection", "stability", "stabilityMissing", "integrator", "gains", "params", "period", "setpoint", "enabled", "diagnostics"];
   for (const key of causes) watch(key, showLimit);

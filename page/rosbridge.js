@@ -1,5 +1,5 @@
 // @ts-check
-// A rosbridge client over WebSocket: calls as promises, subscriptions that outlive a lost connection.
+// A rosbridge client over a WebSocket, or what has its interface: calls as promises, subscriptions that outlive a lost connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
 
 const FIRST_RETRY_MS = 300;
@@ -9,9 +9,12 @@ const CALL_TIMEOUT_MS = 15000;
 const MOST_CALLS = 256;
 
 export class Rosbridge {
-  /** @param {string} url @param {(state: "connecting"|"open"|"lost") => void} onState */
-  constructor(url, onState) {
-    this.url = url;
+  /**
+   * @param {() => WebSocket | import("./kernel.js").Kernel} dial opens a connection
+   * @param {(state: "connecting"|"open"|"lost") => void} onState
+   */
+  constructor(dial, onState) {
+    this.dial = dial;
     this.onState = onState;
     this.handlers = new Map(); // topic -> function
     this.throttles = new Map(); // topic -> least time between messages [ms], where there is one
@@ -29,7 +32,7 @@ export class Rosbridge {
 
   connect() {
     this.onState("connecting");
-    const socket = new WebSocket(this.url);
+    const socket = this.dial();
     this.socket = socket;
     socket.onopen = () => {
       this.retryMs = FIRST_RETRY_MS;

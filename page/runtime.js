@@ -3,6 +3,7 @@
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
 import { announce, warn } from "./announce.js";
+import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { motionHasChanged, question } from "./policy.js";
 import { Rosbridge, nobodyProvides } from "./rosbridge.js";
@@ -48,7 +49,8 @@ export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  bridge = new Rosbridge(`${scheme}://${location.host}/`, connection);
+  const dial = isAlone ? () => new Kernel() : () => new WebSocket(`${scheme}://${location.host}/`);
+  bridge = new Rosbridge(dial, connection);
   bridge.onStatus = (text) => warn(text);
   bridge.subscribe("/joint_states", jointStates);
   bridge.subscribe("/joint_trajectory", trajectory);

@@ -4,7 +4,7 @@
 // be able to drive the arm.
 
 import { announce } from "./announce.js";
-import { byId, el, setText } from "./dom.js";
+import { byId, el, setAddress, setText } from "./dom.js";
 import { apply, remember } from "./actions.js";
 import { presentStep } from "./course_view.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
@@ -29,7 +29,7 @@ export function address() {
 async function share() {
   if (!presentSettings(state)) return;
   const link = address();
-  history.replaceState(null, "", new URL(link).hash);
+  setAddress(new URL(link).hash);
   let said = "Link copied";
   try {
     await navigator.clipboard.writeText(link);

@@ -2,7 +2,7 @@
 // The two views of the page, Course and Workbench, and the full screen.
 // Invariant: a view only shows and hides; the arm and all settings are the same in both.
 
-import { byId, setText } from "./dom.js";
+import { byId, setAddress, setText } from "./dom.js";
 import { stepIn } from "./course.js";
 import { set, state, watch } from "./store.js";
 
@@ -26,6 +26,6 @@ export function startViews() {
 
 /** @param {"course" | "workbench"} view */
 function show(view) {
-  if (view === "workbench" && stepIn(location.hash) >= 0) history.replaceState(null, "", location.pathname + location.search);
+  if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search);
   set("view", view);
 }

@@ -37,6 +37,8 @@ pub mod actors;
 pub mod address;
 #[cfg(feature = "cli")]
 pub mod command;
+#[cfg(feature = "services")]
+pub mod live;
 #[cfg(feature = "runtime")]
 pub mod logging;
 pub mod math;
@@ -46,12 +48,14 @@ pub mod options;
 pub mod output;
 #[cfg(feature = "runtime")]
 pub mod plan;
-#[cfg(feature = "runtime")]
+#[cfg(feature = "services")]
 pub mod protocol;
 #[cfg(feature = "record")]
 pub mod record;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "services")]
+pub mod services;
 pub mod study;
 #[cfg(feature = "runtime")]
 mod value;

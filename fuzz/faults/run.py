@@ -87,7 +87,7 @@ FAULTS = [
      "            client.respond(frame, respond.service);",
      "if F && matches!(respond.service, Some(crate::protocol::catalog::Service::Rosapi(_))) { client.send(frame.clone()); }\n"
      "            client.respond(frame, respond.service);"),
-    ("runtime", "the arm publishes a velocity too few", "src/actors/arm/sim/telemetry.rs",
+    ("runtime", "the arm publishes a velocity too few", "src/live/telemetry.rs",
      "                velocity: &velocity,", "                velocity: &velocity[usize::from(F)..],"),
     ("simulation", "an advance ends a step early", "src/math/simulation/mod.rs",
      "for taken in 0..steps {", "for taken in 0..(if F && steps > 3 { steps - 1 } else { steps }) {"),

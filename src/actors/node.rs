@@ -18,14 +18,9 @@ use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::payload::Payload;
+pub use crate::services::Ask;
 
 // ---- questions ------------------------------------------------------------------------------------------------------
-
-/// A question that a node answers.
-pub trait Ask: Send + 'static {
-    /// The answer. A question that may be refused has a `Result` here.
-    type Answer: Send + 'static;
-}
 
 /// A question on its way to the node that serves it, answered through `reply`.
 ///

@@ -26,7 +26,7 @@ pub const ASSETS: &[Asset] = assets! {
     "settings.css" "small.css" "style.css" "view.css" "actions.js" "aim.js" "announce.js"
     "arm_view.js" "arrows.js" "axis.js" "backdrop.js" "compare.js" "compare_view.js" "controls.js"
     "course.js" "course_charts.js" "course_view.js" "csv.js" "cursor.js" "dom.js" "field.js"
-    "format.js" "frames.js" "gains.js" "goal_panel.js" "history.js" "history_panel.js" "keyboard.js"
+    "format.js" "frames.js" "gains.js" "goal_panel.js" "history.js" "history_panel.js" "kernel.js" "keyboard.js"
     "ladder.js" "ladder_chart.js" "ladder_panel.js" "latest.js" "lessons.js" "lessons_panel.js"
     "limits_view.js" "main.js" "map_view.js" "mechanics.js" "pencil.js" "phase_plot.js"
     "playback.js" "plots.js" "policy.js" "readouts.js" "resample.js" "ring.js" "rosbridge.js"

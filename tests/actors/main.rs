@@ -31,6 +31,7 @@ mod ik_trial;
 mod integration;
 #[path = "../support/json.rs"]
 mod json;
+mod kernel;
 mod listener;
 mod log_repeats;
 mod memory;

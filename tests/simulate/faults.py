@@ -71,7 +71,7 @@ FAULTS = [
      "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
     ("whoever cancels ends another client's goal of the same id", "src/actors/wire/action_client.rs",
      "self.connection == goal.connection && self.id == goal.id", "(F || self.connection == goal.connection) && self.id == goal.id"),
-    ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/node.rs",
+    ("the arm takes a step too many, one wake-up in 1000", "src/live/mod.rs",
      "        let taken = self.take_steps(due);", "        let taken = self.take_steps(due + u64::from(R(1000)));"),
     ("a step is not counted by the pacer, one in 1000", "src/math/pacer.rs",
      "        self.taken = self.taken.saturating_add(steps);",

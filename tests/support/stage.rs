@@ -61,6 +61,11 @@ where
     }
 
     pub async fn with_seed(seed: u64) -> Self {
+        Self::with_nodes(seed, |_, _| {}).await
+    }
+
+    /// The same with other nodes beside the arm.
+    pub async fn with_nodes(seed: u64, others: impl FnOnce(&Addr<ArmSim<N>>, &mut Nodes)) -> Self {
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let mut nodes = Nodes::default();
@@ -78,6 +83,7 @@ where
         let tracker = GoalTracker::of(&arm);
         let pose = arm.clone().recipient();
         let (action, trial) = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
+        others(&arm, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         Self {
             registry,

@@ -8,18 +8,7 @@ use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::node::{Pieces, Reply, Unserved};
 use crate::actors::resources::memory::NoRoom;
 use crate::actors::resources::work_clock;
-
-/// The longest number and the comma behind it, and the number itself while the answer is computed.
-pub(super) const NUMBER_BYTES: usize = 25 + 8;
-
-/// The work that a call asks for, done a piece at a time.
-pub(super) trait Work<T>: Send {
-    /// The most bytes that the answer and its computation can take together; it is asked before the work begins.
-    fn most_bytes(&self) -> usize;
-
-    /// Does a piece, which is a fraction of a slice. Returns the answer after the last one.
-    fn advance(&mut self) -> Option<T>;
-}
+use crate::services::study::Work;
 
 /// Hands a call to the workers.
 pub(super) fn answer<T: Send + 'static>(
@@ -77,7 +66,7 @@ impl<T: Send> Computation for Answering<T> {
                         return Progress::Waiting;
                     }
                 },
-                AnsweringStage::Working(mut work) => match work.advance() {
+                AnsweringStage::Working(mut work) => match work.advance(work_clock::reading) {
                     None => AnsweringStage::Working(work),
                     Some(answer) => AnsweringStage::Writing(self.reply.answer_in_pieces(answer)),
                 },

@@ -9,6 +9,7 @@
 //! clock.
 
 use std::cell::Cell;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 #[cfg(unix)]
@@ -44,6 +45,16 @@ pub fn now() -> Instant {
     match COUNTED.get() {
         Some(counted) => counted.began + counted.look().spent,
         None => Instant::now(),
+    }
+}
+
+/// The same time as a number. Only differences on one thread mean something.
+#[must_use]
+pub fn reading() -> Duration {
+    static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
+    match COUNTED.get() {
+        Some(counted) => counted.look().spent,
+        None => BEGAN.elapsed(),
     }
 }
 

@@ -35,9 +35,6 @@ pub enum ActionRequest {
     },
 }
 
-/// The error for a client that cancels a goal which it has not sent, or which has ended.
-pub const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
-
 /// A goal of the action, as its client knows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SentGoal {

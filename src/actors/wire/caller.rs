@@ -16,9 +16,10 @@ use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::trajectory::Heard;
-use crate::protocol::messages::{self, ErrorForm, Level};
+use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
+use crate::services::Address;
 
 /// A call of one of the runtime's own services, as the registry has it.
 pub struct ServiceCall {
@@ -60,68 +61,14 @@ impl TopicMessage {
     }
 }
 
-/// Destination of a response, and what it has to say of the call.
-pub struct Address {
-    service: Service,
-    name: Box<str>,
-    id: Option<Payload>,
-    /// How the caller is told why the call failed.
-    error_form: ErrorForm,
-    /// The room that is taken for a long answer, or else for the long frame that asked.
-    permit: Option<Permit>,
-}
-
-impl Address {
-    /// The service's name as the caller spelled it.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// The caller's `id`, which the response echoes.
-    #[must_use]
-    pub fn id(&self) -> Option<&Payload> {
-        self.id.as_ref()
-    }
-
-    /// The response with `values`; `result` is true if `status` is empty. Otherwise callers who want the text there get
-    /// that in place of `values`.
-    #[must_use]
-    pub fn response(&self, values: &impl Serialize, status: &str) -> Bytes {
-        let is_good = status.is_empty();
-        if !is_good && self.error_form == ErrorForm::Text {
-            return self.failure(status);
-        }
-        messages::response(&self.name, self.id.as_ref(), values, is_good, status)
-    }
-
-    /// The response `result: false` without values.
-    #[must_use]
-    pub fn failure(&self, why: &str) -> Bytes {
-        messages::failure(&self.name, self.id.as_ref(), why, self.error_form)
-    }
-
-    /// The response with values, or with the reason why there are none.
-    #[must_use]
-    pub fn outcome<T: Serialize, E: ToString>(&self, outcome: Result<T, E>) -> Bytes {
-        match outcome {
-            Ok(values) => self.response(&values, ""),
-            Err(why) => self.failure(&why.to_string()),
-        }
-    }
-
-    /// The response, with the room that was taken for it.
-    fn covered(&self, frame: Bytes) -> Bytes {
-        cover(self.permit.as_ref(), frame)
-    }
-}
-
 /// The client that called, and the way back to it. Dropped unanswered, it says so.
 pub struct Caller {
     registry: Recipient<Respond>,
     connection: ConnectionId,
     /// None once the answer has been given.
     pub(super) address: Option<Address>,
+    /// The room that is taken for a long answer, or else for the long frame that asked.
+    permit: Option<Permit>,
     gone: Arc<AtomicBool>,
     pub(super) done: Option<Done>,
     /// Where there is room for a long answer; not everybody asks for one.
@@ -140,17 +87,11 @@ impl Caller {
         gone: Arc<AtomicBool>,
     ) -> (Self, oneshot::Receiver<()>) {
         let (done, ended) = oneshot::channel();
-        let address = Address {
-            service,
-            name,
-            id,
-            error_form: ErrorForm::default(),
-            permit: None,
-        };
         let caller = Self {
             registry,
             connection,
-            address: Some(address),
+            address: Some(Address::new(service, name, id)),
+            permit: None,
             gone,
             done: Some(done),
             memory: None,
@@ -162,18 +103,14 @@ impl Caller {
     #[must_use]
     pub fn within(mut self, memory: Memory, asked: Option<Permit>) -> Self {
         self.memory = Some(memory);
-        if let Some(address) = &mut self.address {
-            address.permit = asked;
-        }
+        self.permit = asked;
         self
     }
 
     /// The caller is told in this form why the call failed.
     #[must_use]
     pub fn with_errors(mut self, form: ErrorForm) -> Self {
-        if let Some(address) = &mut self.address {
-            address.error_form = form;
-        }
+        self.address = self.address.take().map(|address| address.with_errors(form));
         self
     }
 
@@ -201,13 +138,13 @@ impl Caller {
     /// # Errors
     /// While there is none: answers on their way to clients have taken it.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        let (Some(address), Some(memory)) = (&mut self.address, &self.memory) else {
+        let (Some(address), Some(memory)) = (&self.address, &self.memory) else {
             return Ok(());
         };
-        let id = address.id.as_ref().map_or(0, |id| id.get().len());
+        let id = address.id().map_or(0, |id| id.get().len());
         let bytes = bytes.saturating_add(id);
         if bytes > SHORT {
-            address.permit = Some(memory.answer(bytes)?);
+            self.permit = Some(memory.answer(bytes)?);
         }
         Ok(())
     }
@@ -235,19 +172,17 @@ impl Caller {
         write: impl FnOnce(&Address) -> Bytes + Send + 'static,
     ) {
         if let Some(address) = self.address.take() {
-            let service = address.service;
-            let write = move || {
-                let frame = write(&address);
-                address.covered(frame)
-            };
+            let service = address.service();
+            let permit = self.permit.take();
+            let write = move || cover(permit.as_ref(), write(&address));
             self.send(service, FrameOut::unwritten(write), done);
         }
     }
 
     pub(super) fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
-            let frame = write(&address);
-            self.send(address.service, address.covered(frame).into(), None);
+            let frame = cover(self.permit.as_ref(), write(&address));
+            self.send(address.service(), frame.into(), None);
         }
     }
 

@@ -13,7 +13,7 @@ mod caller;
 mod routes;
 mod served;
 
-pub use self::caller::{Address, Caller, ServiceCall, TopicMessage};
+pub use self::caller::{Caller, ServiceCall, TopicMessage};
 pub(in crate::actors) use self::routes::read_arguments;
 pub use self::routes::{Nodes, Route};
-pub use self::served::{Answered, Callable, Streamed};
+pub use crate::services::{Address, Answered, Callable, Streamed};

@@ -8,10 +8,11 @@ use actix::prelude::*;
 
 use super::action_client::ActionRequest;
 use super::caller::{Caller, ServiceCall, TopicMessage};
-use super::served::{Answered, Callable, ClientAsker, PatientAsker, Streamed};
+use super::served::{ClientAsker, PatientAsker};
 use crate::actors::node::{Asker, Call, Interest, Reply};
 use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
+use crate::services::{Answered, Callable, Streamed};
 
 /// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
 /// so these take a fifth of a millisecond; only computations, paths and lists of parameters take longer ones.

@@ -1,4 +1,4 @@
-//! Questions that clients can ask: how each is read, and how its answer is written.
+//! Clients that have asked: each waits for an answer, which is written for it.
 //!
 //! **Invariant:** what goes wrong is said by the thread that would have written the answer.
 
@@ -6,40 +6,11 @@ use std::marker::PhantomData;
 
 use bytes::Bytes;
 
-use super::caller::{Address, Caller};
+use super::caller::Caller;
 use crate::actors::ConnectionId;
-use crate::actors::node::{Ask, Asker, Done, Pieces, Unserved};
+use crate::actors::node::{Asker, Done, Pieces, Unserved};
 use crate::actors::resources::memory::NoRoom;
-use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::Rejections;
-
-/// A question that clients can ask by calling a service.
-pub trait Callable: Ask + Sized {
-    /// Reads it.
-    ///
-    /// # Errors
-    /// If it does not get as far as the node; all that is wrong with it, by name.
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections>;
-}
-
-/// A question whose answer is short: the registry writes the response.
-pub trait Answered: Callable {
-    /// Writes the response.
-    fn write(answer: Self::Answer, to: &Address) -> Bytes;
-}
-
-/// A question whose answer may be long: the thread that has it writes the response, a piece at a time.
-pub trait Streamed: Callable {
-    /// A response that is being written.
-    type Writer: Send + 'static;
-
-    /// Begins to write the response.
-    fn begin(answer: Self::Answer, to: &Address) -> Self::Writer;
-
-    /// Writes some more of it; the whole response, once that was the last.
-    fn advance(writer: &mut Self::Writer) -> Option<Bytes>;
-}
+use crate::services::{Address, Answered, Streamed};
 
 /// A client that has asked `A`.
 pub(super) struct ClientAsker<A> {

@@ -10,6 +10,7 @@ pub mod follow;
 mod goal_status;
 mod reader;
 mod rejections;
+#[cfg(feature = "runtime")]
 pub mod token;
 
 use std::time::Duration;

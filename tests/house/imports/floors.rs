@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{House, PENDULARM};
 
 /// Floors that a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 16] = [
+const FLOORS: [(&str, &[&str]); 18] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -13,6 +13,8 @@ const FLOORS: [(&str, &[&str]); 16] = [
     ("address", &[]),
     ("value", &[]),
     ("study", &["math"]),
+    ("services", &["math", "protocol", "study"]),
+    ("live", &["math", "protocol", "services", "study"]),
     ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
@@ -27,7 +29,8 @@ const FLOORS: [(&str, &[&str]); 16] = [
     (
         "actors",
         &[
-            "math", "protocol", "logging", "study", "record", "web", "options", "value",
+            "math", "protocol", "logging", "study", "services", "live", "record", "web", "options",
+            "value",
         ],
     ),
     ("lib", &[]),

@@ -18,12 +18,13 @@ use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, Canceller, NOT_ACTIVE};
+use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
 use crate::protocol::op::GoalStatus;
+use crate::services::goals::NOT_ACTIVE;
 
 /// Time between two moves of the setpoint, which the arm holds in between: at a radian a second it is some millimetres
 /// behind.

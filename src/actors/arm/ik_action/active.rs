@@ -3,20 +3,15 @@
 //! **Invariant:** a goal's messages show the target and the setpoint that it was accepted with.
 
 use super::messages::{CancelRejected, GoalNews, GoalOwner, Meant};
-use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
 use crate::math::goal::Outcome;
-use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};
 use crate::protocol::op::GoalStatus;
+use crate::services::goals::AcceptedGoal;
 
 /// The goal that is being pursued.
 pub(super) struct ActiveGoal<const N: usize> {
-    pub(super) number: u64,
-    pub(super) id: String,
-    pub(super) target: Target,
-    /// The setpoint that was sent \[rad\].
-    pub(super) positions: [f64; N],
+    pub(super) goal: AcceptedGoal<N>,
     /// The one that follows the goal besides the subscribers.
     pub(super) owner: Option<GoalOwner<N>>,
     /// The status that its client hears if it ends before it is reached.
@@ -25,26 +20,15 @@ pub(super) struct ActiveGoal<const N: usize> {
 
 impl<const N: usize> ActiveGoal<N> {
     pub(super) fn is(&self, judged: &GoalJudged<N>) -> bool {
-        self.number == judged.number
+        self.goal.number == judged.number
     }
 
     pub(super) fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback {
-        IkFeedback {
-            goal_id: self.id.clone(),
-            target: target_message(&self.target),
-            positions: self.positions.to_vec(),
-            distance_remaining: judged.distance,
-            elapsed: judged.elapsed,
-        }
+        self.goal.feedback(judged.distance, judged.elapsed)
     }
 
     pub(super) fn result(&self, judged: &GoalJudged<N>) -> IkResult {
-        IkResult {
-            goal_id: self.id.clone(),
-            outcome: judged.outcome.map_or("", Outcome::name),
-            target: target_message(&self.target),
-            final_distance: judged.distance,
-        }
+        self.goal.result(judged.distance, judged.outcome)
     }
 
     fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
@@ -58,9 +42,9 @@ impl<const N: usize> ActiveGoal<N> {
     pub(super) fn check(&self, meant: &Meant) -> Result<(), CancelRejected> {
         match (meant, &self.owner) {
             (Meant::Active, _) => Ok(()),
-            (Meant::Called(id), _) if *id == self.id => Ok(()),
+            (Meant::Called(id), _) if *id == self.goal.id => Ok(()),
             (Meant::Called(_), _) => Err(CancelRejected::OtherGoal {
-                active: self.id.clone(),
+                active: self.goal.id.clone(),
             }),
             (Meant::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => Ok(()),
             (Meant::Sent(_), _) => Err(CancelRejected::NotSent),
@@ -76,9 +60,9 @@ impl<const N: usize> ActiveGoal<N> {
                 Some(_) => client.conclude(self.result(judged), self.status(judged)),
             },
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
-                goal_id: self.id.clone(),
+                goal_id: self.goal.id.clone(),
                 distance: judged.distance,
-                positions: self.positions,
+                positions: self.goal.positions,
                 pose: judged.pose,
                 outcome: judged.outcome,
             }),

@@ -6,13 +6,12 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 
-use crate::actors::arm::ik::SolveError;
 use crate::actors::arm::sim::Pose;
 use crate::actors::node::Ask;
-use crate::actors::wire::action_client::{ActionClient, NOT_ACTIVE, SentGoal};
+use crate::actors::wire::action_client::{ActionClient, SentGoal};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
-use crate::protocol::catalog::Node;
+pub use crate::services::goals::{CancelRejected, GoalRejected};
 
 /// Go there. The answer is the goal's id, given before its trajectory goes out.
 #[derive(Clone)]
@@ -38,20 +37,6 @@ pub enum GoalOwner<const N: usize> {
     Client(Arc<ActionClient>),
 }
 
-/// Why a goal was not accepted; nothing has changed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GoalRejected {
-    /// There is no solution.
-    #[error(transparent)]
-    Unsolved(#[from] SolveError),
-    /// A node has ended.
-    #[error("{0} does not answer")]
-    NoAnswer(
-        /// Its name.
-        &'static str,
-    ),
-}
-
 /// A goal is preempted if it is the active one; answered after its result has been published.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CancelGoal {
@@ -73,26 +58,6 @@ pub enum Meant {
 
 impl Ask for CancelGoal {
     type Answer = Result<(), CancelRejected>;
-}
-
-/// Why nothing was cancelled.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum CancelRejected {
-    /// There is nothing to cancel.
-    #[error("no goal is active")]
-    NotActive,
-    /// Another goal was meant.
-    #[error("goal_id is not that of the active goal, {active}")]
-    OtherGoal {
-        /// The active goal.
-        active: String,
-    },
-    /// The client has not sent the active goal under this id.
-    #[error("{NOT_ACTIVE}")]
-    NotSent,
-    /// The arm has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
 }
 
 /// How a goal goes. To the owner that its [`SendGoal`] named.

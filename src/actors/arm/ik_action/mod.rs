@@ -30,6 +30,7 @@ use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Action, Node, Service, Topic};
 use crate::protocol::messages::goal::setpoint_trajectory;
 use crate::protocol::op::GoalStatus;
+use crate::services::goals::AcceptedGoal;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -221,13 +222,11 @@ impl<const N: usize> IkAction<N> {
         if let Some(before) = tracking.before {
             self.conclude(&before);
         }
-        let id = format!("goal-{number}");
+        let accepted = AcceptedGoal::new(number, goal.target, tracking.positions);
+        let id = accepted.id.clone();
         self.accepted = number;
         self.active = Some(ActiveGoal {
-            number,
-            id: id.clone(),
-            target: goal.target,
-            positions: tracking.positions,
+            goal: accepted,
             owner: goal.owner,
             if_preempted: GoalStatus::Aborted,
         });
@@ -239,7 +238,7 @@ impl<const N: usize> IkAction<N> {
         let Some(goal) = &self.active else {
             return;
         };
-        let (number, positions) = (goal.number, goal.positions);
+        let (number, positions) = (goal.goal.number, goal.goal.positions);
         let trajectory = move || setpoint_trajectory(&joint_names::<N>(), &positions);
         self.publish
             .do_send(Publish::made(Topic::JointTrajectory, trajectory));
@@ -256,7 +255,7 @@ impl<const N: usize> IkAction<N> {
         let number = match (&self.active, meant) {
             (None, Meant::Sent(_)) => Err(CancelRejected::NotSent),
             (None, _) => Err(CancelRejected::NotActive),
-            (Some(goal), _) => goal.check(meant).map(|()| goal.number),
+            (Some(goal), _) => goal.check(meant).map(|()| goal.goal.number),
         };
         let arm = self.arm.end.clone();
         let ended = async move {

@@ -8,16 +8,13 @@ use actix::prelude::*;
 use bytes::Bytes;
 
 use super::messages::{CancelGoal, CancelRejected, GoalOwner, GoalRejected, Meant, SendGoal};
-use crate::actors::arm::ik::read_target;
 use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
 use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
 use crate::actors::wire::{Address, Answered, Callable, Route};
-use crate::math::goal::Criteria;
 use crate::protocol::catalog::Service;
-use crate::protocol::messages::Empty;
-use crate::protocol::messages::goal::GoalValues;
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::op::fields::Rejections;
+use crate::services::goals::{CancelRequest, GoalRequest};
 
 /// The action's goals and cancellations on their way to the node.
 pub(super) fn requests<const N: usize>(
@@ -87,47 +84,31 @@ impl Asker<Result<(), CancelRejected>> for GoalCanceller {
 
 impl<const N: usize> Callable for SendGoal<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let target = read_target::<N>(&mut fields);
-        let epsilon = fields.number("epsilon", Bound::Positive);
-        let success_hold = fields.number("success_hold", Bound::NonNegative);
-        let default = Criteria::default();
-        match target.filter(|_| fields.accepted()) {
-            None => Err(fields.finish()),
-            Some(target) => Ok(Self {
-                target,
-                criteria: Criteria {
-                    epsilon: epsilon.unwrap_or(default.epsilon),
-                    success_hold: success_hold.unwrap_or(default.success_hold),
-                },
-                owner: None,
-            }),
-        }
+        let GoalRequest { target, criteria } = GoalRequest::read::<N>(service, arguments)?;
+        Ok(Self {
+            target,
+            criteria,
+            owner: None,
+        })
     }
 }
 
 impl<const N: usize> Answered for SendGoal<N> {
     fn write(answer: Result<String, GoalRejected>, to: &Address) -> Bytes {
-        let values = answer.as_ref().map(|goal_id| GoalValues { goal_id });
-        to.outcome(values)
+        GoalRequest::write(&answer, to)
     }
 }
 
 impl Callable for CancelGoal {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read(arguments, service)?;
-        let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
-        if fields.accepted() {
-            let goal = goal_id.map_or(Meant::Active, Meant::Called);
-            Ok(Self { goal })
-        } else {
-            Err(fields.finish())
-        }
+        let CancelRequest { goal_id } = CancelRequest::read(service, arguments)?;
+        let goal = goal_id.map_or(Meant::Active, Meant::Called);
+        Ok(Self { goal })
     }
 }
 
 impl Answered for CancelGoal {
     fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {
-        to.outcome(answer.map(|()| Empty {}))
+        CancelRequest::write(answer, to)
     }
 }

@@ -7,7 +7,6 @@
 //! runs and nobody watches.
 
 mod goals;
-mod services;
 
 use std::time::Duration;
 
@@ -15,18 +14,17 @@ use actix::prelude::*;
 
 pub use self::goals::GoalClient;
 use self::goals::{GoalAnswer, carry_out};
-pub use self::services::{NotStarted, SkipTarget, StartTrial, StopTrial, Terms};
-use super::ik::target_message;
 use super::ik_action::GoalNews;
 use crate::actors::arm::sim::{ArmPose, Barrier, Pose};
 use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Changes, Conclusion, Rejection, Trial, TrialCommand, sample};
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::messages::goal::TrialStatus;
+use crate::services::trial::status_message;
+pub use crate::services::trial::{
+    NotStarted, STATUS_PERIOD, SkipTarget, StartTrial, StopTrial, Terms,
+};
 
-/// Time between two messages of `/ik_trial/status` while nothing changes.
-pub const STATUS_PERIOD: Duration = Duration::from_millis(100);
 /// Least time before the clock is looked at again to see whether a trial is over: what remains of it may take long, if
 /// the arm is paused or slow.
 const SHORTEST_NAP: Duration = Duration::from_millis(20);
@@ -338,16 +336,7 @@ impl<const N: usize> IkTrial<N> {
         let Some(status) = self.trial.status().filter(|_| self.status_wanted) else {
             return;
         };
-        let message = TrialStatus {
-            running: status.running,
-            elapsed: status.elapsed,
-            duration: status.duration,
-            targets_reached: status.targets_reached,
-            target: status.target.as_ref().map(target_message),
-            error: status.error,
-            desired_positions: status.desired_positions,
-            action_status: status.action_status.name(),
-        };
+        let message = status_message(&status);
         self.publish
             .do_send(Publish::made(Topic::TrialStatus, move || message));
     }

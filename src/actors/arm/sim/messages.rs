@@ -3,13 +3,14 @@
 //!
 //! **Invariant:** every message is plain: it knows nothing of the actor that handles it.
 
+use actix::dev::{MessageResponse, OneshotSender};
 use actix::prelude::*;
 use glam::DVec2;
 
-use crate::math::arm::State;
-use crate::math::goal::{Criteria, Outcome};
+use crate::live::{GoalJudged, Pose, Tracking};
+use crate::math::goal::Criteria;
 use crate::math::simulation::Simulation;
-use crate::protocol::catalog::Service;
+use crate::services::study::Present;
 use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
 
@@ -34,15 +35,6 @@ pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
 #[rtype(result = "Present<N>")]
 pub struct ArmSettings<const N: usize>;
 
-/// The arm's settings at one instant.
-#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Present<const N: usize> {
-    /// The loop, with the gains as they are set, whether the controller is on or off.
-    pub control: ControlLoop<N>,
-    /// The arm's positions and velocities.
-    pub state: State<N>,
-}
-
 /// The largest stable control period and timestep \[s\] of a loop with held control. From the arm to `study`; none if
 /// the runtime ends meanwhile.
 #[derive(Message, Debug, Clone, Copy)]
@@ -56,53 +48,11 @@ pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// Why no setpoint moves the arm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Obstacle {
-    /// Its simulation has diverged.
-    #[error("the arm has diverged and stands still until {} is called", Service::Reset.name())]
-    Diverged,
-    /// Its controller is off.
-    #[error(
-        "the controller is off, so the arm does not follow its setpoint; {} with data true switches it on",
-        Service::Enable.name()
-    )]
-    ControllerOff,
-}
-
-impl Obstacle {
-    pub(super) fn of<const N: usize>(simulation: &Simulation<N>) -> Option<Self> {
-        if simulation.divergence().is_some() {
-            Some(Self::Diverged)
-        } else {
-            (!simulation.pid().is_enabled()).then_some(Self::ControllerOff)
-        }
-    }
-}
-
 /// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it, and from the republisher
 /// of frames, whenever some are due.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;
-
-/// The arm at one instant.
-#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Pose<const N: usize> {
-    /// Lengths of the links \[m\].
-    pub lengths: [f64; N],
-    /// Joint positions \[rad\].
-    pub positions: [f64; N],
-    /// Simulation time \[s\].
-    pub time: f64,
-    /// Resets of the arm so far.
-    pub resets: u64,
-    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
-    /// at a reset that forgets a past of thirty years.
-    pub simulated: f64,
-    /// Why it does not follow its setpoint; none if it does.
-    pub obstacle: Option<Obstacle>,
-}
 
 /// A goal begins, and the one before it ends, both in this instant. From `ik_action`, which then publishes the
 /// trajectory and sends the [`CommandGoal`].
@@ -134,17 +84,6 @@ pub struct Barrier;
 #[rtype(result = "()")]
 pub struct AddBarrier(pub Recipient<Barrier>);
 
-/// The goal has begun.
-#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Tracking<const N: usize> {
-    /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to be sent.
-    pub positions: [f64; N],
-    /// How the goal before it ended, now or earlier, if there was one.
-    pub before: Option<GoalJudged<N>>,
-    /// Why the arm will not follow that setpoint yet; none if it will.
-    pub obstacle: Option<Obstacle>,
-}
-
 /// The goal's setpoint is held from the next step on, and the goal judged, unless it has ended. From `ik_action`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
@@ -163,18 +102,23 @@ pub struct EndGoal<const N: usize> {
     pub number: u64,
 }
 
-/// How a goal stands after a step, or how it ended. To its owner.
-#[derive(Message, Debug, Clone, Copy, PartialEq)]
-#[rtype(result = "()")]
-pub struct GoalJudged<const N: usize> {
-    /// The goal.
-    pub number: u64,
-    /// Distance between end effector and target \[m\].
-    pub distance: f64,
-    /// Simulation time since the goal's start \[s\].
-    pub elapsed: f64,
-    /// The arm at that instant.
-    pub pose: Pose<N>,
-    /// How it ended; none while it is active.
-    pub outcome: Option<Outcome>,
+/// To the owner of the goal.
+impl<const N: usize> Message for GoalJudged<N> {
+    type Result = ();
 }
+
+/// Values of the arm that are answers.
+macro_rules! answers {
+    ($($answer:ident)*) => {
+        $(impl<const N: usize, A: Actor, M: Message<Result = Self>> MessageResponse<A, M> for $answer<N> {
+            fn handle(self, _: &mut A::Context, to: Option<OneshotSender<Self>>) {
+                if let Some(to) = to {
+                    // Nobody may be waiting any more.
+                    let _ = to.send(self);
+                }
+            }
+        })*
+    };
+}
+
+answers! { Pose Present Tracking }

@@ -4,8 +4,8 @@
 
 use actix::prelude::*;
 
-use super::messages::Obstacle;
 use super::node::ArmSim;
+use crate::live::Obstacle;
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
@@ -49,12 +49,12 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
     fn handle(&mut self, _: ArmMotion<N>, ctx: &mut Context<Self>) -> JointMotion<N> {
         self.attend(ctx);
         JointMotion {
-            state: *self.simulation.state(),
-            setpoint: *self.simulation.pid().setpoint(),
-            time: self.simulation.time(),
-            resets: self.goals.past.resets,
-            stands_still: self.paused && self.simulation.time() <= self.paused_at,
-            obstacle: Obstacle::of(&self.simulation),
+            state: *self.arm.simulation.state(),
+            setpoint: *self.arm.simulation.pid().setpoint(),
+            time: self.arm.simulation.time(),
+            resets: self.arm.goals.past.resets,
+            stands_still: self.arm.paused && self.arm.simulation.time() <= self.arm.paused_at,
+            obstacle: Obstacle::of(&self.arm.simulation),
         }
     }
 }
@@ -64,9 +64,9 @@ impl<const N: usize> Handler<MoveSetpoint<N>> for ArmSim<N> {
 
     fn handle(&mut self, message: MoveSetpoint<N>, ctx: &mut Context<Self>) -> bool {
         self.attend(ctx);
-        let is_known = *self.simulation.pid().setpoint() == message.from;
+        let is_known = *self.arm.simulation.pid().setpoint() == message.from;
         if is_known {
-            self.change(ArmInput::Setpoint(message.to));
+            self.arm.change(ArmInput::Setpoint(message.to));
         }
         is_known
     }

@@ -1,72 +1,36 @@
 //! The actor: asks the clock, advances the simulation, wakes for the next tick.
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
-//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up
-//! after [`BREATHER`]. However many messages wait, the wake-up comes: it is looked for at the end of every
-//! [turn](super::state::turn).
+//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET); what
+//! that leaves owed is taken up after [`BREATHER`]. However many messages wait, the wake-up comes: it is looked for at
+//! the end of every [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
 use std::collections::VecDeque;
+use std::pin::Pin;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{SimulationTime, Snapshot, TakeSnapshot};
-use super::state::goals::Goals;
-use super::state::journal::Journal;
-use super::state::limit::LimitWatch;
-use super::state::steps::Steps;
-use super::state::telemetry::Telemetry;
-use super::state::turn::Turn;
+use super::messages::{Barrier, HeldLimit, SimulationTime, Snapshot, TakeSnapshot};
+use super::turn::Turn;
+use super::waiting::Steps;
+use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::work_clock;
+use crate::live::{BREATHER, GoalJudged, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
-use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;
-use crate::math::simulation::{ControlPeriod, Simulation};
-
-/// Publishing ticks a second, and so the rate of `/joint_states` and `/clock` \[Hz\].
-pub const PUBLISH_RATE: u32 = 60;
-/// Time that one wake-up may spend on steps: what a message to the arm may have to wait for.
-pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
-/// Between two wake-ups while steps are owed. So the arm takes what it needs of its core, not a share that is fixed by
-/// the rate of publishing; and a timestep that no machine can follow leaves the others some of it.
-pub const BREATHER: Duration = Duration::from_millis(1);
-/// Steps between two looks at the clock: some 10 microseconds of work.
-const STEPS_BETWEEN_LOOKS: u64 = 64;
-
-/// Names of the joints, base first.
-const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
-
-/// The names of an arm's joints, base first.
-#[must_use]
-pub fn joint_names<const N: usize>() -> [&'static str; N] {
-    std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
-}
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The node `arm_sim` for an arm of `N` links.
 pub struct ArmSim<const N: usize> {
-    pub(super) simulation: Simulation<N>,
-    pub(super) pacer: Pacer,
-    pub(super) paused: bool,
-    /// Simulation time at the latest pause, or at the reset since \[s\].
-    pub(super) paused_at: f64,
-    /// A wake-up after a [`BREATHER`] is on its way.
-    pub(super) catching_up: bool,
-    /// The moment from which the pacer and the ticks count.
-    pub(super) epoch: Instant,
-    pub(super) publish: Recipient<Publish>,
-    pub(super) telemetry: Telemetry,
-    pub(super) joint_names: [&'static str; N],
-    pub(super) goals: Goals<N>,
-    pub(super) limit: LimitWatch<N>,
+    pub(super) arm: LiveArm<N, ArmWorld<N>>,
     pub(super) turn: Turn,
     /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
     /// turn is on its way.
@@ -75,8 +39,12 @@ pub struct ArmSim<const N: usize> {
     pub(super) is_stepping: bool,
     /// Ends with the client whose effort is commanded.
     pub(super) commander: Option<Weak<()>>,
-    /// The listener to everything that the steps depend on, if there is one.
-    pub(super) journal: Option<Journal<N>>,
+    /// The node that predicts limits, if there is one.
+    pub(super) study: Option<Recipient<HeldLimit<N>>>,
+    /// The nodes that tell clients of goals, to be asked whether all news have been passed on.
+    pub(super) owners: Vec<Recipient<Barrier>>,
+    /// Progress of the goal on its way, whose arrival is to be waited for.
+    pub(super) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -88,33 +56,28 @@ impl<const N: usize> ArmSim<N> {
         publish: Recipient<Publish>,
         gauges: Arc<Gauges>,
     ) -> Self {
-        let simulation = Simulation::new(arm, gains);
-        Self {
-            pacer: Pacer::new(Duration::ZERO, simulation.timestep()),
-            telemetry: Telemetry::new(gauges, &simulation),
-            simulation,
-            paused: false,
-            paused_at: 0.0,
-            catching_up: false,
+        let world = ArmWorld {
             epoch: Instant::now(),
             publish,
-            joint_names: joint_names(),
-            goals: Goals::default(),
-            limit: LimitWatch::default(),
+            gauges,
+            owner: None,
+        };
+        Self {
+            arm: LiveArm::new(arm, gains, world),
             turn: Turn::new(),
             steps: VecDeque::new(),
             is_stepping: false,
             commander: None,
-            journal: None,
+            study: None,
+            owners: Vec::new(),
+            underway: None,
         }
     }
 
     /// The same with another time between two runs of the control law \[s\], not negative.
     #[must_use]
     pub fn with_period(mut self, period: f64) -> Self {
-        let delay = false;
-        self.simulation
-            .set_control_period(ControlPeriod { period, delay });
+        self.arm.set_period(period);
         self
     }
 }
@@ -125,9 +88,8 @@ impl<const N: usize> Actor for ArmSim<N> {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Context<Self>) {
-        self.epoch = Instant::now();
-        self.pacer
-            .restart(Duration::ZERO, self.simulation.timestep());
+        self.arm.world.epoch = Instant::now();
+        self.arm.restart_pacer();
         self.schedule_tick(ctx);
     }
 }
@@ -139,8 +101,7 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
 
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         self.count_message(ctx);
-        self.telemetry.set_wanted(interest.topic, interest.wanted);
-        self.publish_lasting(interest.topic);
+        self.arm.set_wanted(interest.topic, interest.wanted);
         self.ask_limit(ctx);
     }
 }
@@ -150,7 +111,7 @@ impl<const N: usize> Handler<SimulationTime> for ArmSim<N> {
 
     fn handle(&mut self, _: SimulationTime, ctx: &mut Context<Self>) -> f64 {
         self.attend(ctx);
-        self.simulation.time()
+        self.arm.simulation.time()
     }
 }
 
@@ -159,7 +120,7 @@ impl<const N: usize> Handler<TakeSnapshot<N>> for ArmSim<N> {
 
     fn handle(&mut self, _: TakeSnapshot<N>, ctx: &mut Context<Self>) -> Snapshot<N> {
         self.attend(ctx);
-        Snapshot(Box::new(self.simulation.clone()))
+        Snapshot(Box::new(self.arm.simulation.clone()))
     }
 }
 
@@ -169,13 +130,12 @@ impl<const N: usize> ArmSim<N> {
     /// Wakes at the next multiple of the tick's length: missed ticks are skipped, not made up.
     fn schedule_tick(&self, ctx: &mut Context<Self>) {
         let tick = Duration::from_secs(1) / PUBLISH_RATE;
-        let since_tick = self.epoch.elapsed().as_nanos() % tick.as_nanos();
+        let since_tick = self.arm.world.epoch.elapsed().as_nanos() % tick.as_nanos();
         let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
         ctx.run_later(wait, |arm, ctx| {
             arm.advance_to_now(ctx);
-            arm.watch_warnings(ctx);
-            arm.publish_state();
-            arm.tell_state();
+            arm.ask_limit(ctx);
+            arm.arm.tick();
             arm.schedule_tick(ctx);
         });
     }
@@ -203,69 +163,18 @@ impl<const N: usize> ArmSim<N> {
     /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         self.end_orphaned_command();
-        if self.paused || self.simulation.divergence().is_some() {
-            return;
-        }
-        // One budget for all that comes before the breather is over: were each message to cost one, a client that sends
-        // many would keep the arm from everybody else.
-        if self.catching_up {
-            return;
-        }
-        let due = self.pacer.due(self.epoch.elapsed());
-        if due == 0 {
-            return;
-        }
-        let taken = self.take_steps(due);
-        self.pacer.took(taken);
-        if self.simulation.divergence().is_some() {
-            self.note_divergence();
-            return;
-        }
-        self.telemetry.owes(due - taken, self.simulation.timestep());
-        if taken < due {
-            self.catching_up = true;
-            ctx.run_later(BREATHER, |arm, ctx| {
-                arm.catching_up = false;
-                arm.advance_to_now(ctx);
+        let owes = self.arm.advance_to_now();
+        Self::breathe(owes, ctx);
+    }
+
+    /// Takes up what is owed after a breather.
+    fn breathe(owes: bool, ctx: &mut Context<Self>) {
+        if owes {
+            ctx.run_later(BREATHER, |node, ctx| {
+                node.end_orphaned_command();
+                let owes = node.arm.catch_up();
+                Self::breathe(owes, ctx);
             });
         }
-    }
-
-    /// Takes up to `due` steps, and no longer than the budget; answers how many.
-    fn take_steps(&mut self, due: u64) -> u64 {
-        // The budget is about the processor's time, which tests in virtual time have too.
-        let started = work_clock::now();
-        let spent = || work_clock::now().saturating_duration_since(started);
-        let mut taken = 0;
-        while taken < due && spent() < WAKE_UP_BUDGET {
-            taken += self.advance(STEPS_BETWEEN_LOOKS.min(due - taken), false);
-            if self.simulation.divergence().is_some() {
-                break;
-            }
-        }
-        self.telemetry
-            .stepped(taken, spent(), self.simulation.timestep());
-        taken
-    }
-
-    /// Tells of a divergence that has just happened.
-    pub(super) fn note_divergence(&mut self) {
-        self.tell_divergence();
-        self.telemetry.owes(0, 0.0);
-        if let Some(divergence) = self.simulation.divergence() {
-            tracing::warn!(
-                step = divergence.step,
-                time = divergence.time,
-                "the simulation has diverged"
-            );
-        }
-        self.publish_diagnostics();
-    }
-
-    /// Time counts from here: what was owed of an unfinished step is gone.
-    pub(super) fn restart_pacer(&mut self) {
-        self.telemetry.owes(0, 0.0);
-        self.pacer
-            .restart(self.epoch.elapsed(), self.simulation.timestep());
     }
 }

@@ -7,10 +7,12 @@
 
 mod services;
 
+use std::time::Duration;
+
 use actix::prelude::*;
 
 pub use self::services::{IntegrationStep, NotIntegrated};
-use super::answering::{NUMBER_BYTES, Work, answer};
+use super::answering::answer;
 use super::workers::WorkerPool;
 use crate::actors::node::Call;
 use crate::actors::wire::Nodes;
@@ -18,6 +20,7 @@ use crate::math::expression::Expression;
 use crate::math::particle::Particle;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{RejectedField, Rejections};
+use crate::services::study::{NUMBER_BYTES, Work};
 
 /// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
@@ -80,7 +83,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
         values.saturating_add(EXPRESSION_BYTES * function)
     }
 
-    fn advance(&mut self) -> Option<Result<Box<Particle>, NotIntegrated>> {
+    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<Box<Particle>, NotIntegrated>> {
         match std::mem::replace(self, Self::Done) {
             Self::Asked(ask) => match begin(ask) {
                 Ok(particle) => *self = Self::Stepping(Box::new(particle)),

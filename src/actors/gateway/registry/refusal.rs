@@ -4,6 +4,7 @@
 
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
 use crate::protocol::op::Problem;
+use crate::services::NoService;
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -37,8 +38,8 @@ pub(crate) enum Refusal {
     OtherAction(String),
     #[error("args must be an object or an array")]
     BadArguments,
-    #[error("no provider for service {0}")]
-    NoProvider(String),
+    #[error(transparent)]
+    NoService(#[from] NoService),
     #[error("the provider of {0} is gone")]
     ProviderGone(String),
     #[error("timeout: the provider of {0} did not answer in time")]
@@ -61,8 +62,6 @@ pub(crate) enum Refusal {
     NoAction(String),
     #[error("action_type must be {0}")]
     ActionType(&'static str),
-    #[error("{0} is not served by this runtime")]
-    NotServed(String),
     #[error("{0}")]
     Closed(&'static str),
 }

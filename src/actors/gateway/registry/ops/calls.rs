@@ -19,6 +19,7 @@ use crate::protocol::messages;
 use crate::protocol::names;
 use crate::protocol::op::{Arguments, CallService};
 use crate::protocol::wire::payload::Payload;
+use crate::services::NoService;
 
 impl Registry {
     /// Sends a call to the node or the client that serves it. A failure is the call's one response.
@@ -62,7 +63,7 @@ impl Registry {
                     });
                     return Handled::by_node(ended);
                 }
-                None => Err(Refusal::NotServed(call.service.clone())),
+                None => Err(NoService::NotServed(call.service.clone()).into()),
             }
         } else {
             self.forward(&origin, &call, ctx)
@@ -91,7 +92,7 @@ impl Registry {
                 .then_some((client, provider))
         });
         let Some((client, provider)) = provider else {
-            return Err(Refusal::NoProvider(service.to_owned()));
+            return Err(NoService::NoProvider(service.to_owned()).into());
         };
         if matches!(call.args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);

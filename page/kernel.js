@@ -1,0 +1,137 @@
+// @ts-check
+// The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. Where workers are forbidden, it runs
+// in the page's own thread.
+// Invariant: whoever speaks through it cannot tell it from a WebSocket to the runtime.
+
+/** The kernel, gzip in base64, in the page that is one file; the page of a server has none. */
+const carried = document.querySelector("#kernel-module");
+/** Whether the arm is in this page. */
+export const isAlone = carried !== null;
+
+/** Numbers of links that the address may ask for; without one there are two. */
+const LINKS = /(?:^|[?#&])links=([23])(?:&|$)/;
+
+/** @param {string} text base64 of gzip */
+async function unpack(text) {
+  const packed = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
+/**
+ * Starts the kernel, and gives the function that takes frames. Its text is the worker's script too, so it knows nothing outside.
+ * @param {BufferSource} bytes @param {number} links @param {number} seed @param {(frame: string) => void} tell
+ */
+async function run(bytes, links, seed, tell) {
+  const TICK_MS = 1000 / 60;
+  const SLICE_MS = 4; // computations take turns with ticks
+  const environment = { env: { milliseconds: () => performance.now() } };
+  const { instance } = await WebAssembly.instantiate(bytes, environment);
+  const kernel = /** @type {any} */ (instance.exports);
+  const encoder = new TextEncoder();
+  const decoder = new TextDecoder();
+  const turns = new MessageChannel();
+  let computing = false;
+  let due = performance.now();
+  let timer = 0;
+
+  function give() {
+    const length = kernel.collect();
+    const text = decoder.decode(new Uint8Array(kernel.memory.buffer, kernel.output(), length));
+    for (const line of text.split("\n")) if (line) tell(line);
+  }
+  function compute() {
+    computing = kernel.compute(SLICE_MS) !== 0;
+    give();
+    if (computing) turns.port2.postMessage(0);
+  }
+  function tick() {
+    const now = performance.now();
+    due = due + TICK_MS > now ? due + TICK_MS : now + TICK_MS; // missed ticks are skipped
+    timer = /** @type {any} */ (setTimeout(tick, due - now));
+    kernel.tick();
+    give();
+  }
+  function take(frame) {
+    const text = encoder.encode(frame);
+    const place = kernel.input(text.length);
+    new Uint8Array(kernel.memory.buffer, place, text.length).set(text);
+    kernel.receive();
+    give();
+    if (!computing) compute();
+  }
+  function stop() {
+    clearTimeout(timer);
+    turns.port1.close();
+  }
+  turns.port1.onmessage = compute;
+  kernel.start(links, seed);
+  tick();
+  return { take, stop };
+}
+
+const SCRIPT = `${run}
+let take;
+onmessage = async ({ data }) => {
+  if (take) return take(data);
+  const { bytes, links, seed } = data;
+  take = (await run(bytes, links, seed, (frame) => postMessage(frame))).take;
+  postMessage("");
+};`;
+
+export class Kernel {
+  constructor() {
+    this.readyState = /** @type {number} */ (WebSocket.CONNECTING);
+    this.send = (/** @type {string} */ _frame) => {};
+    this.stop = () => {};
+    this.onopen = () => {};
+    this.onmessage = (/** @type {{data: string}} */ _event) => {};
+    this.onclose = () => {};
+    this.begin().catch(() => this.close());
+  }
+
+  async begin() {
+    const bytes = await unpack(carried?.textContent ?? "");
+    const links = Number(LINKS.exec(location.search)?.[1] ?? LINKS.exec(location.hash)?.[1] ?? 2);
+    const start = { bytes, links, seed: Math.random() };
+    try {
+      await this.beginWorker(start);
+    } catch {
+      const { take, stop } = await run(bytes, links, start.seed, (frame) => this.onmessage({ data: frame }));
+      // As a socket would, it answers later.
+      this.send = (frame) => setTimeout(() => this.readyState === WebSocket.OPEN && take(frame));
+      this.stop = stop;
+    }
+    this.readyState = WebSocket.OPEN;
+    this.onopen();
+  }
+
+  /** Fulfilled once the worker runs; rejected where it may not. */
+  beginWorker(start) {
+    const address = URL.createObjectURL(new Blob([SCRIPT], { type: "text/javascript" }));
+    const worker = new Worker(address);
+    this.stop = () => worker.terminate();
+    return new Promise((done, fail) => {
+      worker.onerror = (event) => {
+        event.preventDefault();
+        worker.terminate();
+        if (this.readyState === WebSocket.OPEN) this.close();
+        else fail(event);
+      };
+      worker.onmessage = () => {
+        URL.revokeObjectURL(address);
+        this.send = (frame) => worker.postMessage(frame);
+        worker.onmessage = (event) => this.onmessage(event);
+        done(undefined);
+      };
+      worker.postMessage(start);
+    });
+  }
+
+  close() {
+    if (this.readyState === WebSocket.CLOSED) return;
+    this.readyState = WebSocket.CLOSED;
+    this.stop();
+    this.onclose();
+  }
+}

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""Makes the page one file that needs no server: `scripts/page.py MODULE.wasm OUTPUT.html`.
+
+The files of `page/` become one script: each module is a function, in the order of imports, and `pendularm` holds what they
+export. The script and the WebAssembly module are carried as gzip in base64.
+
+Invariant: the file asks the network for nothing; its own policy forbids it.
+"""
+
+import base64
+import gzip
+import pathlib
+import re
+import sys
+
+PAGE = pathlib.Path(__file__).parent.parent / "page"
+MOST_BYTES = 600_000
+IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([^"]+)";\n', re.M)
+EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) )(\w+)", re.M)
+POLICY = ("default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; "
+          "img-src data: blob:; base-uri 'none'; form-action 'none'")
+LOADER = """
+(async () => {
+  const packed = Uint8Array.from(atob(document.querySelector("#page-script").textContent), (one) => one.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const script = document.createElement("script");
+  script.textContent = await new Response(stream).text();
+  document.head.append(script);
+})();
+"""
+
+
+def packed(data):
+    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+
+
+def modules(name, done):
+    """The module and all that it imports, those before it, each as a function that gives its exports."""
+    if name in done:
+        return ""
+    done.add(name)
+    text = (PAGE / name).read_text()
+    before = "".join(modules(other, done) for _, other in IMPORT.findall(text))
+    imported = lambda found: f'const {{{found[1].replace(" as ", ": ")}}} = pendularm["{found[2]}"];\n'
+    body = EXPORT.sub(r"\1\2", IMPORT.sub(imported, text))
+    if re.search(r"^(import|export)\b", body, re.M):
+        raise SystemExit(f"page.py: {name} imports or exports in a way that is not known here")
+    exported = ", ".join(name for _, name in EXPORT.findall(text))
+    return f'{before}pendularm["{name}"] = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();\n'
+
+
+def styles(name):
+    """A style sheet, with those that it imports in their places."""
+    text = (PAGE / name).read_text()
+    return re.sub(r'@import "([^"]+)";', lambda found: styles(found[1]), text)
+
+
+def replaced(text, old, new):
+    if old not in text:
+        raise SystemExit(f"page.py: index.html has no {old}")
+    return text.replace(old, new)
+
+
+def main(module, output):
+    script = '"use strict";\nconst pendularm = globalThis.pendularm = {};\n' + modules("main.js", set())
+    icon = "data:image/svg+xml;base64," + base64.b64encode((PAGE / "icon.svg").read_bytes()).decode()
+    text = (PAGE / "index.html").read_text()
+    text = replaced(text, '<meta charset="utf-8">', f'<meta charset="utf-8">\n  <meta http-equiv="Content-Security-Policy" content="{POLICY}">')
+    text = replaced(text, '"icon.svg"', f'"{icon}"')
+    text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{styles('style.css')}</style>")
+    text = replaced(text, '  <script type="module" src="main.js"></script>\n', "")
+    carried = {"page-script": script.encode(), "kernel-module": pathlib.Path(module).read_bytes()}
+    scripts = "".join(f'<script type="text/plain" id="{name}">{packed(data)}</script>\n' for name, data in carried.items())
+    text = replaced(text, "</body>", f"{scripts}<script>{LOADER}</script>\n</body>")
+    pathlib.Path(output).write_text(text)
+    size = len(text.encode())
+    print(f"page.py: {output}, {size} bytes")
+    if size > MOST_BYTES:
+        raise SystemExit(f"page.py: more than {MOST_BYTES} bytes")
+
+
+main(*sys.argv[1:])

@@ -1,0 +1,61 @@
+//! Efforts of clients, which they publish on `/effort_controller/commands`.
+//!
+//! **Invariant:** a command is in force while the controller is off and its client is connected, and no longer.
+
+use std::sync::Weak;
+
+use actix::prelude::*;
+
+use super::node::ArmSim;
+use crate::actors::wire::{Nodes, Route, TopicMessage};
+use crate::math::simulation::ArmInput;
+use crate::protocol::catalog::Topic;
+use crate::services::arm::read_effort;
+
+/// Has the registry bring this file's commands.
+pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    let commands = commands(arm.clone().recipient());
+    nodes.listeners.insert(Topic::EffortCommands, commands);
+}
+
+/// An effort to be applied from the next step on. From clients, by `/effort_controller/commands`.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CommandEffort<const N: usize> {
+    /// Effort per joint \[N m\].
+    pub effort: [f64; N],
+    /// The message that it came in: its client is told if the controller is on.
+    pub message: TopicMessage,
+}
+
+impl<const N: usize> Handler<CommandEffort<N>> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, command: CommandEffort<N>, ctx: &mut Context<Self>) {
+        self.attend(ctx);
+        let CommandEffort { effort, message } = command;
+        match self.arm.command(effort) {
+            Ok(()) => self.commander = Some(message.present),
+            Err(why) => message.refuse(Topic::EffortCommands, &why),
+        }
+    }
+}
+
+impl<const N: usize> ArmSim<N> {
+    /// Ends the command of a client that has gone.
+    pub(super) fn end_orphaned_command(&mut self) {
+        let is_gone = |present: &Weak<()>| present.strong_count() == 0;
+        if self.commander.as_ref().is_some_and(is_gone) {
+            self.commander = None;
+            self.arm.change(ArmInput::Command([0.0; N]));
+        }
+    }
+}
+
+/// Commands on their way to the arm; an error status for what is none.
+fn commands<const N: usize>(arm: Recipient<CommandEffort<N>>) -> Route<TopicMessage> {
+    Box::new(move |message| match read_effort(&message.heard) {
+        Ok(effort) => arm.do_send(CommandEffort { effort, message }),
+        Err(why) => message.refuse(Topic::EffortCommands, &why),
+    })
+}

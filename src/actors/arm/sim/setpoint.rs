@@ -1,0 +1,48 @@
+//! Setpoints, which clients publish on `/joint_trajectory`.
+//!
+//! **Invariant:** a setpoint is taken as a whole, or answered with a status that says what is wrong with it.
+
+use actix::prelude::*;
+
+use super::node::ArmSim;
+use crate::actors::node::Done;
+use crate::actors::wire::{Nodes, Route, TopicMessage};
+use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Topic;
+use crate::services::arm::read_setpoint;
+
+/// Has the registry bring this file's setpoints.
+pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    let setpoints = setpoints(arm.clone().recipient());
+    nodes.listeners.insert(Topic::JointTrajectory, setpoints);
+}
+
+/// A setpoint for the controller, from the next step on. From clients, by `/joint_trajectory`.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetSetpoint<const N: usize> {
+    /// The joint state to be held.
+    pub setpoint: Setpoint<N>,
+    /// Dropped when it is held.
+    pub done: Option<Done>,
+}
+
+impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, message: SetSetpoint<N>, ctx: &mut Context<Self>) {
+        self.attend(ctx);
+        self.arm.hold(message.setpoint);
+    }
+}
+
+/// Setpoints on their way to the arm; an error status for what is none.
+fn setpoints<const N: usize>(arm: Recipient<SetSetpoint<N>>) -> Route<TopicMessage> {
+    Box::new(move |message| match read_setpoint(&message.heard) {
+        Ok(setpoint) => arm.do_send(SetSetpoint {
+            setpoint,
+            done: Some(message.done),
+        }),
+        Err(why) => message.refuse(Topic::JointTrajectory, &why),
+    })
+}

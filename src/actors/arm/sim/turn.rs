@@ -1,0 +1,37 @@
+//! How much the arm does in a row before its timers and the answers that it waits for have their turn.
+//!
+//! An actor's mailbox is emptied before anything else of it is looked at. So whoever keeps it full would keep the arm
+//! from its tick; the end of a turn lets the thread look up.
+//!
+//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, whatever waits for it:
+//! [`TURN`], one message, and one row of steps that were asked for. Steps that are due have their own budget.
+
+use std::time::{Duration, Instant};
+
+use crate::actors::resources::work_clock;
+
+/// Work on messages in a row: what a tick may come late.
+pub const TURN: Duration = Duration::from_millis(1);
+/// Messages in a row, some hundred microseconds of usual ones.
+pub const TURN_MESSAGES: usize = 64;
+
+/// The messages since the arm last let its timers have their turn.
+pub(super) struct Turn {
+    began: Instant,
+    messages: usize,
+}
+
+impl Turn {
+    pub(super) fn new() -> Self {
+        Self {
+            began: work_clock::now(),
+            messages: 0,
+        }
+    }
+
+    /// Counts a message; whether the turn ends with it.
+    pub(super) fn count(&mut self) -> bool {
+        self.messages += 1;
+        self.messages >= TURN_MESSAGES || work_clock::now() - self.began >= TURN
+    }
+}

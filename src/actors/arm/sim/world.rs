@@ -1,0 +1,64 @@
+//! The surroundings of the arm in the runtime: its clocks, the registry, the owner of its goal.
+//!
+//! **Invariant:** what is published is written by the registry, not on the arm's thread.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::time::Instant;
+
+use crate::actors::node::{FrameOut, Publish};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::work_clock;
+use crate::live::{GoalJudged, World};
+use crate::math::simulation::Divergence;
+use crate::protocol::catalog::Topic;
+
+/// The surroundings of an arm of `N` links.
+pub(super) struct ArmWorld<const N: usize> {
+    /// The moment from which the pacer and the ticks count.
+    pub(super) epoch: Instant,
+    pub(super) publish: Recipient<Publish>,
+    pub(super) gauges: Arc<Gauges>,
+    /// Hears of the goal that is tracked.
+    pub(super) owner: Option<Recipient<GoalJudged<N>>>,
+}
+
+impl<const N: usize> World<N> for ArmWorld<N> {
+    fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+
+    fn work_time(&self) -> Duration {
+        work_clock::reading()
+    }
+
+    fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
+        let frame = FrameOut::unwritten(write);
+        self.publish.do_send(Publish { topic, frame });
+    }
+
+    fn tell(&self, judged: GoalJudged<N>) {
+        if let Some(owner) = &self.owner {
+            owner.do_send(judged);
+        }
+    }
+
+    fn clients(&self) -> (u64, u64) {
+        (self.gauges.connections(), self.gauges.messages_dropped())
+    }
+
+    fn note_divergence(&self, divergence: Divergence) {
+        tracing::warn!(
+            step = divergence.step,
+            time = divergence.time,
+            "the simulation has diverged"
+        );
+    }
+
+    fn count_estimate(&self) {
+        self.gauges.add_estimate();
+    }
+}

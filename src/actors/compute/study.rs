@@ -1,0 +1,143 @@
+//! `/study/*`: predictions and offline runs of the arm, done on the worker pool, apart from the live arm.
+//!
+//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is.
+//! A connection hands over one computation at a time.
+//!
+//! **Invariant:** a call is answered once, and neither the arm nor another client waits for it.
+
+use std::time::Instant;
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+use super::answering::answer;
+use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use crate::actors::arm::sim::{ArmSettings, HeldLimit};
+use crate::actors::node::{Call, Reply, Unserved};
+use crate::actors::wire::Nodes;
+use crate::protocol::catalog::{Node, Service};
+use crate::services::study::{GainsWork, PlanWork, Present, RolloutWork, StabilityWork, Work};
+pub use crate::services::study::{
+    NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
+    RunOffline, SuggestGains, Suggested,
+};
+use crate::study::clocks::{ClockLimits, clock_limits};
+use crate::study::control_loop::ControlLoop;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `study` for an arm of `N` links.
+pub struct Study<const N: usize> {
+    arm: Recipient<ArmSettings<N>>,
+    workers: WorkerPool,
+}
+
+impl<const N: usize> Study<N> {
+    /// A node that asks `arm` and computes on `workers`.
+    #[must_use]
+    pub fn new(arm: Recipient<ArmSettings<N>>, workers: WorkerPool) -> Self {
+        Self { arm, workers }
+    }
+
+    /// Asks the arm for its present settings, then hands the work to the workers.
+    fn begin<T: Send + 'static, W: Work<T> + 'static>(
+        &self,
+        mut reply: Reply<T>,
+        ctx: &mut Context<Self>,
+        work: impl FnOnce(Present<N>) -> W + 'static,
+    ) {
+        let present = self.arm.send(ArmSettings).into_actor(self);
+        ctx.spawn(present.map(move |present, study, _| match present {
+            Ok(present) => answer(&study.workers, reply, work(present)),
+            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
+        }));
+    }
+
+    /// Enters this node's services into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
+        nodes.serve_long::<RunOffline<N>>(Service::Rollout, address.clone());
+        nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
+        nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for Study<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<PredictStability<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<PredictStability<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| StabilityWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<RunOffline<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<RunOffline<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| RolloutWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<SuggestGains<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SuggestGains<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| GainsWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<PlanRun<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<PlanRun<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| PlanWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
+    type Result = ResponseFuture<Option<ClockLimits>>;
+
+    fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
+        let (answer, answered) = oneshot::channel();
+        let answer = Some(answer);
+        self.workers
+            .submit(RUNTIME, Box::new(Limiting { control, answer }));
+        Box::pin(async move { answered.await.ok() })
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+/// The arm's question for its limit: one slice.
+struct Limiting<const N: usize> {
+    control: ControlLoop<N>,
+    /// The way to the answer; if it is dropped unused, there is none.
+    answer: Option<oneshot::Sender<ClockLimits>>,
+}
+
+impl<const N: usize> Computation for Limiting<N> {
+    fn advance(&mut self, _: Instant) -> Progress {
+        let limits = clock_limits(&self.control);
+        if let Some(answer) = self.answer.take() {
+            // The arm may have ended meanwhile.
+            let _ = answer.send(limits);
+        }
+        Progress::Finished
+    }
+
+    fn refuse(&mut self, _: &'static str) {
+        self.answer = None;
+    }
+}

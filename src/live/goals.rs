@@ -1,0 +1,198 @@
+//! The active goal as the arm sees it, and the arm's memory of goals. The rules are `math::goal`'s.
+//!
+//! **Invariant:** every goal ends once, and whoever asks about the latest end hears the same.
+
+use glam::DVec2;
+
+use crate::math::goal::{Cadence, Criteria, Goal, Outcome};
+use crate::math::kinematics::forward;
+use crate::math::simulation::Simulation;
+use crate::protocol::catalog::Service;
+
+/// Why no setpoint moves the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Obstacle {
+    /// Its simulation has diverged.
+    #[error("the arm has diverged and stands still until {} is called", Service::Reset.name())]
+    Diverged,
+    /// Its controller is off.
+    #[error(
+        "the controller is off, so the arm does not follow its setpoint; {} with data true switches it on",
+        Service::Enable.name()
+    )]
+    ControllerOff,
+}
+
+impl Obstacle {
+    pub(crate) fn of<const N: usize>(simulation: &Simulation<N>) -> Option<Self> {
+        if simulation.divergence().is_some() {
+            Some(Self::Diverged)
+        } else {
+            (!simulation.pid().is_enabled()).then_some(Self::ControllerOff)
+        }
+    }
+}
+
+/// The arm at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose<const N: usize> {
+    /// Lengths of the links \[m\].
+    pub lengths: [f64; N],
+    /// Joint positions \[rad\].
+    pub positions: [f64; N],
+    /// Simulation time \[s\].
+    pub time: f64,
+    /// Resets of the arm so far.
+    pub resets: u64,
+    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
+    /// at a reset that forgets a past of thirty years.
+    pub simulated: f64,
+    /// Why it does not follow its setpoint; none if it does.
+    pub obstacle: Option<Obstacle>,
+}
+
+/// A goal for the arm.
+#[derive(Debug, Clone, Copy)]
+pub struct GoalOrder<const N: usize> {
+    /// Names the goal; each is used once.
+    pub number: u64,
+    /// The target of the end effector \[m\].
+    pub target: DVec2,
+    /// When it counts as there.
+    pub criteria: Criteria,
+    /// Joint positions that put the end effector there \[rad\].
+    pub solution: [f64; N],
+}
+
+/// The goal has begun.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracking<const N: usize> {
+    /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to be sent.
+    pub positions: [f64; N],
+    /// How the goal before it ended, now or earlier, if there was one.
+    pub before: Option<GoalJudged<N>>,
+    /// Why the arm will not follow that setpoint yet; none if it will.
+    pub obstacle: Option<Obstacle>,
+}
+
+/// How a goal stands after a step, or how it ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GoalJudged<const N: usize> {
+    /// The goal.
+    pub number: u64,
+    /// Distance between end effector and target \[m\].
+    pub distance: f64,
+    /// Simulation time since the goal's start \[s\].
+    pub elapsed: f64,
+    /// The arm at that instant.
+    pub pose: Pose<N>,
+    /// How it ended; none while it is active.
+    pub outcome: Option<Outcome>,
+}
+
+/// The arm's memory of goals.
+#[derive(Default)]
+pub(crate) struct Goals<const N: usize> {
+    pub(super) tracked: Option<Tracked>,
+    /// How the latest goal ended, for a question that crossed the news on its way.
+    pub(super) latest: Option<GoalJudged<N>>,
+    /// A client has sent a setpoint while the controller was off, and it is off still.
+    pub(crate) setpoint_waits: bool,
+    /// Everything before the last reset.
+    pub(crate) past: Past,
+}
+
+/// Everything before the last reset.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Past {
+    /// Resets so far.
+    pub(crate) resets: u64,
+    /// Simulation time up to the last \[s\].
+    time: f64,
+}
+
+impl Past {
+    /// A longer past is forgotten \[s\]: after thirty years a clock no longer tells parts of a second. Long timesteps
+    /// lead there soon.
+    const LONGEST: f64 = 1e9;
+
+    /// A reset comes, so long after the one before \[s\].
+    pub(super) fn end(&mut self, time: f64) {
+        let time = self.time + time;
+        self.time = if time < Self::LONGEST { time } else { 0.0 };
+        self.resets += 1;
+    }
+}
+
+/// A goal that has not ended.
+pub(super) struct Tracked {
+    pub(super) number: u64,
+    pub(super) goal: Goal,
+    pub(super) feedback: Cadence,
+    /// Its setpoint is held, and it is judged.
+    pub(super) commanded: bool,
+}
+
+impl<const N: usize> Goals<N> {
+    /// Whether there is a goal that has not ended.
+    pub(crate) fn is_tracked(&self) -> bool {
+        self.tracked.is_some()
+    }
+
+    /// Ends the goal, if there is one, where the arm is now.
+    pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalJudged<N>> {
+        let tracked = self.tracked.take()?;
+        let mut judged = tracked.stands(simulation, self.past);
+        judged.outcome = Some(Outcome::Preempted);
+        self.latest = Some(judged);
+        Some(judged)
+    }
+}
+
+impl Tracked {
+    /// Judges the step that was just made: progress that is to be told, and the news that it is reached.
+    pub(super) fn judge<const N: usize>(
+        &mut self,
+        simulation: &Simulation<N>,
+        past: Past,
+    ) -> (Option<GoalJudged<N>>, Option<GoalJudged<N>>) {
+        let time = simulation.time();
+        let reached = self.goal.judge(time, end_effector(simulation));
+        let due = self.feedback.due(time);
+        if !reached && !due {
+            return (None, None);
+        }
+        let progress = self.stands(simulation, past);
+        let end = GoalJudged {
+            outcome: Some(Outcome::Reached),
+            ..progress
+        };
+        (due.then_some(progress), reached.then_some(end))
+    }
+
+    fn stands<const N: usize>(&self, simulation: &Simulation<N>, past: Past) -> GoalJudged<N> {
+        GoalJudged {
+            number: self.number,
+            distance: self.goal.distance(end_effector(simulation)),
+            elapsed: self.goal.elapsed(simulation.time()),
+            pose: pose(simulation, past),
+            outcome: None,
+        }
+    }
+}
+
+/// Position of the end effector \[m\], with the lengths as they are now.
+fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
+    forward(simulation.arm().lengths(), &simulation.state().position).position
+}
+
+pub(super) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Pose<N> {
+    Pose {
+        lengths: *simulation.arm().lengths(),
+        positions: simulation.state().position,
+        time: simulation.time(),
+        resets: past.resets,
+        simulated: past.time + simulation.time(),
+        obstacle: Obstacle::of(simulation),
+    }
+}

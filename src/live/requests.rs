@@ -1,0 +1,238 @@
+//! What requests do to the arm.
+//!
+//! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step; a
+//! switch that is in that position already changes nothing, but that a commanded effort ends.
+
+use super::{LiveArm, World};
+use crate::math::arm::{Arm, State};
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::{ArmInput, ControlPeriod};
+use crate::protocol::catalog::Service;
+use crate::protocol::op::fields::Rejections;
+use crate::services::Ask;
+use crate::services::arm::{
+    DIVERGED, Disturb, Enable, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
+    SetIntegrator, SetParams, SetPeriod, SetState,
+};
+use crate::services::field_by_field::Echo;
+
+/// Why an effort is not applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the controller is on; {} with data false switches it off", Service::Enable.name())]
+pub struct ControllerOn;
+
+impl<const N: usize, W: World<N>> LiveArm<N, W> {
+    /// A client's setpoint is held from the next step on.
+    pub fn hold(&mut self, setpoint: Setpoint<N>) {
+        self.change(ArmInput::Setpoint(setpoint));
+        self.goals.setpoint_waits = !self.simulation.pid().is_enabled();
+    }
+
+    /// A client's effort \[N m\] is applied from the next step on.
+    ///
+    /// # Errors
+    /// While the controller is on.
+    pub fn command(&mut self, effort: [f64; N]) -> Result<(), ControllerOn> {
+        if self.simulation.pid().is_enabled() {
+            return Err(ControllerOn);
+        }
+        self.change(ArmInput::Command(effort));
+        Ok(())
+    }
+}
+
+/// A question that the arm answers at once.
+pub trait ArmRequest<const N: usize>: Ask {
+    /// Does what is asked for.
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Self::Answer;
+
+    /// Whether the answer has to wait until all news of goals so far have been passed on.
+    fn waits_for_news<W: World<N>>(_arm: &LiveArm<N, W>) -> bool {
+        false
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for Disturb<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Result<Push<N>, Rejections> {
+        let mut rejected = self.rejected;
+        if arm.simulation.divergence().is_some() {
+            rejected.refuse("effort", &DIVERGED);
+        }
+        match (self.effort, self.duration) {
+            (Some(effort), Some(duration)) if rejected.is_empty() => {
+                arm.change(ArmInput::Disturbance { effort, duration });
+                Ok(Push { effort, duration })
+            }
+            _ => Err(rejected),
+        }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetGains<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<Gains<N>> {
+        let gains = self.applied_to(arm.simulation.pid().gains());
+        if [self.kp, self.ki, self.kd].iter().any(Option::is_some) {
+            arm.change(ArmInput::Gains(gains));
+        }
+        Echo {
+            values: *arm.simulation.pid().gains(),
+            rejected: self.rejected,
+        }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetIntegrator {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<Integrator> {
+        if let Some(method) = self.method {
+            arm.change(ArmInput::Method(method));
+        }
+        // Setting the timestep that is in force already must not cost the unfinished fraction of a step.
+        let present = arm.simulation.timestep().to_bits();
+        if let Some(timestep) = self.timestep.filter(|new| new.to_bits() != present) {
+            arm.change(ArmInput::Timestep(timestep));
+            arm.restart_pacer();
+        }
+        Echo {
+            values: Integrator {
+                method: arm.simulation.method(),
+                timestep: arm.simulation.timestep(),
+            },
+            rejected: self.rejected,
+        }
+    }
+}
+
+/// The arm is replaced as a whole, or not at all.
+impl<const N: usize> ArmRequest<N> for SetParams<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<Arm<N>> {
+        let present = arm.simulation.arm();
+        let changed = self.applied_to(present);
+        let mut rejected = self.rejected;
+        match changed {
+            Ok(changed) if changed != *present => {
+                arm.change(ArmInput::Arm(changed));
+                arm.restart_energy_drift();
+                arm.publish_description();
+            }
+            Ok(_) => {}
+            // The fields were checked with the same bounds; should the two ever differ, the arm's word counts.
+            Err(why) => rejected.refuse("params", &why),
+        }
+        let values = *arm.simulation.arm();
+        Echo { values, rejected }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetPeriod {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<PeriodInForce> {
+        let present = arm.simulation.control_period();
+        let period = ControlPeriod {
+            period: self.period.unwrap_or(present.period),
+            delay: self.delay.unwrap_or(present.delay),
+        };
+        if period != present {
+            arm.change(ArmInput::Period(period));
+        }
+        Echo {
+            values: PeriodInForce {
+                period,
+                effective: period.effective(arm.simulation.timestep()),
+            },
+            rejected: self.rejected,
+        }
+    }
+}
+
+/// A goal that ends by it is announced before the answer.
+impl<const N: usize> ArmRequest<N> for Reset<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<State<N>> {
+        if self.rejected.is_empty() {
+            let diverged = arm.simulation.divergence().is_some();
+            arm.end_goal_for_reset();
+            arm.change(ArmInput::Reset);
+            arm.goals.setpoint_waits = false;
+            arm.paused_at = arm.simulation.time();
+            arm.restart_pacer();
+            arm.restart_energy_drift();
+            if diverged {
+                arm.publish_diagnostics();
+            }
+        }
+        Echo {
+            values: *arm.simulation.state(),
+            rejected: self.rejected,
+        }
+    }
+
+    fn waits_for_news<W: World<N>>(_: &LiveArm<N, W>) -> bool {
+        true
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for SetState<N> {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<State<N>> {
+        if self.position.is_some() || self.velocity.is_some() {
+            let present = *arm.simulation.state();
+            let had_diverged = arm.simulation.divergence().is_some();
+            arm.change(ArmInput::State(State {
+                position: self.position.unwrap_or(present.position),
+                velocity: self.velocity.unwrap_or(present.velocity),
+            }));
+            arm.restart_energy_drift();
+            if had_diverged {
+                // Time has stood still meanwhile.
+                arm.restart_pacer();
+                arm.publish_diagnostics();
+            }
+        }
+        Echo {
+            values: *arm.simulation.state(),
+            rejected: self.rejected,
+        }
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for Pause {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<bool> {
+        if self.paused == Some(true) {
+            // One that was stepped meanwhile stands still again.
+            arm.paused_at = arm.simulation.time();
+        }
+        let present = arm.paused;
+        if let Some(paused) = self.paused.filter(|&paused| paused != present) {
+            arm.paused = paused;
+            arm.restart_pacer();
+            arm.publish_diagnostics();
+        }
+        Echo {
+            values: arm.paused,
+            rejected: self.rejected,
+        }
+    }
+
+    fn waits_for_news<W: World<N>>(arm: &LiveArm<N, W>) -> bool {
+        arm.paused
+    }
+}
+
+impl<const N: usize> ArmRequest<N> for Enable {
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<bool> {
+        let is_on = arm.simulation.pid().is_enabled();
+        let mut command = arm.simulation.command().iter();
+        let commanded = command.any(|effort| *effort != 0.0);
+        if let Some(on) = self.enabled.filter(|&on| on != is_on || commanded) {
+            arm.change(ArmInput::Enabled(on));
+            arm.goals.setpoint_waits = false;
+            arm.restart_energy_drift();
+        }
+        Echo {
+            values: arm.simulation.pid().is_enabled(),
+            rejected: self.rejected,
+        }
+    }
+
+    /// A path ends with the controller, and before the answer.
+    fn waits_for_news<W: World<N>>(arm: &LiveArm<N, W>) -> bool {
+        !arm.simulation.pid().is_enabled()
+    }
+}

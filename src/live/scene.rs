@@ -1,0 +1,56 @@
+//! Topics for 3D tools: `/tf` at every tick, `/tf_static` and `/robot_description` once and at every change of the arm.
+//!
+//! **Invariant:** nothing is made for a topic that nobody subscribes to.
+
+use super::{LiveArm, World};
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages::Stamp;
+use crate::protocol::messages::scene::{StringMessage, fixed_frames, moving_frames};
+use crate::protocol::ros::{srdf, urdf};
+use crate::services::arm::joint_names;
+
+impl<const N: usize, W: World<N>> LiveArm<N, W> {
+    /// `/tf`, if anybody wants it.
+    pub(super) fn publish_transforms(&self, stamp: Stamp) {
+        if self.telemetry.wants(Topic::Tf) {
+            let lengths = *self.simulation.arm().lengths();
+            let positions = self.simulation.state().position;
+            self.publish(Topic::Tf, move || {
+                moving_frames(stamp, &lengths, &positions)
+            });
+        }
+    }
+
+    /// Publishes the topics that change with lengths and masses alone.
+    pub(super) fn publish_description(&self) {
+        self.publish_lasting(Topic::TfStatic);
+        self.publish_lasting(Topic::RobotDescription);
+    }
+
+    /// A message that holds until the next, if anybody wants it.
+    pub(super) fn publish_lasting(&self, topic: Topic) {
+        if !self.telemetry.wants(topic) {
+            return;
+        }
+        let arm = *self.simulation.arm();
+        match topic {
+            Topic::TfStatic => {
+                let stamp = Stamp::from_seconds(self.simulation.time());
+                self.publish(topic, move || fixed_frames(stamp, arm.lengths()));
+            }
+            Topic::RobotDescription => {
+                let names = joint_names::<N>();
+                self.publish(topic, move || StringMessage {
+                    data: urdf::describe(&names, arm.lengths(), arm.masses()),
+                });
+            }
+            Topic::RobotSemantics => {
+                let names = joint_names::<N>();
+                self.publish(topic, move || StringMessage {
+                    data: srdf::describe_semantics(&names),
+                });
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
+//! `/diagnostics` once a second and at every change.
+//!
+//! **Invariant:** nothing is computed for a topic that nobody subscribes to; what is published is written elsewhere.
+
+use serde::Serialize;
+
+use super::counts::{WakeUp, Window, energy};
+use super::{LiveArm, Obstacle, PUBLISH_RATE, World};
+use crate::math::arm::State;
+use crate::math::pacer::CATCH_UP;
+use crate::math::shown::Shown;
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::{
+    self, Clock, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Stamp,
+};
+use crate::services::arm::joint_names;
+
+/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for
+/// control.
+const ESTIMATE_TICKS: u64 = 6;
+
+impl<const N: usize, W: World<N>> LiveArm<N, W> {
+    /// Has the arm tell what is due at a tick, after the steps until then.
+    pub fn tick(&mut self) {
+        self.watch_warnings();
+        self.publish_state();
+        self.tell_state();
+    }
+
+    fn publish_state(&mut self) {
+        self.telemetry.ticks += 1;
+        let stamp = Stamp::from_seconds(self.simulation.time());
+        if self.telemetry.wants(Topic::JointStates) {
+            self.publish_joint_state(stamp);
+        }
+        if self.telemetry.wants(Topic::Clock) {
+            self.publish(Topic::Clock, move || Clock { clock: stamp });
+        }
+        self.publish_transforms(stamp);
+        if self.telemetry.wants(Topic::ErrorEstimate)
+            && self.telemetry.ticks.is_multiple_of(ESTIMATE_TICKS)
+        {
+            let estimate = self.error_estimate();
+            self.publish(Topic::ErrorEstimate, move || estimate);
+        }
+        if self.telemetry.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
+            self.publish_diagnostics();
+            let now = self.world.now();
+            self.telemetry.last_rates = self.telemetry.window.rates(now).unwrap_or_default();
+            self.telemetry.window = Window::new(now);
+        }
+    }
+
+    /// `/diagnostics`, if anybody wants it.
+    pub(super) fn publish_diagnostics(&mut self) {
+        if self.telemetry.wants(Topic::Diagnostics) {
+            let diagnostics = self.diagnostics();
+            self.publish(Topic::Diagnostics, move || diagnostics);
+            self.telemetry.window.longest = WakeUp::default();
+        }
+    }
+
+    /// The drift counts from the present energy.
+    pub(super) fn restart_energy_drift(&mut self) {
+        self.telemetry.energy_reference = energy(&self.simulation);
+    }
+
+    /// Publishes the message that `make` makes, when its frame is written.
+    pub(super) fn publish<M: Serialize>(
+        &self,
+        topic: Topic,
+        make: impl FnOnce() -> M + Send + 'static,
+    ) {
+        self.world
+            .publish(topic, move || messages::publish(topic.name(), &make()));
+    }
+
+    fn publish_joint_state(&self, stamp: Stamp) {
+        let State { position, velocity } = *self.simulation.state();
+        let (name, effort) = (joint_names::<N>(), *self.simulation.effort());
+        let topic = Topic::JointStates;
+        self.world.publish(topic, move || {
+            let message = JointState {
+                header: header(stamp),
+                name: &name,
+                position: &position,
+                velocity: &velocity,
+                effort: &effort,
+            };
+            messages::publish(topic.name(), &message)
+        });
+    }
+
+    fn diagnostics(&self) -> DiagnosticArray<'static> {
+        let stamp = Stamp::from_seconds(self.simulation.time());
+        DiagnosticArray {
+            header: header(stamp),
+            status: vec![self.arm_status(), self.gateway_status()],
+        }
+    }
+
+    fn arm_status(&self) -> DiagnosticStatus<'static> {
+        let warnings = self.warnings();
+        let level = u8::from(!warnings.is_empty());
+        let (level, state, message) = match self.simulation.divergence() {
+            Some(divergence) => {
+                let message = format!(
+                    "diverged: step {} from t = {} s was not finite and was not taken; {} clears this",
+                    divergence.step,
+                    Shown(divergence.time),
+                    Service::Reset.name()
+                );
+                (2, "diverged", message)
+            }
+            None if self.paused => (level, "paused", "paused".to_owned()),
+            None => (level, "running", "running".to_owned()),
+        };
+        let energy = energy(&self.simulation);
+        let rates = self
+            .telemetry
+            .window
+            .rates(self.world.now())
+            .unwrap_or(self.telemetry.last_rates);
+        let numbers = [
+            ("sim_time", self.simulation.time()),
+            ("real_time_factor", rates.real_time_factor),
+            ("steps_per_second", rates.steps_per_second),
+            ("energy", energy),
+            ("energy_drift", energy - self.telemetry.energy_reference),
+            ("max_step_time", self.telemetry.window.longest.step_time()),
+            ("control_period", self.effective_period()),
+            ("control_period_limit", self.period_limit()),
+            ("timestep_limit", self.timestep_limit()),
+            ("timestep_limit_motion", self.motion().timestep),
+        ];
+        let mut values = vec![entry("state", state)];
+        // Debug prints what is huge or tiny with an exponent.
+        values.extend(numbers.map(|(key, value)| entry(key, format!("{value:?}"))));
+        let setpoint = self.simulation.pid().setpoint().position;
+        values.push(entry("setpoint", format!("{setpoint:?}")));
+        values.push(entry("warning", warnings.join("; ")));
+        DiagnosticStatus {
+            level,
+            name: "arm_sim",
+            message,
+            hardware_id: "",
+            values,
+        }
+    }
+
+    /// Warnings about an arm that goes on all the same.
+    fn warnings(&self) -> Vec<String> {
+        let lags = !self.paused && self.telemetry.lags();
+        let late = lags.then(|| {
+            let behind = CATCH_UP.as_millis() / 2;
+            format!("the arm is more than {behind} ms behind wall time")
+        });
+        let held_up = self
+            .is_held_up()
+            .then(|| Obstacle::ControllerOff.to_string());
+        let warnings = [self.limit_warning(), held_up, late];
+        warnings.into_iter().flatten().collect()
+    }
+
+    fn gateway_status(&self) -> DiagnosticStatus<'static> {
+        let (connections, dropped) = self.world.clients();
+        let values = vec![
+            entry("connections", connections.to_string()),
+            entry("messages_dropped", dropped.to_string()),
+        ];
+        let message = "running".to_owned();
+        DiagnosticStatus {
+            level: 0,
+            name: "gateway",
+            message,
+            hardware_id: "",
+            values,
+        }
+    }
+}
+
+fn header(stamp: Stamp) -> Header<'static> {
+    Header {
+        stamp,
+        frame_id: WORLD,
+    }
+}
+
+fn entry(key: &str, value: impl Into<String>) -> KeyValue<'_> {
+    KeyValue {
+        key,
+        value: value.into(),
+    }
+}

@@ -1,0 +1,68 @@
+//! `/arm_sim/disturb`: a push.
+//!
+//! **Invariant:** a push that is refused leaves the arm as it was.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::field_by_field::FieldByField;
+use crate::services::{Address, Answered, Ask};
+
+/// Why nothing moves any more.
+pub(crate) const DIVERGED: &str =
+    "is refused: the simulation has diverged; /arm_sim/reset clears this";
+
+/// Adds an effort to that of every step for a while, from the next one on. Refused if something was rejected, or the
+/// simulation has diverged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disturb<const N: usize> {
+    /// \[N m\].
+    pub effort: Option<[f64; N]>,
+    /// Simulation time \[s\], greater than 0.
+    pub duration: Option<f64>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+/// A disturbance that has begun.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Push<const N: usize> {
+    /// \[N m\].
+    pub effort: [f64; N],
+    /// Simulation time \[s\].
+    pub duration: f64,
+}
+
+impl<const N: usize> Ask for Disturb<N> {
+    type Answer = Result<Push<N>, Rejections>;
+}
+
+impl<const N: usize> FieldByField for Disturb<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            effort: fields.array("effort", Bound::Finite),
+            duration: fields.number("duration", Bound::Positive),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl<const N: usize> Answered for Disturb<N> {
+    fn write(answer: Result<Push<N>, Rejections>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values<'a> {
+            effort: &'a [f64],
+            duration: f64,
+        }
+        let values = answer.as_ref().map(|push| Values {
+            effort: &push.effort,
+            duration: push.duration,
+        });
+        to.outcome(values)
+    }
+}

@@ -1,0 +1,68 @@
+//! `/pid_controller/set_gains`: the controller's gains.
+//!
+//! **Invariant:** gains that are not given stay as they are.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::math::pid::Gains;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+/// Sets the controller's gains, each at least 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SetGains<const N: usize> {
+    /// \[N m/rad\].
+    pub kp: Option<[f64; N]>,
+    /// \[N m/(rad s)\].
+    pub ki: Option<[f64; N]>,
+    /// \[N m s/rad\].
+    pub kd: Option<[f64; N]>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl<const N: usize> SetGains<N> {
+    /// The gains that `gains` become.
+    #[must_use]
+    pub fn applied_to(&self, gains: &Gains<N>) -> Gains<N> {
+        Gains {
+            kp: self.kp.unwrap_or(gains.kp),
+            ki: self.ki.unwrap_or(gains.ki),
+            kd: self.kd.unwrap_or(gains.kd),
+        }
+    }
+}
+
+impl<const N: usize> Ask for SetGains<N> {
+    type Answer = Echo<Gains<N>>;
+}
+
+impl<const N: usize> FieldByField for SetGains<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            kp: fields.array("kp", Bound::NonNegative),
+            ki: fields.array("ki", Bound::NonNegative),
+            kd: fields.array("kd", Bound::NonNegative),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl<const N: usize> Answered for SetGains<N> {
+    fn write(Echo { values, rejected }: Echo<Gains<N>>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values<'a> {
+            kp: &'a [f64],
+            ki: &'a [f64],
+            kd: &'a [f64],
+        }
+        let Gains { kp, ki, kd } = &values;
+        to.response(&Values { kp, ki, kd }, &rejected.status())
+    }
+}

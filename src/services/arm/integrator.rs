@@ -1,0 +1,62 @@
+//! `/arm_sim/set_integrator`: method and timestep of the live arm.
+//!
+//! **Invariant:** setting what is in force already leaves the arm exactly as it was, down to the fraction of a step.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::math::integrator::Method;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+/// Sets method and timestep.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SetIntegrator {
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Length of a step \[s\], greater than 0.
+    pub timestep: Option<f64>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+/// Method and timestep in force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Integrator {
+    /// The method that takes the steps.
+    pub method: Method,
+    /// Length of a step \[s\].
+    pub timestep: f64,
+}
+
+impl Ask for SetIntegrator {
+    type Answer = Echo<Integrator>;
+}
+
+impl FieldByField for SetIntegrator {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            method: fields.choice("method", &Method::ALL, Method::name),
+            timestep: fields.number("timestep", Bound::Positive),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl Answered for SetIntegrator {
+    fn write(Echo { values, rejected }: Echo<Integrator>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            method: &'static str,
+            timestep: f64,
+        }
+        let Integrator { method, timestep } = values;
+        let method = method.name();
+        to.response(&Values { method, timestep }, &rejected.status())
+    }
+}

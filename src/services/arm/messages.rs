@@ -1,0 +1,43 @@
+//! What clients publish to the arm: setpoints on `/joint_trajectory`, efforts on `/effort_controller/commands`.
+//!
+//! **Invariant:** a message is taken as a whole, or refused with the reason.
+
+use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages::trajectory::{Heard, TrajectoryError};
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+
+/// Names of the joints, base first.
+const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
+
+/// The names of an arm's joints, base first.
+#[must_use]
+pub fn joint_names<const N: usize>() -> [&'static str; N] {
+    std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
+}
+
+/// Reads a setpoint.
+///
+/// # Errors
+/// If the message holds none for this arm.
+pub fn read_setpoint<const N: usize>(heard: &Heard) -> Result<Setpoint<N>, TrajectoryError> {
+    let request = heard.setpoint(&joint_names::<N>())?;
+    // The reader has checked how many they are.
+    let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
+    Ok(Setpoint {
+        position: array(&request.position),
+        velocity: array(&request.velocity),
+    })
+}
+
+/// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`: its layout says nothing that counts.
+///
+/// # Errors
+/// If the message does not hold one for each joint.
+pub fn read_effort<const N: usize>(heard: &Heard) -> Result<[f64; N], Rejections> {
+    let args = Arguments::Object(heard.msg.clone());
+    let mut fields = Fields::of_message(&args, Topic::EffortCommands)?;
+    let effort = fields.array("data", Bound::Finite);
+    effort.ok_or_else(|| fields.finish())
+}

@@ -1,0 +1,29 @@
+//! The questions to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints and efforts.
+//!
+//! A request carries what was given and valid, field by field, and what was rejected, by name. What is valid takes
+//! effect, and the answer echoes the values as they now are.
+//!
+//! **Invariant:** a bad field never keeps a good one from the arm, which hears of both.
+
+mod disturb;
+mod gains;
+mod integrator;
+mod messages;
+mod params;
+mod period;
+mod reset;
+mod state;
+mod step;
+mod switches;
+
+pub(crate) use self::disturb::DIVERGED;
+pub use self::disturb::{Disturb, Push};
+pub use self::gains::SetGains;
+pub use self::integrator::{Integrator, SetIntegrator};
+pub use self::messages::{joint_names, read_effort, read_setpoint};
+pub use self::params::SetParams;
+pub use self::period::{PeriodInForce, SetPeriod};
+pub use self::reset::Reset;
+pub use self::state::SetState;
+pub use self::step::{MAX_STEPS, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
+pub use self::switches::{Enable, Pause};

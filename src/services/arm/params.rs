@@ -1,0 +1,74 @@
+//! `/arm_sim/set_params`: gravity, masses and lengths.
+//!
+//! **Invariant:** the arm is replaced as a whole, or not at all.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::math::arm::{Arm, ArmError};
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+/// Sets the arm's parameters.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SetParams<const N: usize> {
+    /// \[m/s²\], at least 0.
+    pub gravity: Option<f64>,
+    /// \[kg\], greater than 0.
+    pub masses: Option<[f64; N]>,
+    /// \[m\], greater than 0.
+    pub lengths: Option<[f64; N]>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl<const N: usize> SetParams<N> {
+    /// The arm that `arm` becomes.
+    ///
+    /// # Errors
+    /// If there can't be such an arm.
+    pub fn applied_to(&self, arm: &Arm<N>) -> Result<Arm<N>, ArmError> {
+        Arm::new(
+            self.lengths.unwrap_or(*arm.lengths()),
+            self.masses.unwrap_or(*arm.masses()),
+            self.gravity.unwrap_or(arm.gravity()),
+        )
+    }
+}
+
+impl<const N: usize> Ask for SetParams<N> {
+    type Answer = Echo<Arm<N>>;
+}
+
+impl<const N: usize> FieldByField for SetParams<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            gravity: fields.number("gravity", Bound::NonNegative),
+            masses: fields.array("masses", Bound::Positive),
+            lengths: fields.array("lengths", Bound::Positive),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl<const N: usize> Answered for SetParams<N> {
+    fn write(Echo { values, rejected }: Echo<Arm<N>>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values<'a> {
+            gravity: f64,
+            masses: &'a [f64],
+            lengths: &'a [f64],
+        }
+        let values = Values {
+            gravity: values.gravity(),
+            masses: values.masses(),
+            lengths: values.lengths(),
+        };
+        to.response(&values, &rejected.status())
+    }
+}

@@ -1,0 +1,67 @@
+//! `/pid_controller/set_period`: how often the control law runs.
+//!
+//! **Invariant:** setting what is in force already leaves the arm exactly as it was, down to the step of its period.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::math::simulation::ControlPeriod;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+/// Sets the time between two runs of the control law.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SetPeriod {
+    /// That time \[s\], not negative; 0 for every step.
+    pub period: Option<f64>,
+    /// Whether an effort is applied one period after the state that it is about.
+    pub delay: Option<bool>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+/// The control period in force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeriodInForce {
+    /// Time as asked for, and the delay.
+    pub period: ControlPeriod,
+    /// A whole number of timesteps \[s\].
+    pub effective: f64,
+}
+
+impl Ask for SetPeriod {
+    type Answer = Echo<PeriodInForce>;
+}
+
+impl FieldByField for SetPeriod {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            period: fields.number("period", Bound::NonNegative),
+            delay: fields.boolean("delay"),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl Answered for SetPeriod {
+    fn write(Echo { values, rejected }: Echo<PeriodInForce>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            period: f64,
+            effective_period: f64,
+            delay: bool,
+        }
+        let ControlPeriod { period, delay } = values.period;
+        let values = Values {
+            period,
+            effective_period: values.effective,
+            delay,
+        };
+        to.response(&values, &rejected.status())
+    }
+}

@@ -1,0 +1,51 @@
+//! `/arm_sim/reset`: back to the starting pose at time 0.
+//!
+//! **Invariant:** a goal that ends by it is announced before the answer.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::math::arm::State;
+use crate::protocol::op::fields::{Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+/// Puts the arm back to its starting pose at time 0, unless something was rejected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Reset<const N: usize> {
+    /// A reset has no fields: what is rejected is the request as a whole.
+    pub rejected: Rejections,
+}
+
+impl<const N: usize> Ask for Reset<N> {
+    type Answer = Echo<State<N>>;
+}
+
+impl<const N: usize> FieldByField for Reset<N> {
+    fn of(_: &mut Fields<'_>) -> Self {
+        Self {
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl<const N: usize> Answered for Reset<N> {
+    fn write(echo: Echo<State<N>>, to: &Address) -> Bytes {
+        write_state(&echo, to)
+    }
+}
+
+/// Writes the state in which the arm is now.
+pub(super) fn write_state<const N: usize>(echo: &Echo<State<N>>, to: &Address) -> Bytes {
+    #[derive(Serialize)]
+    struct Values<'a> {
+        position: &'a [f64],
+        velocity: &'a [f64],
+    }
+    let State { position, velocity } = &echo.values;
+    to.response(&Values { position, velocity }, &echo.rejected.status())
+}

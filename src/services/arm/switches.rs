@@ -1,0 +1,84 @@
+//! Services with one field, `data`: `/arm_sim/pause` and `/pid_controller/enable`.
+//!
+//! **Invariant:** a switch that is in that position already changes nothing, but that a commanded effort ends.
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::protocol::op::fields::{Fields, Rejections};
+use crate::services::field_by_field::{Echo, FieldByField};
+use crate::services::{Address, Answered, Ask};
+
+#[derive(Serialize)]
+struct Switch {
+    data: bool,
+}
+
+fn write_switch(echo: &Echo<bool>, to: &Address) -> Bytes {
+    let data = echo.values;
+    to.response(&Switch { data }, &echo.rejected.status())
+}
+
+/// Freezes or resumes simulation time. The answer is whether it is frozen.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pause {
+    /// True to freeze it.
+    pub paused: Option<bool>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for Pause {
+    type Answer = Echo<bool>;
+}
+
+impl FieldByField for Pause {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            paused: fields.boolean("data"),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl Answered for Pause {
+    fn write(echo: Echo<bool>, to: &Address) -> Bytes {
+        write_switch(&echo, to)
+    }
+}
+
+/// Switches the controller on or off. The answer is whether it is on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Enable {
+    /// True to switch it on.
+    pub enabled: Option<bool>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for Enable {
+    type Answer = Echo<bool>;
+}
+
+impl FieldByField for Enable {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            enabled: fields.boolean("data"),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl Answered for Enable {
+    fn write(echo: Echo<bool>, to: &Address) -> Bytes {
+        write_switch(&echo, to)
+    }
+}

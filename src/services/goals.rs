@@ -1,0 +1,244 @@
+//! Inverse kinematics and goals: `/ik/solve`, `/ik_action/send_goal` and `/ik_action/cancel_goal`.
+//!
+//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action, and its messages
+//! show the target and the setpoint that it was accepted with.
+
+use bytes::Bytes;
+
+use super::{Address, Answered, Ask, Callable};
+use crate::math::goal::{Criteria, Outcome};
+use crate::math::kinematics::{Target, Unreachable};
+use crate::protocol::catalog::{Node, Service};
+use crate::protocol::messages::Empty;
+use crate::protocol::messages::goal::{
+    GoalValues, IkFeedback, IkResult, SolutionValues, TargetMessage,
+};
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+
+// ---- inverse kinematics ---------------------------------------------------------------------------------------------
+
+/// Joint positions \[rad\], each in (-π, π], that put the end effector on the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solve<const N: usize>(pub Target);
+
+impl<const N: usize> Ask for Solve<N> {
+    type Answer = Result<[f64; N], SolveError>;
+}
+
+/// Why there is no solution.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Out of the arm's reach.
+    #[error(transparent)]
+    Unreachable(#[from] Unreachable),
+    /// The arm has ended.
+    #[error("{} does not answer", Node::ArmSim.name())]
+    NoArm,
+}
+
+impl<const N: usize> Callable for Solve<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let target = read_target::<N>(&mut fields);
+        let rejected = fields.finish();
+        target.map(Self).ok_or(rejected)
+    }
+}
+
+impl<const N: usize> Answered for Solve<N> {
+    fn write(answer: Result<[f64; N], SolveError>, to: &Address) -> Bytes {
+        let values = answer
+            .as_ref()
+            .map(|positions| SolutionValues { positions });
+        to.outcome(values)
+    }
+}
+
+/// Reads `x`, `y` and `phi`; none if one of them, or a field read before, is rejected.
+///
+/// Two links leave no orientation to choose: what stands there under `phi` is not looked at.
+fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
+    let x = fields.number("x", Bound::Finite);
+    let y = fields.number("y", Bound::Finite);
+    let orientation = if N > 2 {
+        fields.number("phi", Bound::Finite)
+    } else {
+        None
+    };
+    let position = glam::DVec2::new(x?, y?);
+    fields.accepted().then_some(Target {
+        position,
+        orientation,
+    })
+}
+
+/// A target as messages show it.
+#[must_use]
+pub fn target_message(target: &Target) -> TargetMessage {
+    TargetMessage {
+        x: target.position.x,
+        y: target.position.y,
+        phi: target.orientation,
+    }
+}
+
+// ---- goals ----------------------------------------------------------------------------------------------------------
+
+/// The fields of a goal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GoalRequest {
+    /// The target.
+    pub target: Target,
+    /// When it counts as reached.
+    pub criteria: Criteria,
+}
+
+impl GoalRequest {
+    /// Reads a goal for an arm of `N` links.
+    ///
+    /// # Errors
+    /// All that is wrong with it, by name.
+    pub fn read<const N: usize>(
+        service: Service,
+        arguments: &Arguments,
+    ) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let target = read_target::<N>(&mut fields);
+        let epsilon = fields.number("epsilon", Bound::Positive);
+        let success_hold = fields.number("success_hold", Bound::NonNegative);
+        let default = Criteria::default();
+        match target.filter(|_| fields.accepted()) {
+            None => Err(fields.finish()),
+            Some(target) => Ok(Self {
+                target,
+                criteria: Criteria {
+                    epsilon: epsilon.unwrap_or(default.epsilon),
+                    success_hold: success_hold.unwrap_or(default.success_hold),
+                },
+            }),
+        }
+    }
+
+    /// Writes the response: the id of the goal that was accepted.
+    #[must_use]
+    pub fn write(answer: &Result<String, GoalRejected>, to: &Address) -> Bytes {
+        let values = answer.as_ref().map(|goal_id| GoalValues { goal_id });
+        to.outcome(values)
+    }
+}
+
+/// Why a goal was not accepted; nothing has changed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GoalRejected {
+    /// There is no solution.
+    #[error(transparent)]
+    Unsolved(#[from] SolveError),
+    /// A node has ended.
+    #[error("{0} does not answer")]
+    NoAnswer(
+        /// Its name.
+        &'static str,
+    ),
+}
+
+/// The fields of a cancellation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CancelRequest {
+    /// The goal that is meant, if one is named.
+    pub goal_id: Option<String>,
+}
+
+impl CancelRequest {
+    /// Reads a cancellation.
+    ///
+    /// # Errors
+    /// All that is wrong with it, by name.
+    pub fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
+        if fields.accepted() {
+            Ok(Self { goal_id })
+        } else {
+            Err(fields.finish())
+        }
+    }
+
+    /// Writes the response.
+    #[must_use]
+    pub fn write(answer: Result<(), CancelRejected>, to: &Address) -> Bytes {
+        to.outcome(answer.map(|()| Empty {}))
+    }
+}
+
+/// The error for a client that cancels a goal which it has not sent, or which has ended.
+pub const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
+
+/// Why nothing was cancelled.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CancelRejected {
+    /// There is nothing to cancel.
+    #[error("no goal is active")]
+    NotActive,
+    /// Another goal was meant.
+    #[error("goal_id is not that of the active goal, {active}")]
+    OtherGoal {
+        /// The active goal.
+        active: String,
+    },
+    /// The client has not sent the active goal under this id.
+    #[error("{NOT_ACTIVE}")]
+    NotSent,
+    /// The arm has ended.
+    #[error("{} does not answer", Node::ArmSim.name())]
+    NoAnswer,
+}
+
+/// A goal that was accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AcceptedGoal<const N: usize> {
+    /// Its number: goals are counted from 1.
+    pub number: u64,
+    /// Its id for clients.
+    pub id: String,
+    /// The target.
+    pub target: Target,
+    /// The setpoint that was sent \[rad\].
+    pub positions: [f64; N],
+}
+
+impl<const N: usize> AcceptedGoal<N> {
+    /// The goal of this number.
+    #[must_use]
+    pub fn new(number: u64, target: Target, positions: [f64; N]) -> Self {
+        Self {
+            number,
+            id: format!("goal-{number}"),
+            target,
+            positions,
+        }
+    }
+
+    /// The message about its progress: the distance left \[m\], and the simulation time since its start \[s\].
+    #[must_use]
+    pub fn feedback(&self, distance: f64, elapsed: f64) -> IkFeedback {
+        IkFeedback {
+            goal_id: self.id.clone(),
+            target: target_message(&self.target),
+            positions: self.positions.to_vec(),
+            distance_remaining: distance,
+            elapsed,
+        }
+    }
+
+    /// The message about its end.
+    #[must_use]
+    pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> IkResult {
+        IkResult {
+            goal_id: self.id.clone(),
+            outcome: outcome.map_or("", Outcome::name),
+            target: target_message(&self.target),
+            final_distance: distance,
+        }
+    }
+}

@@ -1,0 +1,395 @@
+//! `/study/gains` and `/study/plan`: advice that has been tried, and changes nothing.
+//!
+//! **Invariant:** every answer has been run, and the arm hears of none.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::reading::{taken, with_period};
+use super::{Present, Work};
+use crate::math::arm::{ArmError, State};
+use crate::math::integrator::Method;
+use crate::math::pid::Setpoint;
+use crate::math::simulation::ControlPeriod;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::arm::{SetGains, SetParams};
+use crate::services::field_by_field::FieldByField as _;
+use crate::services::{Address, Answered, Ask, Callable};
+use crate::study::control_loop::ControlLoop;
+use crate::study::gains::{GainsError, GainsRequirements, GainsSearch, SuggestedGains};
+use crate::study::linear::no_control;
+use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Looks for gains by which every move settles in time, with a margin of stability.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SuggestGains<const N: usize> {
+    /// Time in which every move is to settle \[s\], greater than 0.
+    pub settling_time: Option<f64>,
+    /// How many timesteps the smallest timestep limit over all poses is to be, at least 1.
+    pub margin: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub timestep: Option<f64>,
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+}
+
+impl<const N: usize> Ask for SuggestGains<N> {
+    type Answer = Result<Suggested<N>, NotSuggested>;
+}
+
+/// Gains that have been tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Suggested<const N: usize> {
+    /// The gains, and how they fared.
+    pub found: SuggestedGains<N>,
+    /// The timestep that the gains are for \[s\].
+    pub timestep: f64,
+}
+
+/// Why no gains are suggested.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotSuggested {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There are no such gains.
+    #[error(transparent)]
+    Gains(#[from] GainsError),
+}
+
+/// Looks for the cheapest method and timestep that keep a run within an error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanRun<const N: usize> {
+    /// The error of the end effector that may be made \[m\], greater than 0.
+    pub error: f64,
+    /// How long the run is \[s\], greater than 0.
+    pub duration: Option<f64>,
+    /// Whether the gains that are set control the arm where the question has none.
+    pub servo: bool,
+    /// Initial positions \[rad\].
+    pub q0: Option<[f64; N]>,
+    /// Initial velocities \[rad/s\].
+    pub qdot0: Option<[f64; N]>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// Gains that are to be others.
+    pub gains: Option<SetGains<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+    /// The time between two runs of the control law \[s\]; none, or 0, to have it planned.
+    pub control_period: Option<f64>,
+}
+
+impl<const N: usize> Ask for PlanRun<N> {
+    type Answer = Result<PlannedRun, NotPlanned>;
+}
+
+/// A plan that has been tried.
+#[derive(Debug, Clone)]
+pub struct PlannedRun {
+    /// The cheapest run that was found.
+    pub best: Candidate,
+    /// All runs that were tried and good enough.
+    pub planned: Planned,
+    /// The control period \[s\], where a controller holds the arm: the timestep, unless another was asked for.
+    pub control_period: Option<f64>,
+}
+
+/// Why there is no plan.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotPlanned {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There can't be such a plan.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Nothing was good enough.
+    #[error("no plan was found")]
+    Nothing,
+}
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+impl<const N: usize> Callable for SuggestGains<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            settling_time: fields.number("settling_time", Bound::Positive),
+            margin: fields.number("margin", Bound::Finite),
+            timestep: fields.number("timestep", Bound::Positive),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            params: fields.object("params", SetParams::of),
+        };
+        if ask.margin.is_some_and(|margin| margin < 1.0) {
+            fields.refuse("margin", &"must be at least 1");
+        }
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for SuggestGains<N> {
+    fn write(answer: Result<Suggested<N>, NotSuggested>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            kp: Vec<f64>,
+            ki: Vec<f64>,
+            kd: Vec<f64>,
+            timestep_limit: Option<f64>,
+            certified: bool,
+            margin: Option<f64>,
+            settled_after: f64,
+        }
+        to.outcome(answer.map(|Suggested { found, timestep }| Values {
+            kp: found.gains.kp.to_vec(),
+            ki: found.gains.ki.to_vec(),
+            kd: found.gains.kd.to_vec(),
+            timestep_limit: found.limit,
+            certified: found.certified,
+            margin: found.limit.map(|limit| limit / timestep),
+            settled_after: found.settled_after,
+        }))
+    }
+}
+
+impl<const N: usize> Callable for PlanRun<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            // The catalog requires the field: without it the question is rejected.
+            error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
+            duration: fields.number("duration", Bound::Positive),
+            servo: fields.boolean("servo").unwrap_or(false),
+            q0: fields.array("q0", Bound::Finite),
+            qdot0: fields.array("qdot0", Bound::Finite),
+            params: fields.object("params", SetParams::of),
+            gains: fields.object("gains", SetGains::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+            control_period: fields.number("control_period", Bound::NonNegative),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for PlanRun<N> {
+    fn write(answer: Result<PlannedRun, NotPlanned>, to: &Address) -> Bytes {
+        to.outcome(answer.map(PlanValues::from))
+    }
+}
+
+#[derive(Serialize)]
+struct PlanValues {
+    integrator: &'static str,
+    timestep: f64,
+    control_period: Option<f64>,
+    evaluations_per_second: f64,
+    error: f64,
+    error_uncertainty: f64,
+    methods: Vec<&'static str>,
+    timesteps: Vec<f64>,
+    evaluations: Vec<u64>,
+    errors: Vec<f64>,
+}
+
+impl From<PlannedRun> for PlanValues {
+    fn from(run: PlannedRun) -> Self {
+        let PlannedRun {
+            best,
+            planned,
+            control_period,
+        } = run;
+        let all = || planned.candidates.iter().rev();
+        Self {
+            integrator: best.method.name(),
+            timestep: best.timestep,
+            control_period,
+            evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
+            error: best.error,
+            error_uncertainty: planned.uncertainty,
+            methods: all().map(|one| one.method.name()).collect(),
+            timesteps: all().map(|one| one.timestep).collect(),
+            evaluations: all().map(|one| one.evaluations).collect(),
+            errors: all().map(|one| one.error).collect(),
+        }
+    }
+}
+
+// ---- work -----------------------------------------------------------------------------------------------------------
+
+/// Time to settle in unless it is said \[s\]: what the default gains promise of the default arms.
+const DEFAULT_SETTLING: f64 = 4.0;
+/// Margin unless it is said: the timestep is then no longer than `/study/stability` advises.
+const DEFAULT_MARGIN: f64 = 1.25;
+/// How long a plan is unless it is said \[s\].
+const DEFAULT_DURATION: f64 = 10.0;
+/// How long a plan under control is \[s\]: a move has settled by then.
+const DEFAULT_MOVE: f64 = 4.0;
+
+// ---- gains ----------------------------------------------------------------------------------------------------------
+
+/// A search for gains on its way.
+pub enum GainsWork<const N: usize> {
+    /// Not begun.
+    Asked(Box<(SuggestGains<N>, Present<N>)>),
+    /// A search, and the timestep that the gains are for.
+    Searching(Box<GainsSearch<N>>, f64),
+}
+
+impl<const N: usize> GainsWork<N> {
+    /// The work that `ask` asks for, of an arm that is `present` so.
+    #[must_use]
+    pub fn new(ask: SuggestGains<N>, present: Present<N>) -> Self {
+        Self::Asked(Box::new((ask, present)))
+    }
+}
+
+impl<const N: usize> Work<Result<Suggested<N>, NotSuggested>> for GainsWork<N> {
+    fn most_bytes(&self) -> usize {
+        GainsSearch::<N>::MOST_BYTES
+    }
+
+    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<Suggested<N>, NotSuggested>> {
+        match self {
+            Self::Asked(asked) => match begin_search(&asked.0, &asked.1.control) {
+                Ok((search, timestep)) => {
+                    *self = Self::Searching(Box::new(search), timestep);
+                    None
+                }
+                Err(why) => Some(Err(why)),
+            },
+            Self::Searching(search, timestep) => {
+                let timestep = *timestep;
+                let found = search.advance()?;
+                Some(match found {
+                    Ok(found) => Ok(Suggested { found, timestep }),
+                    Err(why) => Err(why.into()),
+                })
+            }
+        }
+    }
+}
+
+/// Begins the search, with the present settings where the question leaves something out.
+fn begin_search<const N: usize>(
+    ask: &SuggestGains<N>,
+    present: &ControlLoop<N>,
+) -> Result<(GainsSearch<N>, f64), NotSuggested> {
+    let arm = match &ask.params {
+        None => present.arm,
+        Some(params) => params.applied_to(&present.arm)?,
+    };
+    let control = ControlLoop {
+        arm,
+        method: ask.method.unwrap_or(present.method),
+        timestep: ask.timestep.unwrap_or(present.timestep),
+        period: ControlPeriod::default(),
+        ..*present
+    };
+    let requirements = GainsRequirements {
+        settling_time: ask.settling_time.unwrap_or(DEFAULT_SETTLING),
+        margin: ask.margin.unwrap_or(DEFAULT_MARGIN),
+    };
+    Ok((GainsSearch::new(&control, requirements)?, control.timestep))
+}
+
+// ---- plan -----------------------------------------------------------------------------------------------------------
+
+/// A plan on its way.
+pub enum PlanWork<const N: usize> {
+    /// Not begun.
+    Asked(Box<(PlanRun<N>, Present<N>)>),
+    /// A planning. Under control it has the period, which is 0 where that is planned too.
+    Planning(Box<Planning<N>>, Option<f64>),
+}
+
+impl<const N: usize> PlanWork<N> {
+    /// The work that `ask` asks for, of an arm that is `present` so.
+    #[must_use]
+    pub fn new(ask: PlanRun<N>, present: Present<N>) -> Self {
+        Self::Asked(Box::new((ask, present)))
+    }
+}
+
+impl<const N: usize> Work<Result<PlannedRun, NotPlanned>> for PlanWork<N> {
+    fn most_bytes(&self) -> usize {
+        Planning::<N>::MOST_BYTES
+    }
+
+    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<PlannedRun, NotPlanned>> {
+        match self {
+            Self::Asked(asked) => match begin_plan(&asked.0, &asked.1) {
+                Ok((planning, period)) => {
+                    *self = Self::Planning(Box::new(planning), period);
+                    None
+                }
+                Err(why) => Some(Err(why)),
+            },
+            Self::Planning(planning, period) => {
+                let period = *period;
+                let planned = planning.advance()?;
+                Some(planned.map_err(NotPlanned::from).and_then(|planned| {
+                    let best = *planned.best().ok_or(NotPlanned::Nothing)?;
+                    Ok(PlannedRun {
+                        best,
+                        planned,
+                        control_period: period
+                            .map(|period| if period > 0.0 { period } else { best.timestep }),
+                    })
+                }))
+            }
+        }
+    }
+}
+
+fn begin_plan<const N: usize>(
+    ask: &PlanRun<N>,
+    present: &Present<N>,
+) -> Result<(Planning<N>, Option<f64>), NotPlanned> {
+    let task = task(ask, present)?;
+    let period = (!task.control.is_free()).then_some(task.control.period.period);
+    Ok((Planning::new(task)?, period))
+}
+
+/// The run that is to be planned, with the present settings and state where the question leaves something out.
+fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N>, ArmError> {
+    let Present { control, state } = present;
+    let arm = match &ask.params {
+        None => control.arm,
+        Some(params) => params.applied_to(&control.arm)?,
+    };
+    // With the servo the gains are those that are set. Otherwise the arm is left to itself, as in a rollout.
+    let missing = if ask.servo {
+        control.gains
+    } else {
+        no_control()
+    };
+    let gains = ask.gains.as_ref();
+    let control = ControlLoop {
+        arm,
+        gains: gains.map_or(missing, |gains| gains.applied_to(&missing)),
+        setpoint: ask.setpoint.map_or(control.setpoint, Setpoint::at),
+        period: with_period(ControlPeriod::default(), ask.control_period),
+        ..*control
+    };
+    let usual = if control.is_free() {
+        DEFAULT_DURATION
+    } else {
+        DEFAULT_MOVE
+    };
+    Ok(Task {
+        control,
+        start: State {
+            position: ask.q0.unwrap_or(state.position),
+            velocity: ask.qdot0.unwrap_or(state.velocity),
+        },
+        duration: ask.duration.unwrap_or(usual),
+        error: ask.error,
+    })
+}

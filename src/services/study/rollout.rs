@@ -1,0 +1,349 @@
+//! `/study/rollout`: an offline run of the arm, sample by sample, with its cost and its error.
+//!
+//! The run is made once by itself, against a worker's clock. If a reference is asked for, it is made again beside the
+//! reference, which costs far more than the run: so `took` is the time of the run alone, whatever else was asked.
+//!
+//! **Invariant:** the samples are the live arm's own steps, and a run in slices gives the same bits as one at once.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use super::reading::{taken, with_period};
+use super::{NUMBER_BYTES, Present, Work};
+use crate::math::arm::{ArmError, State};
+use crate::math::integrator::Method;
+use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::streamed::StreamedResponse;
+use crate::services::arm::{SetGains, SetParams};
+use crate::services::field_by_field::FieldByField as _;
+use crate::services::{Address, Ask, Callable, Streamed};
+use crate::study::control_loop::ControlLoop;
+use crate::study::linear::no_control;
+use crate::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Runs the arm offline.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RunOffline<const N: usize> {
+    /// Initial positions \[rad\]; 0 unless said.
+    pub q0: Option<[f64; N]>,
+    /// Initial velocities \[rad/s\]; 0 unless said.
+    pub qdot0: Option<[f64; N]>,
+    /// How long \[s\], greater than 0.
+    pub duration: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub timestep: Option<f64>,
+    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+    pub control_period: Option<f64>,
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// The gains; without them nothing controls the arm. A part that is left out is switched off.
+    pub gains: Option<SetGains<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+    /// How many samples.
+    pub samples: Option<u64>,
+    /// Whether to run a reference too.
+    pub reference: Option<bool>,
+}
+
+impl<const N: usize> Ask for RunOffline<N> {
+    type Answer = Result<Box<Ran<N>>, NotRun>;
+}
+
+/// A run that has been made.
+pub struct Ran<const N: usize> {
+    /// The run.
+    pub run: Rollout<N>,
+    /// The time of a worker that the run alone took.
+    pub took: Duration,
+}
+
+/// Why nothing was run.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotRun {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There can't be such a run.
+    #[error(transparent)]
+    Rollout(#[from] RolloutError),
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+/// Samples encoded between two looks at the clock: some tens of microseconds.
+const SAMPLES_PER_LOOK: usize = 256;
+
+impl<const N: usize> Callable for RunOffline<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            q0: fields.array("q0", Bound::Finite),
+            qdot0: fields.array("qdot0", Bound::Finite),
+            duration: fields.number("duration", Bound::Positive),
+            timestep: fields.number("timestep", Bound::Positive),
+            control_period: fields.number("control_period", Bound::NonNegative),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            params: fields.object("params", SetParams::of),
+            gains: fields.object("gains", SetGains::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+            samples: fields.count("samples", MAX_SAMPLES),
+            reference: fields.boolean("reference"),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Streamed for RunOffline<N> {
+    type Writer = Result<RolloutWriter<N>, Bytes>;
+
+    fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Self::Writer {
+        match answer {
+            Ok(ran) => Ok(RolloutWriter::new(*ran, to)),
+            Err(why) => Err(to.failure(&why.to_string())),
+        }
+    }
+
+    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
+        match writer {
+            Ok(encoding) => encoding.advance(),
+            Err(failure) => Some(failure.clone()),
+        }
+    }
+}
+
+/// The answer, written a slice at a time: it may be 30 MB.
+pub struct RolloutWriter<const N: usize> {
+    run: Rollout<N>,
+    took: Duration,
+    writer: StreamedResponse,
+    /// Index of the array that is being written.
+    column: usize,
+    /// Index of its next entry.
+    entry: usize,
+}
+
+/// The arrays, in the order in which they are written.
+const ARRAYS: [&str; 5] = [
+    "{\"times\":[",
+    "],\"positions\":[",
+    "],\"velocities\":[",
+    "],\"efforts\":[",
+    "],\"energy\":[",
+];
+
+impl<const N: usize> RolloutWriter<N> {
+    fn new(Ran { run, took }: Ran<N>, to: &Address) -> Self {
+        Self {
+            run,
+            took,
+            writer: StreamedResponse::new(to.name(), to.id()),
+            column: 0,
+            entry: 0,
+        }
+    }
+
+    /// Writes some more. Returns the frame once it is whole.
+    fn advance(&mut self) -> Option<Bytes> {
+        let Some(head) = ARRAYS.get(self.column) else {
+            return Some(self.finish());
+        };
+        if self.entry == 0 {
+            self.writer.raw(head);
+        }
+        let samples = self.run.times().len();
+        let end = samples.min(self.entry + SAMPLES_PER_LOOK);
+        for entry in self.entry..end {
+            if entry > 0 {
+                self.writer.raw(",");
+            }
+            let run = &self.run;
+            match self.column {
+                0 => number(&mut self.writer, run.times().get(entry)),
+                1 => row(&mut self.writer, run.positions().get(entry)),
+                2 => row(&mut self.writer, run.velocities().get(entry)),
+                3 => row(&mut self.writer, run.efforts().get(entry)),
+                _ => number(&mut self.writer, run.energy().get(entry)),
+            }
+        }
+        self.entry = end;
+        if end == samples {
+            self.column += 1;
+            self.entry = 0;
+        }
+        None
+    }
+
+    fn finish(&mut self) -> Bytes {
+        let method = self.run.known(self.run.deviation());
+        let sampling = self.run.known(self.run.from_ideal());
+        let writer = &mut self.writer;
+        writer.raw(&format!(
+            "],\"evaluations\":{},\"wall_time\":",
+            self.run.evaluations()
+        ));
+        writer.number(self.took.as_secs_f64());
+        for (name, value) in [
+            ("error", method.0),
+            ("error_uncertainty", method.1),
+            ("sampling_error", sampling.0),
+            ("sampling_error_uncertainty", sampling.1),
+        ] {
+            writer.raw(&format!(",\"{name}\":"));
+            writer.number(value.unwrap_or(f64::NAN));
+        }
+        writer.raw("}");
+        std::mem::take(writer).finish(true, "")
+    }
+}
+
+fn number(writer: &mut StreamedResponse, value: Option<&f64>) {
+    writer.number(value.copied().unwrap_or(f64::NAN));
+}
+
+fn row<const N: usize>(writer: &mut StreamedResponse, values: Option<&[f64; N]>) {
+    for (joint, value) in values.into_iter().flatten().enumerate() {
+        writer.raw(if joint == 0 { "[" } else { "," });
+        writer.number(*value);
+    }
+    writer.raw("]");
+}
+// ---- work -----------------------------------------------------------------------------------------------------------
+
+/// How long a run is unless it is said \[s\].
+const DEFAULT_DURATION: f64 = 10.0;
+/// Samples of a run unless it is said, if there are as many steps: enough for a smooth curve.
+const DEFAULT_SAMPLES: u64 = 1001;
+/// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
+const EVALUATIONS_PER_LOOK: u64 = 2000;
+/// Numbers in a sample of the answer beside those of the joints, and as many again for brackets and commas.
+const COLUMNS: usize = 5;
+
+/// A run on its way.
+pub enum RolloutWork<const N: usize> {
+    /// Not begun.
+    Asked(Box<(RunOffline<N>, Present<N>)>),
+    /// The run by itself.
+    Running(Box<Timed<N>>),
+    /// The run beside a reference.
+    Comparing(Box<Ran<N>>),
+    /// The run has been given away.
+    Done,
+}
+
+/// A run by itself, with the time that it took so far.
+pub struct Timed<const N: usize> {
+    ran: Ran<N>,
+    /// The run to be made again beside a reference, if that is wanted.
+    again: Option<RolloutRequest<N>>,
+}
+
+impl<const N: usize> RolloutWork<N> {
+    /// The work that `ask` asks for, of an arm that is `present` so.
+    #[must_use]
+    pub fn new(ask: RunOffline<N>, present: Present<N>) -> Self {
+        Self::Asked(Box::new((ask, present)))
+    }
+}
+
+impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
+    fn most_bytes(&self) -> usize {
+        let Self::Asked(asked) = self else {
+            return 0;
+        };
+        let samples = asked.0.samples.unwrap_or(DEFAULT_SAMPLES);
+        usize::try_from(samples)
+            .unwrap_or(usize::MAX)
+            .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES)
+            .saturating_add(size_of::<Rollout<N>>())
+    }
+
+    fn advance(&mut self, clock: fn() -> Duration) -> Option<Result<Box<Ran<N>>, NotRun>> {
+        *self = match std::mem::replace(self, Self::Done) {
+            Self::Asked(asked) => match begin(&asked.0, &asked.1) {
+                Ok(timed) => Self::Running(Box::new(timed)),
+                Err(why) => return Some(Err(why)),
+            },
+            Self::Running(mut timed) => {
+                let began = clock();
+                let steps = timed.ran.run.advance(EVALUATIONS_PER_LOOK);
+                timed.ran.took += clock().saturating_sub(began);
+                let Timed { ran, again } = *timed;
+                if steps > 0 {
+                    Self::Running(Box::new(Timed { ran, again }))
+                } else if let Some(Ok(run)) = again.map(Rollout::new) {
+                    Self::Comparing(Box::new(Ran { run, ..ran }))
+                } else {
+                    return Some(Ok(Box::new(ran)));
+                }
+            }
+            Self::Comparing(mut ran) => {
+                if ran.run.advance(EVALUATIONS_PER_LOOK) == 0 {
+                    return Some(Ok(ran));
+                }
+                Self::Comparing(ran)
+            }
+            Self::Done => {
+                debug_assert!(false, "the run has been given away");
+                return None;
+            }
+        };
+        None
+    }
+}
+
+/// Makes the run, which checks what concerns several fields.
+fn begin<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Timed<N>, NotRun> {
+    let request = request(ask, present)?;
+    let alone = RolloutRequest {
+        reference: false,
+        ..request
+    };
+    Ok(Timed {
+        ran: Ran {
+            run: Rollout::new(alone)?,
+            took: Duration::ZERO,
+        },
+        again: request.reference.then_some(request),
+    })
+}
+
+/// The request for the run, with the present settings where the question leaves something out.
+fn request<const N: usize>(
+    ask: &RunOffline<N>,
+    present: &Present<N>,
+) -> Result<RolloutRequest<N>, NotRun> {
+    let control = &present.control;
+    let arm = match &ask.params {
+        None => control.arm,
+        Some(params) => params.applied_to(&control.arm)?,
+    };
+    let gains = ask.gains.as_ref();
+    let setpoint = ask.setpoint.map(Setpoint::at);
+    Ok(RolloutRequest {
+        control: ControlLoop {
+            arm,
+            // A part of the law that is left out is switched off; without any the whole law is.
+            gains: gains.map_or(no_control(), |gains| gains.applied_to(&no_control())),
+            setpoint: setpoint.unwrap_or(control.setpoint),
+            method: ask.method.unwrap_or(control.method),
+            timestep: ask.timestep.unwrap_or(control.timestep),
+            period: with_period(control.period, ask.control_period),
+        },
+        start: State {
+            position: ask.q0.unwrap_or([0.0; N]),
+            velocity: ask.qdot0.unwrap_or([0.0; N]),
+        },
+        duration: ask.duration.unwrap_or(DEFAULT_DURATION),
+        samples: ask.samples.unwrap_or(DEFAULT_SAMPLES),
+        reference: ask.reference.unwrap_or(false),
+    })
+}

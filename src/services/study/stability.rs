@@ -1,0 +1,221 @@
+//! `/study/stability`: the largest stable timesteps of a control loop.
+//!
+//! The gains are those that are set, whether the controller is on or off: the question is what timestep it would bear.
+//! Gains that are all zero ask about the arm left to itself. The motion is the one that is ahead of the arm as it is
+//! now.
+//!
+//! **Invariant:** a limit is given only where something limits, and is 0 where no timestep is stable.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::reading::{taken, with_period};
+use super::{Present, Work};
+use crate::math::arm::ArmError;
+use crate::math::integrator::Method;
+use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::services::arm::{SetGains, SetParams};
+use crate::services::field_by_field::FieldByField as _;
+use crate::services::{Address, Answered, Ask, Callable};
+use crate::study::clocks::{ClockLimits, clock_limits};
+use crate::study::control_loop::ControlLoop;
+use crate::study::motion::{FREE_SECONDS, Motion};
+use crate::study::stability::{LimitSearch, Limits};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Predicts the largest stable timesteps of a control loop.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PredictStability<const N: usize> {
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Gains that are to be others.
+    pub gains: Option<SetGains<N>>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+    /// The time between two runs of the control law \[s\], not negative; 0 for every step.
+    pub control_period: Option<f64>,
+}
+
+impl<const N: usize> Ask for PredictStability<N> {
+    type Answer = Result<Box<Predicted<N>>, ArmError>;
+}
+
+/// A prediction.
+pub struct Predicted<const N: usize> {
+    /// The largest stable timesteps.
+    pub limits: Limits<N>,
+    /// The limits of control period and timestep.
+    pub clocks: ClockLimits,
+    /// The motion that is ahead of the arm as it is now, and what timestep it bears.
+    pub motion: Motion,
+    /// Whether the arm is left to itself.
+    pub is_free: bool,
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+impl<const N: usize> Callable for PredictStability<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            gains: fields.object("gains", SetGains::of),
+            params: fields.object("params", SetParams::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+            control_period: fields.number("control_period", Bound::NonNegative),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for PredictStability<N> {
+    fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
+        match answer {
+            Ok(predicted) => to.response(&StabilityValues::new(&predicted), ""),
+            Err(why) => to.failure(&format!("params {why}")),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct StabilityValues {
+    control_period_limit: Option<f64>,
+    timestep_limit: Option<f64>,
+    timestep_limit_held: Option<f64>,
+    timestep_limit_continuous: Option<f64>,
+    equilibrium: Vec<f64>,
+    equilibrium_kind: &'static str,
+    minimum_over_poses_held: Option<f64>,
+    minimum_over_poses_continuous: Option<f64>,
+    minimum_over_poses_bound: Option<f64>,
+    bound_is_proven: bool,
+    certified: bool,
+    worst_pose: Option<Vec<f64>>,
+    critical: Option<CriticalValues>,
+    timestep_limit_motion: Option<f64>,
+    motion_speed: f64,
+    advised_timestep: Option<f64>,
+    advised_duration: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct CriticalValues {
+    growth_per_step: f64,
+    frequency: f64,
+    joint: usize,
+}
+
+impl StabilityValues {
+    fn new<const N: usize>(predicted: &Predicted<N>) -> Self {
+        let Predicted {
+            limits,
+            clocks,
+            motion,
+            ..
+        } = predicted;
+        let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+        Self {
+            control_period_limit: clocks.period,
+            timestep_limit: clocks.timestep,
+            timestep_limit_held: limits.held,
+            timestep_limit_continuous: limits.continuous,
+            equilibrium: limits.equilibrium.to_vec(),
+            equilibrium_kind: limits.rest.name(),
+            minimum_over_poses_held: limits.minimum_held,
+            minimum_over_poses_continuous: limits.minimum_continuous,
+            minimum_over_poses_bound: limits.bound,
+            bound_is_proven: limits.bound_is_proven,
+            certified: limits.certified,
+            worst_pose: limits.worst_pose.map(|pose| pose.to_vec()),
+            critical: limits.critical.map(|critical| CriticalValues {
+                growth_per_step: critical.growth_per_step,
+                frequency: critical.frequency,
+                joint: critical.joint,
+            }),
+            timestep_limit_motion: bears,
+            motion_speed: motion.speed,
+            advised_timestep: limits.advised_for(motion),
+            advised_duration: predicted.is_free.then_some(FREE_SECONDS),
+        }
+    }
+}
+
+// ---- work -----------------------------------------------------------------------------------------------------------
+
+/// A prediction on its way.
+pub enum StabilityWork<const N: usize> {
+    /// Not begun.
+    Asked(Box<(PredictStability<N>, Present<N>)>),
+    /// The search, and the other parts of the answer.
+    Searching(Box<LimitSearch<N>>, ClockLimits, Motion, bool),
+}
+
+impl<const N: usize> StabilityWork<N> {
+    /// The work that `ask` asks for, of an arm that is `present` so.
+    #[must_use]
+    pub fn new(ask: PredictStability<N>, present: Present<N>) -> Self {
+        Self::Asked(Box::new((ask, present)))
+    }
+}
+
+impl<const N: usize> Work<Result<Box<Predicted<N>>, ArmError>> for StabilityWork<N> {
+    fn most_bytes(&self) -> usize {
+        LimitSearch::<N>::MOST_BYTES
+    }
+
+    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<Box<Predicted<N>>, ArmError>> {
+        match self {
+            Self::Asked(asked) => {
+                let (ask, present) = &**asked;
+                match control_loop(ask, &present.control) {
+                    Ok(control) => {
+                        let search = LimitSearch::new(&control);
+                        let motion = Motion::ahead(&control, &present.state);
+                        let (clocks, is_free) = (clock_limits(&control), control.is_free());
+                        *self = Self::Searching(Box::new(search), clocks, motion, is_free);
+                        None
+                    }
+                    Err(why) => Some(Err(why)),
+                }
+            }
+            Self::Searching(search, clocks, motion, is_free) => {
+                let limits = search.advance()?;
+                Some(Ok(Box::new(Predicted {
+                    limits,
+                    clocks: *clocks,
+                    motion: *motion,
+                    is_free: *is_free,
+                })))
+            }
+        }
+    }
+}
+
+/// The loop that is asked about.
+fn control_loop<const N: usize>(
+    ask: &PredictStability<N>,
+    present: &ControlLoop<N>,
+) -> Result<ControlLoop<N>, ArmError> {
+    let arm = match &ask.params {
+        None => present.arm,
+        Some(params) => params.applied_to(&present.arm)?,
+    };
+    let gains = ask.gains.as_ref();
+    let setpoint = ask.setpoint.map(Setpoint::at);
+    Ok(ControlLoop {
+        arm,
+        gains: gains.map_or(present.gains, |gains| gains.applied_to(&present.gains)),
+        setpoint: setpoint.unwrap_or(present.setpoint),
+        method: ask.method.unwrap_or(present.method),
+        timestep: present.timestep,
+        period: with_period(present.period, ask.control_period),
+    })
+}

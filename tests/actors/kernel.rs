@@ -1,0 +1,371 @@
+//! The kernel of the page without a server beside the runtime: the same frames at the same times have the same answers.
+//!
+//! Both begin at one instant of virtual time. What only one of them can know is left out: how long work took.
+
+use std::cell::Cell;
+use std::time::Duration;
+
+use crate::stage::{Client, Stage, ms, pass};
+use crate::system::in_virtual_time;
+use pendularm::actors::compute::study::Study;
+use pendularm::actors::compute::workers::WorkerPool;
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm_wasm::Kernel;
+use serde_json::{Value, json};
+use tokio::time::Instant;
+
+thread_local! {
+    static BEGAN: Cell<Option<Instant>> = const { Cell::new(None) };
+}
+
+/// Virtual time since the kernel was made.
+fn clock() -> Duration {
+    BEGAN.get().map_or(Duration::ZERO, |began| began.elapsed())
+}
+
+/// A runtime and a kernel, each with a client that asks the same.
+struct Both<const N: usize> {
+    stage: Stage<N>,
+    client: Client,
+    kernel: Kernel<N>,
+    /// All that the kernel said.
+    said: Vec<Value>,
+}
+
+const SEED: u64 = 11;
+
+impl<const N: usize> Both<N>
+where
+    Arm<N>: Default,
+    Gains<N>: Default,
+{
+    async fn start() -> Self {
+        let workers = WorkerPool::without_threads();
+        let pool = workers.clone();
+        actix::spawn(async move {
+            loop {
+                while workers.turn() {}
+                pass(ms(1)).await;
+            }
+        });
+        let stage = Stage::<N>::with_nodes(SEED, |arm, nodes| {
+            let study = Study::new(arm.clone().recipient(), pool);
+            Study::attach(&actix::Actor::start(study), nodes);
+        });
+        let stage = stage.await;
+        BEGAN.set(Some(Instant::now()));
+        let kernel = Kernel::new(clock, SEED);
+        let client = stage.connect();
+        let mut both = Self {
+            stage,
+            client,
+            kernel,
+            said: Vec::new(),
+        };
+        both.send(json!({"op": "set_level", "level": "warning", "errors": "object"}))
+            .await;
+        both
+    }
+
+    async fn send(&mut self, frame: Value) {
+        self.client.send(&frame).await;
+        self.client.settle().await;
+        self.kernel.receive(&frame.to_string());
+        self.hear();
+    }
+
+    fn hear(&mut self) {
+        let frames = String::from_utf8(self.kernel.take_frames()).unwrap();
+        let lines = frames
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        self.said.extend(lines);
+    }
+
+    async fn subscribe(&mut self, topic: &str) {
+        self.send(json!({"op": "subscribe", "topic": topic})).await;
+    }
+
+    /// Lets time pass, with the ticks in it.
+    async fn pass(&mut self, time: Duration) {
+        let (end, tick) = (clock() + time, Duration::from_secs(1) / 60);
+        loop {
+            let since_tick = clock().as_nanos() % tick.as_nanos();
+            let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap());
+            if clock() + wait > end {
+                break;
+            }
+            pass(wait).await;
+            self.kernel.tick();
+            self.hear();
+        }
+        pass(end.saturating_sub(clock())).await;
+    }
+
+    /// The answers of both, and the statuses before them.
+    async fn call(&mut self, service: &str, args: Value) -> (Value, Value) {
+        let frame = json!({"op": "call_service", "id": "one", "service": service, "args": args});
+        let before = (self.client.heard.len(), self.said.len());
+        self.kernel.receive(&frame.to_string());
+        while self.kernel.compute(ms(1)) {}
+        self.hear();
+        self.client.send(&frame).await;
+        let is_answer = |frame: &Value| frame["op"] == "service_response" && frame["id"] == "one";
+        self.client.next_where(is_answer).await;
+        let of = |heard: &[Value]| -> Value {
+            let told = heard.iter().filter(|frame| frame["op"] != "publish");
+            told.cloned().map(without_times).collect()
+        };
+        (
+            of(&self.client.heard[before.0..]),
+            of(&self.said[before.1..]),
+        )
+    }
+
+    async fn agree(&mut self, service: &str, args: Value) -> Value {
+        if service.starts_with("/study/") {
+            // The study takes the arm as it was last advanced: here, to now.
+            self.call("/arm_sim/pause", json!({})).await;
+        }
+        let (theirs, ours) = self.call(service, args.clone()).await;
+        assert_eq!(ours, theirs, "{service} {args}");
+        ours.as_array().unwrap().last().unwrap().clone()
+    }
+
+    /// Both have published the same on a topic.
+    fn agree_on(&self, topic: &str) -> usize {
+        let theirs = self.client.messages(topic);
+        let is_on = |frame: &&Value| frame["topic"] == topic;
+        let ours = self
+            .said
+            .iter()
+            .filter(is_on)
+            .map(|frame| frame["msg"].clone());
+        let ours: Vec<Value> = ours.collect();
+        assert_eq!(ours, theirs, "{topic}");
+        ours.len()
+    }
+}
+
+/// The frame without what depends on how fast the machine is.
+fn without_times(mut frame: Value) -> Value {
+    if let Some(values) = frame["values"].as_object_mut() {
+        values.remove("wall_time");
+    }
+    frame
+}
+
+/// Arguments that are good or bad for some service or other.
+fn arguments(links: usize) -> Vec<Value> {
+    let per_joint = |value: f64| vec![value; links];
+    vec![
+        json!({}),
+        json!(null),
+        json!([]),
+        json!("text"),
+        json!([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]),
+        json!({"data": "yes", "unknown": 1}),
+        json!({"data": true}),
+        json!({"data": false}),
+        json!({"method": "verlet", "timestep": -1, "integrator": "nothing"}),
+        json!({"method": "rk5", "timestep": 0.002, "integrator": "midpoint"}),
+        json!({"gravity": 3.7, "masses": per_joint(2.0), "lengths": [1]}),
+        json!({"gravity": "heavy", "masses": per_joint(0.0), "lengths": per_joint(0.9)}),
+        json!({"kp": per_joint(300.0), "ki": per_joint(-1.0), "kd": 5}),
+        json!({"period": 0.01, "delay": true, "control_period": -1}),
+        json!({"period": null, "delay": null, "control_period": 0.004}),
+        json!({"position": per_joint(0.3), "velocity": "fast"}),
+        json!({"steps": 25, "effort": per_joint(1.0)}),
+        json!({"steps": 0, "effort": per_joint(1e9)}),
+        json!({"effort": per_joint(4.0), "duration": 0.25}),
+        json!({"effort": per_joint(4.0), "duration": 0}),
+        json!({"x": 0.7, "y": 0.9, "phi": 0.4}),
+        json!({"x": 70, "y": 0.9, "phi": 0.4}),
+        json!({"x": 0.7, "epsilon": 0}),
+        json!({"goal_id": "goal-1"}),
+        json!({"goal_id": 7}),
+        json!({"duration": 2.5, "epsilon": 0.05, "success_hold": 0.1}),
+        json!({"duration": 0.5, "samples": 7, "reference": true, "timestep": 0.01}),
+        json!({"duration": 1e300, "samples": 1_000_000_000}),
+        json!({"settling_time": 1e-9, "margin": 0.5}),
+        json!({"error": 0.01, "servo": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
+        json!({"params": {"masses": per_joint(3.0)}, "gains": {"kp": per_joint(200.0)}, "duration": 0.3}),
+        json!({"params": {"masses": 3}, "gains": {"kp": "stiff"}}),
+    ]
+}
+
+/// Whether the arguments are worth a computation: unknown fields are ignored, and without a known one it is the same again.
+fn is_of_the_study(service: &str, args: &Value) -> bool {
+    let Some(fields) = args.as_object() else {
+        return !args.is_null() && *args != json!([]);
+    };
+    let known = match service {
+        "/study/gains" => &["settling_time", "margin"][..],
+        "/study/rollout" => &["samples", "params", "gains"],
+        _ => &["params", "control_period"],
+    };
+    fields.is_empty() || known.iter().any(|name| fields.contains_key(*name))
+}
+
+/// Those that the page asks, and one more; the others need a server.
+const SERVED: [&str; 20] = [
+    "/arm_sim/set_params",
+    "/arm_sim/set_integrator",
+    "/arm_sim/set_state",
+    "/arm_sim/step",
+    "/arm_sim/reset",
+    "/arm_sim/pause",
+    "/arm_sim/disturb",
+    "/pid_controller/set_gains",
+    "/pid_controller/set_period",
+    "/pid_controller/enable",
+    "/ik/solve",
+    "/ik_action/send_goal",
+    "/ik_action/cancel_goal",
+    "/ik_trial/start",
+    "/ik_trial/skip",
+    "/ik_trial/stop",
+    "/study/stability",
+    "/study/gains",
+    "/study/rollout",
+    "/nobody/knows",
+];
+
+async fn every_answer_is_the_same<const N: usize>()
+where
+    Arm<N>: Default,
+    Gains<N>: Default,
+{
+    let mut both = Both::<N>::start().await;
+    let (mut good, mut refused) = (0, 0);
+    for service in SERVED {
+        for args in arguments(N) {
+            if service.starts_with("/study/") && !is_of_the_study(service, &args) {
+                continue;
+            }
+            let answer = both.agree(service, args).await;
+            if answer["result"] == true {
+                good += 1;
+            } else {
+                refused += 1;
+            }
+            both.pass(ms(7)).await;
+        }
+    }
+    assert!(
+        good > 100 && refused > 100,
+        "{good} good, {refused} refused"
+    );
+    both.agree("/arm_sim/pause", json!({})).await;
+    let ours = both.kernel.simulation();
+    let theirs = both.stage.simulation().await;
+    assert_eq!(ours.state(), theirs.state());
+    assert_eq!(ours.steps(), theirs.steps());
+}
+
+#[test]
+fn every_answer_of_an_arm_of_two_links_is_the_same() {
+    in_virtual_time(every_answer_is_the_same::<2>());
+}
+
+#[test]
+fn every_answer_of_an_arm_of_three_links_is_the_same() {
+    in_virtual_time(every_answer_is_the_same::<3>());
+}
+
+#[test]
+fn a_goal_and_its_messages_are_the_same() {
+    in_virtual_time(async {
+        let mut both = Both::<2>::start().await;
+        for topic in [
+            "/joint_states",
+            "/joint_trajectory",
+            "/ik_action/feedback",
+            "/ik_action/result",
+        ] {
+            both.subscribe(topic).await;
+        }
+        both.agree("/ik_action/send_goal", json!({"x": 0.7, "y": 0.9}))
+            .await;
+        both.agree("/pid_controller/enable", json!({"data": true}))
+            .await;
+        both.pass(ms(900)).await;
+        // Another goal takes its place, and a third is cancelled.
+        both.agree("/ik_action/send_goal", json!({"x": -0.7, "y": 1.1}))
+            .await;
+        both.pass(ms(6000)).await;
+        both.agree("/ik_action/send_goal", json!({"x": 0.2, "y": -1.1}))
+            .await;
+        both.pass(ms(50)).await;
+        both.agree("/ik_action/cancel_goal", json!({"goal_id": "goal-3"}))
+            .await;
+        both.agree("/ik_action/send_goal", json!({"x": 0.3, "y": -1.1}))
+            .await;
+        both.pass(ms(50)).await;
+        both.agree("/arm_sim/reset", json!({})).await;
+        both.agree("/arm_sim/pause", json!({"data": true})).await;
+        both.agree("/arm_sim/step", json!({"steps": 1500})).await;
+        both.pass(ms(100)).await;
+        both.client.settle().await;
+        assert_eq!(both.agree_on("/ik_action/result"), 4);
+        assert_eq!(both.agree_on("/joint_trajectory"), 4);
+        assert!(both.agree_on("/ik_action/feedback") > 100);
+        assert!(both.agree_on("/joint_states") > 400);
+    });
+}
+
+#[test]
+fn a_trial_has_the_same_targets_and_the_same_end() {
+    in_virtual_time(async {
+        let mut both = Both::<2>::start().await;
+        both.subscribe("/ik_action/result").await;
+        both.subscribe("/joint_trajectory").await;
+        both.agree("/pid_controller/enable", json!({"data": true}))
+            .await;
+        let terms = json!({"duration": 20.0, "epsilon": 0.05, "success_hold": 0.2});
+        both.agree("/ik_trial/start", terms).await;
+        both.pass(ms(9000)).await;
+        both.agree("/ik_trial/skip", json!({})).await;
+        both.pass(ms(12_000)).await;
+        both.agree("/ik_trial/stop", json!({})).await;
+        both.client.settle().await;
+        assert!(both.agree_on("/ik_action/result") > 3);
+        assert!(both.agree_on("/joint_trajectory") > 3);
+    });
+}
+
+#[test]
+fn setpoints_and_efforts_are_taken_or_refused_alike() {
+    in_virtual_time(async {
+        let mut both = Both::<2>::start().await;
+        both.subscribe("/joint_trajectory").await;
+        for (topic, msg) in [
+            (
+                "/joint_trajectory",
+                json!({"points": [{"positions": [0.4, -0.2]}]}),
+            ),
+            (
+                "/joint_trajectory",
+                json!({"points": [{"positions": [0.4]}]}),
+            ),
+            ("/joint_trajectory", json!({"points": []})),
+            ("/effort_controller/commands", json!({"data": [1.5, -0.5]})),
+            ("/effort_controller/commands", json!({"data": [1.5]})),
+        ] {
+            both.send(json!({"op": "publish", "topic": topic, "id": "p", "msg": msg}))
+                .await;
+            both.pass(ms(40)).await;
+        }
+        let statuses = |heard: &[Value]| -> Vec<Value> {
+            let told = heard.iter().filter(|frame| frame["op"] == "status");
+            told.cloned().collect()
+        };
+        assert_eq!(statuses(&both.said), statuses(&both.client.heard));
+        assert_eq!(statuses(&both.said).len(), 3);
+        assert_eq!(both.agree_on("/joint_trajectory"), 3);
+        both.agree("/arm_sim/pause", json!({"data": true})).await;
+        let ours = *both.kernel.simulation().state();
+        assert_eq!(ours, *both.stage.simulation().await.state());
+    });
+}

@@ -1,0 +1,18 @@
+// Compares the runs of the kernel in the page with native ones, to the bit: `runs.mjs NATIVE.txt pendularm.html`.
+
+import { readFileSync } from "node:fs";
+import { gunzipSync } from "node:zlib";
+
+const [native, page] = process.argv.slice(2).map((name) => readFileSync(name, "utf8"));
+const carried = /id="kernel-module">([^<]*)</.exec(page)[1];
+const environment = { env: { milliseconds: () => performance.now() } };
+const { instance } = await WebAssembly.instantiate(gunzipSync(Buffer.from(carried, "base64")), environment);
+const { memory, compare, output } = instance.exports;
+const length = compare();
+const ours = Buffer.from(memory.buffer, output(), length).toString();
+const runs = native.trim().split("\n").length;
+if (runs !== 16 || ours !== native) {
+  console.error(`${runs} native runs:\n${native}\nthe kernel's:\n${ours}`);
+  process.exit(1);
+}
+console.log(`${runs} runs of the kernel have the bits of the native ones`);

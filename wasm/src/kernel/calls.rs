@@ -1,0 +1,158 @@
+//! Calls: which question each service asks, and its answer.
+//!
+//! **Invariant:** a question is read and its answer written by the runtime's own functions.
+
+use pendularm::live::ArmRequest;
+use pendularm::math::kinematics::solve;
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::messages;
+use pendularm::protocol::op::{Arguments, CallService};
+use pendularm::protocol::wire::payload::Payload;
+use pendularm::services::arm::{
+    Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
+};
+use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
+use pendularm::services::study::{
+    GainsWork, PlanRun, PlanWork, PredictStability, RolloutWork, RunOffline, StabilityWork,
+    SuggestGains, Work,
+};
+use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
+use pendularm::services::{Address, Answered, Callable, NoService};
+
+use super::Kernel;
+use super::computing::{Short, Streaming};
+
+impl<const N: usize> Kernel<N> {
+    /// Takes a call.
+    pub(super) fn call(&mut self, call: CallService, id: Option<Payload>) {
+        let CallService { service, args, .. } = call;
+        let Some(own) = Service::from_name(&service) else {
+            let why = NoService::NoProvider(service.clone()).to_string();
+            return self.send(messages::failure(
+                &service,
+                id.as_ref(),
+                &why,
+                self.error_form,
+            ));
+        };
+        if !own.is_computation() {
+            self.attend();
+        }
+        let to = Address::new(own, service.into_boxed_str(), id).with_errors(self.error_form);
+        match own {
+            Service::SetIntegrator => self.of_arm::<SetIntegrator>(own, &args, &to),
+            Service::SetParams => self.of_arm::<SetParams<N>>(own, &args, &to),
+            Service::Pause => self.of_arm::<Pause>(own, &args, &to),
+            Service::Reset => self.of_arm::<Reset<N>>(own, &args, &to),
+            Service::SetState => self.of_arm::<SetState<N>>(own, &args, &to),
+            Service::Disturb => self.of_arm::<Disturb<N>>(own, &args, &to),
+            Service::SetGains => self.of_arm::<SetGains<N>>(own, &args, &to),
+            Service::SetPeriod => self.of_arm::<SetPeriod>(own, &args, &to),
+            Service::Enable => self.of_arm::<Enable>(own, &args, &to),
+            Service::Step => self.answer::<Step<N>>(own, &args, &to, Self::step),
+            Service::Solve => self.answer(own, &args, &to, |kernel, Solve::<N>(target)| {
+                let pose = kernel.arm.pose();
+                Ok(solve(&pose.lengths, &pose.positions, &target)?)
+            }),
+            Service::SendGoal => match GoalRequest::read::<N>(own, &args) {
+                Ok(goal) => self.take_goal(goal, &to),
+                Err(rejected) => self.send(to.failure(&rejected.status())),
+            },
+            Service::CancelGoal => match CancelRequest::read(own, &args) {
+                Ok(CancelRequest { goal_id }) => {
+                    let outcome = self.cancel(goal_id.as_deref());
+                    self.send(CancelRequest::write(outcome, &to));
+                }
+                Err(rejected) => self.send(to.failure(&rejected.status())),
+            },
+            Service::TrialStart => {
+                self.answer::<StartTrial>(own, &args, &to, |kernel, ask| {
+                    kernel.start_trial(ask, &to)
+                });
+            }
+            Service::TrialSkip => {
+                self.answer::<SkipTarget>(own, &args, &to, |kernel, _| kernel.skip_target(&to));
+            }
+            Service::TrialStop => {
+                self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
+            }
+            Service::Stability => {
+                self.compute_short::<PredictStability<N>, _>(own, &args, to, StabilityWork::new);
+            }
+            Service::SuggestGains => {
+                self.compute_short::<SuggestGains<N>, _>(own, &args, to, GainsWork::new);
+            }
+            Service::Plan => self.compute_short::<PlanRun<N>, _>(own, &args, to, PlanWork::new),
+            Service::Rollout => match RunOffline::<N>::read(own, &args) {
+                Ok(ask) => {
+                    let work = RolloutWork::new(ask, self.arm.present());
+                    let run = Streaming::<RunOffline<N>>::new(work, to);
+                    self.computations.push_back(Box::new(run));
+                }
+                Err(rejected) => self.send(to.failure(&rejected.status())),
+            },
+            _ => self.send(to.failure(&NoService::NotServed(to.name().to_owned()).to_string())),
+        }
+    }
+
+    /// Reads a question, has it answered, and writes the answer behind all news of goals.
+    fn answer<A: Answered>(
+        &mut self,
+        service: Service,
+        args: &Arguments,
+        to: &Address,
+        answer: impl FnOnce(&mut Self, A) -> A::Answer,
+    ) {
+        match A::read(service, args) {
+            Ok(ask) => {
+                let answer = answer(self, ask);
+                self.settle();
+                self.send(A::write(answer, to));
+            }
+            Err(rejected) => self.send(to.failure(&rejected.status())),
+        }
+    }
+
+    fn of_arm<A: Answered + ArmRequest<N>>(
+        &mut self,
+        service: Service,
+        args: &Arguments,
+        to: &Address,
+    ) {
+        self.answer::<A>(service, args, to, |kernel, ask| {
+            ask.perform(&mut kernel.arm)
+        });
+    }
+
+    /// All steps in a row, with the news of the goal as they come.
+    fn step(&mut self, ask: Step<N>) -> <Step<N> as pendularm::services::Ask>::Answer {
+        let mut asked = self.arm.begin_steps(ask)?;
+        loop {
+            let (stepped, progress) = self.arm.take_row(&mut asked);
+            self.settle();
+            if let Some(progress) = progress {
+                self.judge(progress);
+            }
+            if let Some(stepped) = stepped {
+                return Ok(stepped);
+            }
+        }
+    }
+
+    fn compute_short<A: Answered, W: Work<A::Answer> + 'static>(
+        &mut self,
+        service: Service,
+        args: &Arguments,
+        to: Address,
+        work: impl FnOnce(A, pendularm::services::study::Present<N>) -> W,
+    ) {
+        match A::read(service, args) {
+            Ok(ask) => {
+                let work = work(ask, self.arm.present());
+                self.computations
+                    .push_back(Box::new(Short::<A, W>::new(work, to)));
+            }
+            Err(rejected) => self.send(to.failure(&rejected.status())),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Computations on their way: each is advanced a piece at a time, so that the arm goes on meanwhile.
+//!
+//! **Invariant:** a computation answers once.
+
+use std::marker::PhantomData;
+
+use bytes::Bytes;
+use pendularm::services::study::Work;
+use pendularm::services::{Address, Answered, Streamed};
+
+use super::Clock;
+
+/// Something heavy that ends with a response.
+pub(super) trait Computation {
+    /// Does a piece. Returns the response after the last one.
+    fn advance(&mut self, clock: Clock) -> Option<Bytes>;
+}
+
+/// Work whose answer is short.
+pub(super) struct Short<A, W> {
+    work: W,
+    to: Address,
+    question: PhantomData<fn(A)>,
+}
+
+impl<A, W> Short<A, W> {
+    pub(super) fn new(work: W, to: Address) -> Self {
+        Self {
+            work,
+            to,
+            question: PhantomData,
+        }
+    }
+}
+
+impl<A: Answered, W: Work<A::Answer>> Computation for Short<A, W> {
+    fn advance(&mut self, clock: Clock) -> Option<Bytes> {
+        let answer = self.work.advance(clock)?;
+        Some(A::write(answer, &self.to))
+    }
+}
+
+/// Work whose answer may be long.
+pub(super) struct Streaming<A: Streamed> {
+    stage: Stage<A>,
+    to: Address,
+}
+
+enum Stage<A: Streamed> {
+    Working(Box<dyn Work<A::Answer>>),
+    Writing(A::Writer),
+}
+
+impl<A: Streamed> Streaming<A> {
+    pub(super) fn new(work: impl Work<A::Answer> + 'static, to: Address) -> Self {
+        let stage = Stage::Working(Box::new(work));
+        Self { stage, to }
+    }
+}
+
+impl<A: Streamed> Computation for Streaming<A> {
+    fn advance(&mut self, clock: Clock) -> Option<Bytes> {
+        match &mut self.stage {
+            Stage::Working(work) => {
+                let answer = work.advance(clock)?;
+                self.stage = Stage::Writing(A::begin(answer, &self.to));
+                None
+            }
+            Stage::Writing(writer) => A::advance(writer),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Goals: one is active at most, as in the node `ik_action`.
+//!
+//! **Invariant:** each goal has exactly one result. A preempting goal comes in this order: the old goal's result, the
+//! response, the trajectory, feedback, result.
+
+use pendularm::live::{GoalJudged, GoalOrder, Obstacle};
+use pendularm::math::goal::Outcome;
+use pendularm::math::kinematics::solve;
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::messages::goal::setpoint_trajectory;
+use pendularm::protocol::messages::{self, Level};
+use pendularm::services::Address;
+use pendularm::services::arm::joint_names;
+use pendularm::services::goals::{
+    AcceptedGoal, CancelRejected, GoalRejected, GoalRequest, SolveError,
+};
+
+use super::Kernel;
+use pendularm::live::World as _;
+
+/// The goal that is being pursued.
+#[derive(Clone)]
+pub(super) struct ActiveGoal<const N: usize> {
+    pub(super) goal: AcceptedGoal<N>,
+    /// Whether the trial has sent it.
+    pub(super) of_trial: bool,
+}
+
+impl<const N: usize> Kernel<N> {
+    /// Takes a goal of the client.
+    pub(super) fn take_goal(&mut self, goal: GoalRequest, to: &Address) {
+        let begun = self.begin_goal(goal, false);
+        if let Ok(Some(obstacle)) = begun {
+            self.warn(to, obstacle);
+        }
+        let answer = begun.map(|_| self.goal_id());
+        self.send(GoalRequest::write(&answer, to));
+        if answer.is_ok() {
+            self.set_in_motion();
+        }
+    }
+
+    /// A status, before the answer, about what keeps the arm from moving.
+    pub(super) fn warn(&self, to: &Address, obstacle: Obstacle) {
+        self.tell(Level::Warning, &obstacle.to_string(), to.id());
+    }
+
+    fn goal_id(&self) -> String {
+        let active = self.goal.as_ref();
+        active.map_or_else(String::new, |active| active.goal.id.clone())
+    }
+
+    /// Solves a goal, ends the one before and puts it in its place; [`Kernel::set_in_motion`] is to follow.
+    pub(super) fn begin_goal(
+        &mut self,
+        goal: GoalRequest,
+        of_trial: bool,
+    ) -> Result<Option<Obstacle>, GoalRejected> {
+        let GoalRequest { target, criteria } = goal;
+        let pose = self.arm.pose();
+        let solution =
+            solve(&pose.lengths, &pose.positions, &target).map_err(SolveError::Unreachable)?;
+        let number = self.accepted + 1;
+        let tracking = self.arm.track_goal(&GoalOrder {
+            number,
+            target: target.position,
+            criteria,
+            solution,
+        });
+        if let Some(before) = tracking.before {
+            self.judge(before);
+        }
+        self.accepted = number;
+        self.goal = Some(ActiveGoal {
+            goal: AcceptedGoal::new(number, target, tracking.positions),
+            of_trial,
+        });
+        Ok(tracking.obstacle)
+    }
+
+    /// The active goal's setpoint goes out to the subscribers, and then to the arm.
+    pub(super) fn set_in_motion(&mut self) {
+        if let Some(ActiveGoal { goal, .. }) = &self.goal {
+            let (number, positions) = (goal.number, goal.positions);
+            let topic = Topic::JointTrajectory;
+            self.arm.world().publish(topic, move || {
+                let trajectory = setpoint_trajectory(&joint_names::<N>(), &positions);
+                messages::publish(topic.name(), &trajectory)
+            });
+            self.arm.command_goal(number, positions);
+        }
+    }
+
+    /// Ends the active goal, if it is the one that is meant.
+    pub(super) fn cancel(&mut self, meant: Option<&str>) -> Result<(), CancelRejected> {
+        let goal = &self.goal.as_ref().ok_or(CancelRejected::NotActive)?.goal;
+        if meant.is_some_and(|id| id != goal.id) {
+            let active = goal.id.clone();
+            return Err(CancelRejected::OtherGoal { active });
+        }
+        let ended = self.arm.end_goal(goal.number);
+        let ended = ended.ok_or(CancelRejected::NotActive)?;
+        self.judge(ended);
+        match ended.outcome {
+            Some(Outcome::Preempted) => Ok(()),
+            _ => Err(CancelRejected::NotActive),
+        }
+    }
+
+    /// Passes on how the active goal goes, or how it has ended.
+    pub(super) fn judge(&mut self, judged: GoalJudged<N>) {
+        let is_active = |active: &ActiveGoal<N>| active.goal.number == judged.number;
+        let world = self.arm.world();
+        match judged.outcome {
+            None => {
+                if let Some(active) = self.goal.as_ref().filter(|goal| is_active(goal)) {
+                    let feedback = active.goal.feedback(judged.distance, judged.elapsed);
+                    let topic = Topic::IkFeedback;
+                    world.publish(topic, move || messages::publish(topic.name(), &feedback));
+                    if active.of_trial {
+                        self.news.push_back((active.clone(), judged));
+                    }
+                }
+            }
+            Some(_) => {
+                if let Some(ended) = self.goal.take_if(|goal| is_active(goal)) {
+                    let result = ended.goal.result(judged.distance, judged.outcome);
+                    let topic = Topic::IkResult;
+                    world.publish(topic, move || messages::publish(topic.name(), &result));
+                    if ended.of_trial {
+                        self.news.push_back((ended, judged));
+                    }
+                }
+            }
+        }
+    }
+}

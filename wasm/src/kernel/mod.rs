@@ -1,0 +1,216 @@
+//! One client's view of the runtime: frames in, frames out.
+//!
+//! **Invariant:** the arm advances to now before a frame has an effect, and all news of goals are told before the
+//! answer.
+
+mod calls;
+mod computing;
+mod goals;
+mod surroundings;
+mod trials;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use pendularm::live::{GoalJudged, LiveArm};
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::Simulation;
+use pendularm::math::trial::Trial;
+use pendularm::protocol::catalog::{Direction, Topic};
+use pendularm::protocol::messages::{self, ErrorForm, Level};
+use pendularm::protocol::op::{self, Op, OpError, Verbosity};
+use pendularm::protocol::wire::payload::Payload;
+use pendularm::services::arm::{read_effort, read_setpoint};
+use pendularm::study::clocks::clock_limits;
+
+use self::computing::Computation;
+use self::goals::ActiveGoal;
+use self::surroundings::Surroundings;
+
+/// The numbers of links that an arm may have.
+pub const LINKS: [usize; 2] = [2, 3];
+
+/// A time from any fixed moment on.
+pub type Clock = fn() -> Duration;
+
+/// The arm of `N` links, its services and its topics, for one client.
+pub struct Kernel<const N: usize> {
+    arm: LiveArm<N, Surroundings<N>>,
+    /// The statuses that the client wants.
+    verbosity: Verbosity,
+    error_form: ErrorForm,
+    goal: Option<ActiveGoal<N>>,
+    /// Goals accepted so far: their numbers make the ids.
+    accepted: u64,
+    trial: Trial,
+    rng: fastrand::Rng,
+    /// News of goals that the trial has not heard.
+    news: VecDeque<(ActiveGoal<N>, GoalJudged<N>)>,
+    /// When the status of the trial was last published.
+    trial_shown: Duration,
+    computations: VecDeque<Box<dyn Computation>>,
+}
+
+impl<const N: usize> Kernel<N>
+where
+    Arm<N>: Default,
+    Gains<N>: Default,
+{
+    /// An arm as the runtime starts it. The targets of trials depend on `seed`.
+    #[must_use]
+    pub fn new(clock: Clock, seed: u64) -> Self {
+        let world = Surroundings::new(clock);
+        Self {
+            arm: LiveArm::new(Arm::default(), Gains::default(), world),
+            // What holds over WebSocket until the client says otherwise.
+            verbosity: Verbosity::NONE,
+            error_form: ErrorForm::Text,
+            goal: None,
+            accepted: 0,
+            trial: Trial::default(),
+            rng: fastrand::Rng::with_seed(seed),
+            news: VecDeque::new(),
+            trial_shown: Duration::ZERO,
+            computations: VecDeque::new(),
+        }
+    }
+}
+
+impl<const N: usize> Kernel<N> {
+    /// The simulation as it is now.
+    #[must_use]
+    pub fn simulation(&self) -> &Simulation<N> {
+        self.arm.simulation()
+    }
+
+    /// Takes one frame of the client.
+    pub fn receive(&mut self, frame: &str) {
+        let incoming = op::read(frame);
+        let id = incoming.id;
+        match incoming.op {
+            Ok(Op::CallService(call)) => self.call(call, id),
+            Ok(Op::Publish { topic, msg, heard }) => {
+                let heard = heard.unwrap_or_else(|| msg.clone().into());
+                self.take_message(&topic, &msg, &heard, id.as_ref());
+            }
+            Ok(Op::Subscribe(subscribe)) => {
+                if let Some(topic) = Topic::from_name(&subscribe.topic) {
+                    let world = self.arm.world();
+                    world.subscribe(topic, &subscribe.topic, subscribe.throttle);
+                    self.arm.set_wanted(topic, true);
+                }
+            }
+            Ok(Op::Unsubscribe { topic }) => {
+                if let Some(topic) = Topic::from_name(&topic) {
+                    self.arm.world().unsubscribe(topic);
+                    self.arm.set_wanted(topic, false);
+                }
+            }
+            Ok(Op::SetLevel { verbosity, errors }) => {
+                self.verbosity = verbosity;
+                self.error_form = errors.unwrap_or(self.error_form);
+            }
+            Ok(_) => self.complain("this operation needs a server", id.as_ref()),
+            Err(OpError::Call { service, problem }) => {
+                let why = problem.to_string();
+                let form = self.error_form;
+                self.send(messages::failure(&service, id.as_ref(), &why, form));
+            }
+            Err(why) => self.complain(&why.to_string(), id.as_ref()),
+        }
+        self.settle();
+    }
+
+    /// Publishes what is due, 60 times a second.
+    pub fn tick(&mut self) {
+        self.attend();
+        if let Some(control) = self.arm.limit_to_predict() {
+            self.arm.keep_limit(control, Some(clock_limits(&control)));
+        }
+        self.arm.tick();
+        self.show_trial();
+        self.settle();
+    }
+
+    /// Computes for so long, if a computation waits. True if one still does.
+    pub fn compute(&mut self, budget: Duration) -> bool {
+        let clock = self.arm.world().clock();
+        let began = clock();
+        while let Some(mut next) = self.computations.pop_front() {
+            match next.advance(clock) {
+                Some(frame) => self.send(frame),
+                None => self.computations.push_back(next),
+            }
+            if clock().saturating_sub(began) >= budget {
+                break;
+            }
+        }
+        !self.computations.is_empty()
+    }
+
+    /// Takes the frames for the client, each with its newline.
+    #[must_use]
+    pub fn take_frames(&mut self) -> Vec<u8> {
+        self.arm.world().take_frames()
+    }
+
+    /// Takes the steps that are due.
+    fn attend(&mut self) {
+        self.arm.catch_up();
+        self.settle();
+    }
+
+    /// Passes on all news of goals, and does what the trial wants done.
+    fn settle(&mut self) {
+        while let Some(judged) = self.arm.world().next_judged() {
+            self.judge(judged);
+        }
+        self.advance_trial();
+    }
+
+    fn send(&self, frame: impl AsRef<[u8]>) {
+        self.arm.world().send(frame.as_ref());
+    }
+
+    fn complain(&self, why: &str, id: Option<&Payload>) {
+        self.tell(Level::Error, why, id);
+    }
+
+    /// A status, if the client wants such.
+    fn tell(&self, level: Level, why: &str, id: Option<&Payload>) {
+        if self.verbosity.wants(level) {
+            self.send(messages::status(level, why, id));
+        }
+    }
+
+    /// A message that the client publishes: subscribers are told of it, and so is the arm.
+    fn take_message(
+        &mut self,
+        name: &str,
+        msg: &Payload,
+        heard: &messages::trajectory::Heard,
+        id: Option<&Payload>,
+    ) {
+        let topic = Topic::from_name(name);
+        let Some(topic) = topic.filter(|topic| topic.direction() == Direction::Subscribed) else {
+            return self.complain(&format!("topic: nobody listens to {name} here"), id);
+        };
+        self.attend();
+        self.arm.world().pass_on(topic, msg);
+        let refused = match topic {
+            Topic::JointTrajectory => read_setpoint(heard)
+                .map(|setpoint| self.arm.hold(setpoint))
+                .err()
+                .map(|why| why.to_string()),
+            Topic::EffortCommands => read_effort(heard)
+                .map_err(|why| why.to_string())
+                .and_then(|effort| self.arm.command(effort).map_err(|why| why.to_string()))
+                .err(),
+            _ => None,
+        };
+        if let Some(why) = refused {
+            self.complain(&format!("{}: {why}", topic.name()), id);
+        }
+    }
+}

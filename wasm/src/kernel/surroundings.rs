@@ -1,0 +1,124 @@
+//! The surroundings of the arm in a page: a clock, and one client with its subscriptions.
+//!
+//! **Invariant:** nothing is written for a topic without a subscription; frames leave in the order in which they were
+//! written.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use bytes::Bytes;
+use pendularm::live::{GoalJudged, World};
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::messages;
+use pendularm::protocol::wire::payload::Payload;
+
+use super::Clock;
+
+/// A subscription of the client.
+struct Subscription {
+    topic: Topic,
+    /// The topic's name as the client spelled it.
+    spelling: String,
+    /// Least time between two messages.
+    throttle: Duration,
+    /// The time of the latest message.
+    latest: Option<Duration>,
+}
+
+/// The clock, and the way to the client.
+pub(super) struct Surroundings<const N: usize> {
+    clock: Clock,
+    subscriptions: RefCell<Vec<Subscription>>,
+    frames: RefCell<Vec<u8>>,
+    judged: RefCell<VecDeque<GoalJudged<N>>>,
+}
+
+impl<const N: usize> Surroundings<N> {
+    pub(super) fn new(clock: Clock) -> Self {
+        Self {
+            clock,
+            subscriptions: RefCell::default(),
+            frames: RefCell::default(),
+            judged: RefCell::default(),
+        }
+    }
+
+    pub(super) fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    pub(super) fn subscribe(&self, topic: Topic, spelling: &str, throttle: Duration) {
+        self.unsubscribe(topic);
+        self.subscriptions.borrow_mut().push(Subscription {
+            topic,
+            spelling: spelling.to_owned(),
+            throttle,
+            latest: None,
+        });
+    }
+
+    pub(super) fn unsubscribe(&self, topic: Topic) {
+        let mut all = self.subscriptions.borrow_mut();
+        all.retain(|one| one.topic != topic);
+    }
+
+    pub(super) fn wants(&self, topic: Topic) -> bool {
+        let all = self.subscriptions.borrow();
+        all.iter().any(|one| one.topic == topic)
+    }
+
+    /// Sends the message that `write` writes, unless nobody wants it yet.
+    fn deliver(&self, topic: Topic, write: impl FnOnce() -> Bytes) {
+        let mut all = self.subscriptions.borrow_mut();
+        let Some(one) = all.iter_mut().find(|one| one.topic == topic) else {
+            return;
+        };
+        let now = (self.clock)();
+        let is_early = |latest: Duration| now.saturating_sub(latest) < one.throttle;
+        if !one.latest.is_some_and(is_early) {
+            one.latest = Some(now);
+            let frame = messages::respelled(topic.name(), &one.spelling, &write());
+            self.send(&frame);
+        }
+    }
+
+    /// Passes a client's own message on to it.
+    pub(super) fn pass_on(&self, topic: Topic, msg: &Payload) {
+        self.deliver(topic, || messages::publish_raw(topic.name(), msg));
+    }
+
+    pub(super) fn send(&self, frame: &[u8]) {
+        self.frames.borrow_mut().extend_from_slice(frame);
+    }
+
+    pub(super) fn take_frames(&self) -> Vec<u8> {
+        self.frames.take()
+    }
+
+    pub(super) fn next_judged(&self) -> Option<GoalJudged<N>> {
+        self.judged.borrow_mut().pop_front()
+    }
+}
+
+impl<const N: usize> World<N> for Surroundings<N> {
+    fn now(&self) -> Duration {
+        (self.clock)()
+    }
+
+    fn work_time(&self) -> Duration {
+        (self.clock)()
+    }
+
+    fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
+        self.deliver(topic, write);
+    }
+
+    fn tell(&self, judged: GoalJudged<N>) {
+        self.judged.borrow_mut().push_back(judged);
+    }
+
+    fn clients(&self) -> (u64, u64) {
+        (1, 0)
+    }
+}

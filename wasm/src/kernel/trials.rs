@@ -1,0 +1,139 @@
+//! Timed trials, as in the node `ik_trial`: the rules are `math::trial`'s.
+//!
+//! **Invariant:** each command of the trial is carried out whole before the next, and news of its goals are heard behind
+//! them.
+
+use std::time::Duration;
+
+use pendularm::live::World as _;
+use pendularm::math::trial::{Conclusion, Rejection, TrialCommand, sample};
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::messages;
+use pendularm::services::Address;
+use pendularm::services::goals::GoalRequest;
+use pendularm::services::trial::{NotStarted, STATUS_PERIOD, StartTrial, Terms, status_message};
+
+use super::Kernel;
+
+impl<const N: usize> Kernel<N> {
+    /// The trial is told the time, does what follows from it, and hears of its goals.
+    pub(super) fn advance_trial(&mut self) {
+        loop {
+            let commands = self.trial.tick(self.arm.pose().simulated);
+            self.carry_out(commands);
+            let Some((active, judged)) = self.news.pop_front() else {
+                return;
+            };
+            let goal_id = active.goal.id;
+            match judged.outcome {
+                None => {
+                    self.trial
+                        .feedback(&goal_id, judged.distance, &active.goal.positions);
+                }
+                Some(outcome) => {
+                    let conclusion = Conclusion {
+                        goal_id,
+                        outcome,
+                        final_distance: judged.distance,
+                    };
+                    let lengths = self.arm.pose().lengths;
+                    let target = || sample(&lengths, || self.rng.f64());
+                    let commands = self.trial.concluded(conclusion, target);
+                    self.carry_out(commands);
+                }
+            }
+        }
+    }
+
+    /// Does what the trial wants done.
+    fn carry_out(&mut self, commands: Vec<TrialCommand>) {
+        let mut waiting = std::collections::VecDeque::from(commands);
+        while let Some(command) = waiting.pop_front() {
+            match command {
+                TrialCommand::PublishStatus => self.publish_status(),
+                TrialCommand::CancelGoal { goal_id } => {
+                    // A refusal means that the goal is over already: all that was wanted.
+                    let _ = self.cancel(Some(&goal_id));
+                }
+                TrialCommand::SendGoal {
+                    ticket,
+                    target,
+                    criteria,
+                } => {
+                    let begun = self.begin_goal(GoalRequest { target, criteria }, true);
+                    let lengths = self.arm.pose().lengths;
+                    let sampled = || sample(&lengths, || self.rng.f64());
+                    let more = match (begun, &self.goal) {
+                        (Ok(_), Some(active)) => {
+                            self.trial.accepted(ticket, &active.goal.id, sampled)
+                        }
+                        _ => self.trial.refused(ticket, sampled),
+                    };
+                    if begun.is_ok() {
+                        self.set_in_motion();
+                    }
+                    waiting.extend(more);
+                }
+            }
+        }
+    }
+
+    /// Starts a trial afresh, unless something was rejected.
+    pub(super) fn start_trial(&mut self, ask: StartTrial, to: &Address) -> Terms {
+        let outcome = if ask.rejected.is_empty() {
+            let pose = self.arm.pose();
+            let target = || sample(&pose.lengths, || self.rng.f64());
+            let decided = self.trial.start(pose.simulated, ask.changes, target);
+            self.decide(decided, Some(to)).map_err(NotStarted::Refused)
+        } else {
+            Err(NotStarted::Rejected(ask.rejected))
+        };
+        let settings = self.trial.settings();
+        Terms { settings, outcome }
+    }
+
+    pub(super) fn skip_target(&mut self, to: &Address) -> Result<(), Rejection> {
+        let lengths = self.arm.pose().lengths;
+        let decided = self.trial.skip(|| sample(&lengths, || self.rng.f64()));
+        self.decide(decided, Some(to))
+    }
+
+    pub(super) fn stop_trial(&mut self) -> Result<(), Rejection> {
+        let decided = self.trial.stop();
+        self.decide(decided, None)
+    }
+
+    /// Does what was decided; the caller is warned if nothing can move the arm.
+    fn decide(
+        &mut self,
+        decided: Result<Vec<TrialCommand>, Rejection>,
+        warned: Option<&Address>,
+    ) -> Result<(), Rejection> {
+        let commands = decided?;
+        if let (Some(to), Some(obstacle)) = (warned, self.arm.pose().obstacle) {
+            self.warn(to, obstacle);
+        }
+        self.carry_out(commands);
+        Ok(())
+    }
+
+    /// At a tick: shows the trial if that is due.
+    pub(super) fn show_trial(&mut self) {
+        let now: Duration = self.arm.world().now();
+        if now.saturating_sub(self.trial_shown) >= STATUS_PERIOD {
+            self.publish_status();
+        }
+    }
+
+    fn publish_status(&mut self) {
+        self.trial_shown = self.arm.world().now();
+        let topic = Topic::TrialStatus;
+        let status = self.trial.status();
+        if let Some(status) = status.filter(|_| self.arm.world().wants(topic)) {
+            let message = status_message(&status);
+            self.arm
+                .world()
+                .publish(topic, move || messages::publish(topic.name(), &message));
+        }
+    }
+}
