@@ -105,7 +105,7 @@ function end() {
   if (lastPlace?.answered) finish(lastPlace);
 }
 
-/** What is chosen beside the view, since a touch screen has no keys; shift means the setpoint. @returns {Mode} */
+/** The mode chosen beside the view, since a touch screen has no keys; shift means the setpoint. @returns {Mode} */
 function modeOf(event) {
   /** @type {HTMLInputElement} */
   const chosen = document.querySelector("input[name=drag]:checked");

@@ -1,6 +1,6 @@
 // @ts-check
 // Says aloud, to screen readers, what others see happen: goals reached, refusals, a lost connection.
-// Invariant: only events are announced; what changes all the time is in texts that are read when asked for.
+// Invariant: only events are announced. Values that change all the time are in texts that are read when asked for.
 
 import { byId } from "./dom.js";
 

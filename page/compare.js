@@ -1,7 +1,7 @@
 // @ts-check
 // Any number of integrators and timesteps against a reference: the same arm, from the same state, computed offline by the
 // runtime, drawn over one another and played back together.
-// Invariant: what is compared is what the runtime answered; the live arm is not touched.
+// Invariant: the runs that are compared are the runtime's answers; the live arm is not touched.
 
 import { announce } from "./announce.js";
 import { CompareView } from "./compare_view.js";

@@ -1,6 +1,6 @@
 // @ts-check
 // The settings: integrator and timestep, servo and gains, gravity, masses, lengths, setpoint and pushes.
-// Invariant: a control changes only by what the runtime accepted; what it refused is said beside it.
+// Invariant: a control changes only to values that the runtime accepted. A refusal is shown beside it.
 
 import { warn } from "./announce.js";
 import { byId, el, setText } from "./dom.js";

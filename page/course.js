@@ -1,13 +1,13 @@
 // @ts-check
 // The course: ten steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
-// Invariant: a step is data. Its text has at most 40 words; whoever shows it sets the scene on a click only.
+// Invariant: a step is data. Its text has at most 40 words. Its view sets the scene on a click only.
 
 import { DEFAULTS } from "./settings.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {{text: string, answers: string[], right: number, because: string}} Question */
 /**
- * What the student has done in a step so far; a task looks at it.
+ * Actions of the student in a step so far; a task looks at them.
  * @typedef {object} Seen
  * @property {Set<string>} methods that were in force
  * @property {boolean} reached whether a goal was reached

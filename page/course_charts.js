@@ -20,7 +20,7 @@ export const PERIODS = new LogScale(1e-3, 2e-2);
 export const FACTORS = new LogScale(0.25, 4);
 const ERRORS = new LogScale(1e-10, 1);
 
-/** A bar for each control step; those that point down are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
+/** A bar for each control step; negative ones are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
 export function drawBars(surface, bars, across = "look of the controller") {
   const { context, width, height } = surface;
   surface.clear();
@@ -48,7 +48,7 @@ export function drawBars(surface, bars, across = "look of the controller") {
   axisTitles(context, width, height, across, "speed of the last joint [rad/s]");
 }
 
-/** What the method costs and what waiting costs, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
+/** The errors of the method and of waiting, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
 export function drawErrors(surface, errors) {
   const { context, width, height } = surface;
   surface.clear();

@@ -164,7 +164,7 @@ function damping() {
   return usual && state.gains ? state.gains.kd[0] / usual : NaN;
 }
 
-// What is shown
+// The visible parts
 
 function show() {
   const one = STEPS[at];
@@ -315,7 +315,7 @@ function ask(place, { text, answers, right, because }, chosen, choose) {
   if (chosen >= 0) place.append(el("p", { class: "note" }, chosen === right ? `Right. ${because}` : "Not that one. Try again."));
 }
 
-// What happens
+// The events
 
 /** At every news of the runtime. */
 function look() {

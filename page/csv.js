@@ -1,7 +1,7 @@
 // @ts-check
 // The recording as a CSV file: the settings in lines that begin with #, then one row per joint state, SI units named in
 // the header.
-// Invariant: what is not known, or not finite, is an empty field.
+// Invariant: a value that is unknown or not finite is an empty field.
 
 import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, record } from "./history.js";
 import { toFragment } from "./settings.js";

@@ -1,6 +1,6 @@
 // @ts-check
 // A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
-// Invariant: what stands in the field is the value in force, except while somebody is changing it.
+// Invariant: the field has the value in force, except while somebody is changing it.
 
 import { warn } from "./announce.js";
 import { el, setText } from "./dom.js";

@@ -14,7 +14,7 @@ export function fixed(value, digits) {
   return text.startsWith("-") ? (Number(text) === 0 ? text.slice(1) : MINUS + text.slice(1)) : text;
 }
 
-/** Those digits behind the point, or as many as keep it short: its place is small. @param {number} value @param {number} digits */
+/** Those digits behind the point, or fewer to keep it short: its place is small. @param {number} value @param {number} digits */
 export function short(value, digits) {
   const before = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
   return fixed(value, Number.isFinite(before) ? Math.max(0, Math.min(digits, MOST_DIGITS - before)) : digits);

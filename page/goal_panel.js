@@ -43,7 +43,7 @@ async function report(call) {
   said.show(answer.result ? "" : answer.status);
 }
 
-/** Orientation and tolerance for the next goal; what is empty is left to the runtime. */
+/** Orientation and tolerance for the next goal; an empty field is left to the runtime. */
 export function goalOptions() {
   return {
     phi: state.links > 2 ? fields.phi.number() : undefined,

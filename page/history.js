@@ -1,5 +1,5 @@
 // @ts-check
-// The last five minutes of the arm, one row per joint state: what the plots draw and the CSV file holds.
+// The last five minutes of the arm, one row per joint state: the source of the plots and the CSV file.
 // Invariant: rows are in order of simulation time, without repeats; a reset begins anew.
 
 import { gravityLoad, kinetic, potential } from "./mechanics.js";

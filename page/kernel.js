@@ -1,7 +1,7 @@
 // @ts-check
 // The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. Where workers are forbidden, it runs
 // in the page's own thread.
-// Invariant: whoever speaks through it cannot tell it from a WebSocket to the runtime.
+// Invariant: its callers cannot tell it from a WebSocket to the runtime.
 
 /** The kernel, gzip in base64, in the page that is one file; the page of a server has none. */
 const carried = document.querySelector("#kernel-module");

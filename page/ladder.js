@@ -40,7 +40,7 @@ const CLEAR = 4;
 /** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
 const FOLLOWED = 1e-3;
 
-/** A run's cell in the table: what the method costs, and with a controller what its waiting costs. @param {Rung} rung */
+/** A run's cell in the table: the error of the method, and with a controller the error of waiting. @param {Rung} rung */
 export function errorText({ error, sampling, uncertainty, divergedAt }) {
   if (divergedAt !== null) return `diverged at ${significant(divergedAt, 3)} s`;
   if (error !== null) return `${significant(error, 2)}${sampling === null ? "" : ` + ${significant(sampling, 2)}`}`;
@@ -48,7 +48,7 @@ export function errorText({ error, sampling, uncertainty, divergedAt }) {
   return uncertainty < FOLLOWED ? `< ${significant(CLEAR * uncertainty, 1)}` : "too wild to follow";
 }
 
-/** What the whole run costs: of the two errors that are known, the larger [rad]; null if none is. @param {Rung} rung */
+/** The error of the whole run: of the two errors that are known, the larger [rad]; null if none is. @param {Rung} rung */
 export function total({ error, sampling }) {
   return error == null && sampling == null ? null : Math.max(error ?? 0, sampling ?? 0);
 }

@@ -1,6 +1,6 @@
 // @ts-check
-// Error against run time, both logarithmic, a line per method. Solid: what the method costs. Dashed: what waiting between control
-// updates costs. A run that diverged is a cross on the upper edge.
+// Error against run time, both logarithmic, a line per method. Solid: the error of the method. Dashed: the error of waiting
+// between control updates. A run that diverged is a cross on the upper edge.
 // Invariant: a run without an error never stretches the axes.
 
 import { METHODS, duration, methodName } from "./format.js";

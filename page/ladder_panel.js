@@ -39,7 +39,7 @@ export function startLadder() {
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
   setText(byId("ladder-text"), INVITATION);
-  // What was measured is of another loop.
+  // The measurement is of another loop.
   for (const key of ["links", "params", "gains", "period", "enabled"]) watch(key, () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
 }
 
@@ -94,7 +94,7 @@ export async function climb(length, isWanted, tell) {
     const answer = await rollout(args);
     if (!isWanted()) return "";
     if (!answer.result) return answer.status;
-    // The shorter of two times: whatever else the machine did in between has no part in it.
+    // The shorter of two times: other work of the machine in between has no part in it.
     const again = await rollout({ ...args, reference: false });
     const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
     if (!isWanted()) return "";

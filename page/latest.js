@@ -1,6 +1,6 @@
 // @ts-check
 // Sends the newest of many values: at most one call under way, and no more often than `intervalMs`.
-// Invariant: the last value offered is always sent in the end; those between may be skipped.
+// Invariant: the last value offered is always sent in the end; values between may be skipped.
 
 export function latestOnly(send, intervalMs) {
   let waiting = null;

@@ -1,6 +1,6 @@
 // @ts-check
 // The lessons: each sets the scene with one click and says in two sentences what to see and what to try.
-// Invariant: a lesson is data; whoever starts it applies its settings, resets the arm, and shows its panel.
+// Invariant: a lesson is data. Its starter applies its settings, resets the arm, and shows its panel.
 
 import { DEFAULTS } from "./settings.js";
 import { scaled } from "./gains.js";

@@ -106,7 +106,7 @@ function within(timestep) {
 }
 
 function drawFrame(context, width, height) {
-  // Only as far up as the limits are known: what has not been judged is neither.
+  // Only as far up as the limits are known: points beyond are neither stable nor unstable.
   const known = rows.length > 0 ? y(rows.at(-1).factor) : height - BOTTOM;
   context.fillStyle = colors.unstable;
   context.fillRect(LEFT, known, width - LEFT - RIGHT, height - BOTTOM - known);

@@ -1,7 +1,7 @@
 // @ts-check
 // The recording, looked at again while the arm goes on: a time in it, step by step, in slow motion, and back to now.
 // The arm itself always runs in real time; only its recording can be slow.
-// Invariant: looking back changes nothing of the arm; what is shown lies within what is recorded.
+// Invariant: looking back changes nothing of the arm; the shown time lies within the record.
 
 import { EFFORT, POSITION, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./history.js";
 import { MOST_LINKS, state, tell } from "./store.js";

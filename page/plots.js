@@ -156,7 +156,7 @@ export function showValues() {
   setText(byId("legend-drift-name"), energyName(state));
 }
 
-/** Energy at the last reset, change of parameters or switching of PID [J]: what the drift is measured from. */
+/** Energy at the last reset, change of parameters or switching of PID [J]: the drift is measured from it. */
 function reference() {
   const { diagnostics } = state;
   return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;

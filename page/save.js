@@ -1,6 +1,6 @@
 // @ts-check
-// Files to keep: what was recorded as CSV, the plots as PNG or SVG.
-// Invariant: the page's memory is not kept: what was made is handed to the browser and let go.
+// Files to keep: the recording as CSV, the plots as PNG or SVG.
+// Invariant: the page's memory is not kept: a file is handed to the browser and released.
 
 import { csvText } from "./csv.js";
 import { byId, el } from "./dom.js";

@@ -1,7 +1,7 @@
 // @ts-check
-// All settings of the arm as one object: taken, compared, spelled in a link, read from one. And the way back: what was in
+// All settings of the arm as one object: taken, compared, spelled in a link, read from one. And the way back: the settings in
 // force before the latest changes.
-// Invariant: nothing here speaks to the runtime; whoever applies settings hears its refusals.
+// Invariant: nothing here speaks to the runtime; the caller that applies settings gets its refusals.
 
 import { METHODS, exact } from "./format.js";
 
@@ -112,7 +112,7 @@ export class Undo {
     if (this.past.length > MOST_STEPS) this.past.shift();
   }
 
-  /** Whether there are settings to go back to: others than those in force. What was refused has changed nothing. */
+  /** Whether there are settings to go back to: others than those in force. A refused setting has changed nothing. */
   leadsBackFrom(/** @type {Settings | null} */ present) {
     return this.past.some((settings) => !isSame(settings, present));
   }

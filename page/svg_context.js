@@ -1,6 +1,6 @@
 // @ts-check
 // The part of a canvas's context that the plots use, written down as an SVG file.
-// Invariant: what is drawn is text of ours and numbers; texts are escaped.
+// Invariant: a drawing is text of ours and numbers; texts are escaped.
 
 const ESCAPES = /** @type {Record<string, string>} */ ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" });
 

@@ -37,7 +37,7 @@ function whyFree({ critical }, method, limit) {
   return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings have a smaller limit.`;
 }
 
-/** What grows first beyond the smallest limit of all poses. @param {any} answer */
+/** The motion that grows first beyond the smallest limit of all poses. @param {any} answer */
 function cause({ critical, minimum_over_poses_held: least }) {
   if (!critical || !(least > 0)) return "beyond it a deviation grows.";
   const joint = `joint ${critical.joint + 1}`;

@@ -84,7 +84,8 @@
 //! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and
 //! `EndRecord`, from the runtime: the beginning and the end of a record.
 //!
-//! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
+//! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: the questions
+//! of introspection.
 //!
 //! [`ArmMotion`]: arm::sim::ArmMotion
 //! [`MoveSetpoint`]: arm::sim::MoveSetpoint

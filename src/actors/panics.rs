@@ -1,8 +1,8 @@
 //! The end of a panic: it takes along what it happened in, or everything.
 //!
 //! No input is known to cause one. Should one happen all the same: in what serves one client it ends that client, in a
-//! computation that computation. Anywhere else, in a node or the registry, others would wait for ever for what is gone:
-//! there the process ends at once, with one line that says where, so that whoever started it can start it again.
+//! computation that computation. Anywhere else, in a node or the registry, others would wait for ever. There the
+//! process ends at once, with one line that says where, so that its supervisor can start it again.
 //!
 //! **Invariant:** a panic is contained by whoever called [`contain`], or it is the last thing that the process does.
 
@@ -41,7 +41,7 @@ pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     }));
 }
 
-/// Does `work`, and survives its panic. What it was about must not be used afterwards.
+/// Does `work`, and survives its panic. The subject of the panic must not be used afterwards.
 ///
 /// # Errors
 /// The panic.

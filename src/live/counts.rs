@@ -18,7 +18,7 @@ pub(crate) struct Telemetry {
     wanted: Vec<Topic>,
     /// Publishing ticks so far.
     pub(crate) ticks: u64,
-    /// Energy when it was last changed from outside \[J\]: what the drift is measured from.
+    /// Energy when it was last changed from outside \[J\]: the drift is measured from it.
     pub(crate) energy_reference: f64,
     pub(crate) window: Window,
     /// Wall time that the latest wake-up left owed \[s\].

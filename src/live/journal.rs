@@ -89,7 +89,7 @@ impl<const N: usize> Journal<N> {
         let step = self.before_reset + steps;
         if self.is_whole && self.stood != Some(step) {
             self.stood = Some(step);
-            // A state that is missed is missed: those behind it are compared all the same.
+            // A missed state is skipped: later ones are compared all the same.
             self.say(
                 steps,
                 ArmEvent::Stands {

@@ -91,8 +91,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// The latest predictions \[s\], of the timestep and of the control period: infinite where nothing limits, NaN
-    /// while there are none. Those for an earlier setpoint will do until the next are there; those for another arm,
-    /// other gains, another method or another period say nothing.
+    /// while there are none. Limits for an earlier setpoint will do until the next are there. Limits for another
+    /// arm, other gains, another method or another period say nothing.
     fn limits(&self) -> (f64, f64) {
         let infinite = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
         match &self.limit.known {

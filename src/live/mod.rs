@@ -41,10 +41,10 @@ pub use self::steps::StepsAsked;
 
 /// Publishing ticks a second, and so the rate of `/joint_states` and `/clock` \[Hz\].
 pub const PUBLISH_RATE: u32 = 60;
-/// Time that one wake-up may spend on steps: what a message to the arm may have to wait for.
+/// Time that one wake-up may spend on steps: a message to the arm may have to wait for that.
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
-/// Between two wake-ups while steps are owed. So the arm takes what it needs of its core, not a share that is fixed by
-/// the rate of publishing; and a timestep that no machine can follow leaves the others some of it.
+/// Between two wake-ups while steps are owed. So the arm takes as much of its core as it needs, not a share that is
+/// fixed by the rate of publishing. A timestep that no machine can follow leaves the others some of it.
 pub const BREATHER: Duration = Duration::from_millis(1);
 /// Steps between two looks at the clock: some 10 microseconds of work.
 const STEPS_BETWEEN_LOOKS: u64 = 64;
@@ -208,7 +208,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.publish_diagnostics();
     }
 
-    /// Time counts from here: what was owed of an unfinished step is gone.
+    /// Time counts from here: the part of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
         self.telemetry.owes(0, 0.0);
         self.pacer

@@ -1,7 +1,7 @@
-//! What requests do to the arm.
+//! The effects of requests on the arm.
 //!
-//! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step; a
-//! switch that is in that position already changes nothing, but that a commanded effort ends.
+//! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step. A
+//! switch that is in that position already changes nothing, but ends a commanded effort.
 
 use super::{LiveArm, World};
 use crate::math::arm::{Arm, State};

@@ -53,7 +53,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
         let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
         let mut progress = None;
-        // A goal that is reached on the way ends an advance, not the steps; what is to be told of it ends the row.
+        // A goal that is reached on the way ends an advance, not the steps. News of a goal end the row.
         while steps.taken < row_end && progress.is_none() && self.simulation.divergence().is_none()
         {
             let taken;

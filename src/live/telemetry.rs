@@ -1,7 +1,7 @@
 //! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
 //! `/diagnostics` once a second and at every change.
 //!
-//! **Invariant:** nothing is computed for a topic that nobody subscribes to; what is published is written elsewhere.
+//! **Invariant:** nothing is computed for a topic without a subscriber; messages are written elsewhere.
 
 use serde::Serialize;
 

@@ -67,7 +67,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// Takes up to `steps` steps, and returns how many; fewer if a goal is reached on the way, or if the simulation
-    /// diverges. For a caller that `waits` they end at feedback too, which is returned: a single step while paused may
+    /// diverges. For a caller that `waits` they end at feedback too, which is returned. A single step while paused may
     /// be longer than a sixtieth of a second, and each has feedback for every subscriber.
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalJudged<N>>) {
         let past = self.goals.past;

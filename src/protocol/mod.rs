@@ -1,6 +1,7 @@
 //! The rosbridge side: bytes and JSON in and out.
 //!
-//! **Invariant:** no sockets, no clock, no physics in here; whatever depends on time is told the time.
+//! **Invariant:** no sockets, no clock, no physics in here; functions that depend on time take it as
+//! an argument.
 
 pub mod catalog;
 pub mod limits;

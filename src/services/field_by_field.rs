@@ -1,7 +1,6 @@
 //! Requests whose fields are taken one by one, and the answer to one that sets something.
 //!
-//! **Invariant:** a bad field never keeps a good one from the arm; what is echoed are the values as they are after the
-//! request.
+//! **Invariant:** a bad field never keeps a good one from the arm; the echoed values are those after the request.
 
 use super::{Ask, Callable};
 use crate::protocol::catalog::Service;

@@ -1,6 +1,6 @@
 //! Inverse kinematics and goals: `/ik/solve`, `/ik_action/send_goal` and `/ik_action/cancel_goal`.
 //!
-//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action, and its messages
+//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action. Its messages
 //! show the target and the setpoint that it was accepted with.
 
 use bytes::Bytes;
@@ -57,7 +57,7 @@ impl<const N: usize> Answered for Solve<N> {
 
 /// Reads `x`, `y` and `phi`; none if one of them, or a field read before, is rejected.
 ///
-/// Two links leave no orientation to choose: what stands there under `phi` is not looked at.
+/// Two links leave no orientation to choose: a value under `phi` is not looked at.
 fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
     let x = fields.number("x", Bound::Finite);
     let y = fields.number("y", Bound::Finite);

@@ -1,5 +1,5 @@
-//! The services: what each asks, how a request is read, and how its answer is written. Both the runtime and the page
-//! without a server read and write by these functions.
+//! The services: their questions, how a request is read, and how its answer is written. Both the runtime and the
+//! page without a server read and write by these functions.
 //!
 //! **Invariant:** plain values: nothing here knows an actor, a socket or a clock.
 

@@ -13,7 +13,7 @@ use pendularm::math::simulation::Simulation;
 pub const STEPS: u64 = 20_000;
 
 /// One line for each run, by each method, with both numbers of links, without and with the
-/// controller: what it is, and the bits of its last state, effort and time.
+/// controller: its name, and the bits of its last state, effort and time.
 #[must_use]
 pub fn text() -> String {
     let mut text = String::new();

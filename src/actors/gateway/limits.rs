@@ -27,8 +27,8 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + 2 * SHORT
     + MAX_KEPT
     + 96 * KIB;
-/// Bytes that a long frame takes at most: as it comes, as a message, as text, as the value that is passed on, as the
-/// frame that is sent on, and that in another form.
+/// Bytes that a long frame takes at most: as it comes, as a message, as text, as a value, as the frame that is sent
+/// on, and that in another form.
 pub const LONG_FRAME_BYTES: usize = 6 * MAX_FRAME;
 /// Bytes of the program itself, and of the trees of messages that are being encoded.
 const PROGRAM_BYTES: usize = 40 * KIB * KIB;

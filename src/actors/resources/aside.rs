@@ -1,8 +1,8 @@
 //! Work that would keep the gateway's thread for longer than a turn, done on another thread meanwhile.
 //!
 //! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Long work that needs
-//! nothing but its bytes and that one client waits for is done here: a frame of megabytes to be read, a message to
-//! be encoded, a long list to be written.
+//! nothing but its bytes and that one client waits for is done here. Examples are a frame of megabytes to be read, a
+//! message to be encoded, and a long list to be written.
 //!
 //! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of errand; the others
 //! wait in the order in which they came.

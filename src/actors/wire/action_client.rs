@@ -1,4 +1,4 @@
-//! Goals of an action: what the registry hands to the node that serves the action, and the way back to the sender.
+//! Goals of an action: the registry's message to the node that serves the action, and the way back to the sender.
 //!
 //! **Invariant:** feedback may be lost on its way to a slow client, the end of a goal may not, and it comes after it.
 //! Both are handed over as values, and written by the registry.

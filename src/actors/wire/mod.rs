@@ -5,8 +5,8 @@
 //! routes ([`Nodes`]) says which node is asked. All that goes wrong on the way is in here, once: bad arguments, a
 //! question that was dropped, and how an error is written.
 //!
-//! **Invariant:** arguments are read before a node hears of the call, and what it says is written after it has said it,
-//! by the registry or by who has a long answer: a node sees no JSON.
+//! **Invariant:** a node sees no JSON. Arguments are read before a node hears of the call. Its answer is written
+//! afterwards, by the registry or by the thread that has a long answer.
 
 pub mod action_client;
 mod caller;

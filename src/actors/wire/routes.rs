@@ -15,13 +15,13 @@ use crate::protocol::catalog::{Action, Service, Topic};
 use crate::services::{Answered, Callable, Streamed};
 
 /// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
-/// so these take a fifth of a millisecond; only computations, paths and lists of parameters take longer ones.
+/// so these take a fifth of a millisecond. Only computations, paths and lists of parameters take longer ones.
 const LONG_ARGUMENTS: usize = 1024;
 
 /// Hands what has come to the node that is meant.
 pub type Route<T> = Box<dyn Fn(T) + Send>;
 
-/// The runtime's own nodes: who serves, listens and publishes what.
+/// The runtime's own nodes, by the services, topics and actions that they serve.
 #[derive(Default)]
 pub struct Nodes {
     /// The way of a call to the node that answers it.

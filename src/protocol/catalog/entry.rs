@@ -25,7 +25,7 @@ pub enum Count {
     One,
     /// Any number, perhaps up to a bound: `float64[]`, `float64[<=3]`.
     Any,
-    /// So many: `uint8[16]`.
+    /// This many: `uint8[16]`.
     Exactly(usize),
 }
 
@@ -109,7 +109,7 @@ impl Type {
     }
 }
 
-/// Who sends on a topic.
+/// The publisher of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// The runtime publishes; clients subscribe, and may neither advertise nor publish.

@@ -3,8 +3,8 @@
 //! The registry, the tables of docs/protocol.md and the tests are checked against it; nothing else spells
 //! `/joint_states`. Fields stand in documented order, which is the order in which a positional `args` array is read.
 //!
-//! **Invariant:** each thing is one row of one table. What is served is listed: the compiler asks, since a table is an
-//! enum. What is listed is served: `tests/actors/rosapi.rs` asks.
+//! **Invariant:** each thing is one row of one table. A served entry is listed: the compiler asks, since a table is an
+//! enum. A listed entry is served: `tests/actors/rosapi.rs` asks.
 
 mod actions;
 mod entry;

@@ -1,6 +1,6 @@
 //! The nodes: one row each.
 //!
-//! **Invariant:** a name stands here without a slash; whoever shows it adds one.
+//! **Invariant:** a name stands here without a slash; its reader adds one.
 
 use super::table::table;
 

@@ -1,6 +1,7 @@
 //! The types of `rcl_interfaces` that every node of ROS 2 has its parameters told and set by.
 //!
-//! **Invariant:** fields stand as in the definitions of ROS 2; what a parameter here never is, is empty there.
+//! **Invariant:** fields stand as in the definitions of ROS 2; parts that a parameter here never has are empty
+//! there.
 
 use super::entry::{Type, message, required};
 

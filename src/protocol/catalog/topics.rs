@@ -218,7 +218,8 @@ mod tests {
     use super::ARM_STATE;
     use crate::protocol::catalog::{Rosapi, Service};
 
-    /// A question answered, a listing or a computation leaves the arm as it is: what waits for a client stays.
+    /// A question answered, a listing or a computation leaves the arm as it is: messages that wait for a
+    /// client stay.
     #[test]
     fn the_arms_state_grows_old_by_what_changes_the_arm_and_by_nothing_else() {
         let questions = Rosapi::ALL.into_iter().map(Service::Rosapi);

@@ -1,4 +1,4 @@
-//! The message types: what the runtime's own topics carry, and what is inside.
+//! The message types: those of the runtime's own topics, and the types inside.
 //!
 //! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its
 //! end.
@@ -16,7 +16,7 @@ use crate::protocol::names;
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
 const SEPARATOR: &str = "=";
 
-/// All message types: those of the topics, then those inside.
+/// All message types: first of the topics, then those inside.
 pub fn all() -> impl Iterator<Item = Type> {
     let topics = Topic::ALL.into_iter().map(Topic::message);
     topics

@@ -80,7 +80,7 @@ fn without_slash(name: &str) -> &str {
     name.strip_prefix('/').unwrap_or(name)
 }
 
-/// The frames `sources` as seen from `target`; those that the arm does not have are left out.
+/// The frames `sources` as seen from `target`. Frames that the arm does not have are left out.
 #[must_use]
 pub fn seen_from<'a>(
     stamp: Stamp,

@@ -147,7 +147,7 @@ pub struct KeyValue<'a> {
     pub value: String,
 }
 
-/// `pendularm_interfaces/msg/ErrorEstimate`; what is not finite is written as `null`.
+/// `pendularm_interfaces/msg/ErrorEstimate`; a value that is not finite is written as `null`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorEstimateMessage<'a> {
     /// The method that takes the steps.

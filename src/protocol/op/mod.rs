@@ -1,6 +1,7 @@
 //! Every rosbridge operation that a client may send, read from a frame.
 //!
-//! Payloads (`msg`, `args`, `values`) stay raw: what only passes through is never parsed further than its syntax.
+//! Payloads (`msg`, `args`, `values`) stay raw: a payload that only passes through is never parsed further than
+//! its syntax.
 //!
 //! **Invariant:** every frame gives exactly one operation or exactly one error that names what is wrong with it, and
 //! its `id` either way.
@@ -180,9 +181,9 @@ impl Op {
 pub struct Verbosity(pub Option<Level>);
 
 impl Verbosity {
-    /// Every status: what holds over raw TCP until the client says otherwise.
+    /// Every status: the level over raw TCP until the client says otherwise.
     pub const ALL: Self = Self(Some(Level::Info));
-    /// No status: what holds over WebSocket until the client says otherwise.
+    /// No status: the level over WebSocket until the client says otherwise.
     pub const NONE: Self = Self(None);
 
     /// Whether a status of that level is wanted.

@@ -35,8 +35,8 @@ pub const MAX_TOPIC_BYTES: usize = 304 * 1024;
 pub const MAX_MESSAGE: usize = MAX_FRAME + 1;
 /// How long a topic message may wait before it is dropped, unless it is the newest of its topic.
 pub const MAX_AGE: Duration = Duration::from_secs(1);
-/// The same once a message has been too old, until nothing waits any more: the client is slower than its topics, and
-/// what it reads is late by this and by what it has not read.
+/// The same once a message has been too old, until nothing waits any more. The client is slower than its topics, and
+/// its reading is late by this and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
 pub const MESSAGE_BYTES: usize = 160;
@@ -57,8 +57,8 @@ pub struct Outbox {
     topics: BTreeMap<u64, QueuedMessage>,
     /// The topics of these, and how many messages of each may wait.
     queues: Queues,
-    /// Messages with lower numbers have been looked at for their age. Those that are left are the newest of their
-    /// topics.
+    /// Messages with lower numbers have been looked at for their age. The messages that are left are the newest
+    /// of their topics.
     looked_at: u64,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,
@@ -199,7 +199,7 @@ impl Outbox {
     }
 
     /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
-    /// (`None`, or no time at all). What is held back then counts as produced now.
+    /// (`None`, or no time at all). Messages held back then count as produced now.
     pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
         match throttle.filter(|(interval, _)| !interval.is_zero()) {
             Some((interval, queue_length)) => {
@@ -220,14 +220,14 @@ impl Outbox {
         self.queues.set_bound(topic, queue_length);
     }
 
-    /// Sets how many bytes of topic messages may be taken from now on. What is ahead of a response is taken all the
-    /// same, unless it is older than `fresh`; then it is dropped, except the newest of its topic.
+    /// Sets how many bytes of topic messages may be taken from now on. Messages ahead of a response are taken all
+    /// the same, unless they are older than `fresh`. Then they are dropped, except the newest of its topic.
     pub const fn allow(&mut self, room: usize, fresh: Duration) {
         self.room = room;
         self.fresh = fresh;
     }
 
-    /// Forgets a topic after an unsubscription: its throttle, and what is held back. What is queued still leaves.
+    /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
     pub fn forget(&mut self, topic: &str) {
         self.throttles.forget(topic);
         self.queues.forget_bound(topic);
@@ -389,7 +389,8 @@ impl Outbox {
         self.topic_bytes + self.throttles.bytes()
     }
 
-    /// Topic messages dropped so far for want of room. What throttling replaces by something newer is not counted.
+    /// Topic messages dropped so far for want of room. A message that throttling replaces by a newer one is not
+    /// counted.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped

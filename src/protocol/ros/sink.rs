@@ -1,6 +1,6 @@
 //! Bytes that are written one behind the other, up to a limit.
 //!
-//! **Invariant:** no more than the limit is kept; what has gone beyond it is not there at all.
+//! **Invariant:** no more than the limit is kept; bytes beyond it are dropped.
 
 /// The bytes so far.
 #[derive(Debug)]

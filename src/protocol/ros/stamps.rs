@@ -1,5 +1,5 @@
-//! Stamps and durations under the names that ROS 1 has for their members too: written for clients that know a topic by
-//! its type of ROS 1, and read from every client.
+//! Stamps and durations under the names that ROS 1 has for their members too. They are written for clients that know a
+//! topic by its type of ROS 1, and read from every client.
 //!
 //! **Invariant:** the members of ROS 2 stay as they are: some clients use ROS 1's name of a type for ROS 2's messages.
 

@@ -26,7 +26,7 @@ pub enum Foreign {
 }
 
 impl Foreign {
-    /// One line for the status: what was recognised, and what this port speaks.
+    /// One line for the status: the protocol that was recognised, and those of this port.
     #[must_use]
     pub const fn explanation(self) -> &'static str {
         match self {

@@ -1,6 +1,6 @@
 //! A client's JSON that is passed on or echoed: ids, messages, arguments, answers.
 //!
-//! **Invariant:** it is read once, when it comes. What is written of it is one line of valid JSON, ready to be copied.
+//! **Invariant:** it is read once, when it comes. Its text is one line of valid JSON, ready to be copied.
 
 use std::borrow::Cow;
 use std::sync::Arc;

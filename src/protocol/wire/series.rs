@@ -4,8 +4,8 @@
 //! Most programs write their JSON that way, and a flood of messages is all of this kind. Such a line is checked in
 //! one pass and passed on as it is; nothing of it is taken apart and put together again.
 //!
-//! **Invariant:** what is taken for a series is what the general reader and writer would have made of it, byte for
-//! byte; whatever is in doubt is left to those.
+//! **Invariant:** a series is passed on as the general reader and writer would have done it, byte for byte. A
+//! doubtful message is left to those.
 
 use bytes::Bytes;
 
@@ -24,7 +24,8 @@ const MIDDLE: &[u8] = b"\",\"msg\":{";
 const END: &[u8] = b"}\n";
 /// Longest number whose value is certainly finite: the largest `f64` has 309 digits.
 const MAX_DIGITS: usize = 308;
-/// Levels that are kept in one word, the message itself included; what is deeper goes the general way.
+/// Levels that are kept in one word, the message itself included. A deeper message goes the general
+/// way.
 const MAX_LEVELS: u32 = 60;
 
 /// Messages of a client on a topic of clients, one behind the other.
@@ -127,8 +128,8 @@ fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
 }
 
 /// Where the JSON object ends whose brace is right before `at`. `None` where it is not valid or not complete, and
-/// where it holds anything that calls for a closer look: an escape, a byte beyond ASCII, an exponent, a number or a
-/// nesting of unusual length.
+/// where it needs a closer look: an escape, a byte beyond ASCII, an exponent, a number or a nesting of unusual
+/// length.
 fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
     // One bit per open level, 1 for a bracket; the leading 1 marks how many there are.
     let mut levels: u64 = 0b10;
@@ -269,7 +270,7 @@ fn past_digits(bytes: &[u8], mut at: usize) -> usize {
 fn string(bytes: &[u8], mut at: usize) -> Option<usize> {
     loop {
         let text = eight(bytes, at);
-        // The lowest mark is right; those above it may come from a borrow.
+        // The lowest mark is right; higher ones may come from a borrow.
         let equal = |byte: u8| (text ^ all(byte)).wrapping_sub(all(1)) & !(text ^ all(byte));
         let control = text.wrapping_sub(all(b' ')) & !text;
         let plain = before_mark(equal(b'"') | equal(b'\\') | control | text);

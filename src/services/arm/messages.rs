@@ -1,4 +1,4 @@
-//! What clients publish to the arm: setpoints on `/joint_trajectory`, efforts on `/effort_controller/commands`.
+//! Messages of clients to the arm: setpoints on `/joint_trajectory`, efforts on `/effort_controller/commands`.
 //!
 //! **Invariant:** a message is taken as a whole, or refused with the reason.
 

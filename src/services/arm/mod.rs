@@ -1,6 +1,6 @@
 //! The questions to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints and efforts.
 //!
-//! A request carries what was given and valid, field by field, and what was rejected, by name. What is valid takes
+//! A request carries what was given and valid, field by field, and what was rejected, by name. Valid fields take
 //! effect, and the answer echoes the values as they now are.
 //!
 //! **Invariant:** a bad field never keeps a good one from the arm, which hears of both.

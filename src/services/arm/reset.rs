@@ -13,7 +13,7 @@ use crate::services::{Address, Answered, Ask};
 /// Puts the arm back to its starting pose at time 0, unless something was rejected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reset<const N: usize> {
-    /// A reset has no fields: what is rejected is the request as a whole.
+    /// A reset has no fields: the request is rejected as a whole.
     pub rejected: Rejections,
 }
 

@@ -1,9 +1,9 @@
 //! `/arm_sim/step`: single steps of a paused arm.
 //!
-//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for
-//! single steps, one after the other, so what others ask takes effect in between.
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and requests for more take turns. It is as if each had asked for
+//! single steps, one after the other, so other requests take effect in between.
 //!
-//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a
+//! **Invariant:** a request that is refused at first changes nothing. One that is accepted is done as a whole, unless a
 //! divergence, a resume or the end of the runtime comes in between.
 
 use bytes::Bytes;
@@ -15,7 +15,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::field_by_field::FieldByField;
 use crate::services::{Address, Answered, Ask};
 
-/// Steps in one request: what one wake-up's budget is worth, and ten seconds of the default timestep.
+/// Steps in one request: the budget of one wake-up, and ten seconds of the default timestep.
 pub const MAX_STEPS: u64 = 10_000;
 
 /// Steps in a row: some 0.2 ms of work, so that neither the tick nor anybody's call waits for the steps of others.

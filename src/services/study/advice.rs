@@ -223,7 +223,7 @@ impl From<PlannedRun> for PlanValues {
 
 // ---- work -----------------------------------------------------------------------------------------------------------
 
-/// Time to settle in unless it is said \[s\]: what the default gains promise of the default arms.
+/// Time to settle in unless it is said \[s\]: the default gains promise it of the default arms.
 const DEFAULT_SETTLING: f64 = 4.0;
 /// Margin unless it is said: the timestep is then no longer than `/study/stability` advises.
 const DEFAULT_MARGIN: f64 = 1.25;

@@ -63,7 +63,7 @@ where
         let world = Surroundings::new(clock);
         Self {
             arm: LiveArm::new(Arm::default(), Gains::default(), world),
-            // What holds over WebSocket until the client says otherwise.
+            // The level over WebSocket until the client says otherwise.
             verbosity: Verbosity::NONE,
             error_form: ErrorForm::Text,
             goal: None,

@@ -181,7 +181,7 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> IkAction<N> {
-    /// Solves a goal and sets it in motion; who sent it is answered in between.
+    /// Solves a goal and sets it in motion; its sender is answered in between.
     fn pursue(
         &self,
         goal: SendGoal<N>,

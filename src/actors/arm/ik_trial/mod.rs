@@ -1,7 +1,7 @@
 //! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the state of things on `/ik_trial/status`.
 //!
 //! The rules are `math::trial`'s. The node asks the arm for lengths and simulation time before it does anything, and
-//! moves it through `ik_action` only. What it asks for there is done to the end before it takes its next message.
+//! moves it through `ik_action` only. Its request there is completed before it takes its next message.
 //!
 //! **Invariant:** time and goals' news are taken in the order in which the arm gave them; nothing ticks while no trial
 //! runs and nobody watches.
@@ -25,8 +25,8 @@ pub use crate::services::trial::{
     NotStarted, STATUS_PERIOD, SkipTarget, StartTrial, StopTrial, Terms,
 };
 
-/// Least time before the clock is looked at again to see whether a trial is over: what remains of it may take long, if
-/// the arm is paused or slow.
+/// Least time before the clock is looked at again to see whether a trial is over. The rest of a trial may take long,
+/// if the arm is paused or slow.
 const SHORTEST_NAP: Duration = Duration::from_millis(20);
 /// Longest such time: a timer can't be set to any number of seconds that a client may think of.
 const LONGEST_NAP: Duration = Duration::from_secs(3600);

@@ -1,4 +1,4 @@
-//! Goals on the arm: who begins one, who ends one, and who is asked before the arm says that it stands still.
+//! Goals on the arm: their begin, their end, and the barriers before the arm says that it stands still.
 //!
 //! `ik_action` owns the goal and hears what becomes of it; `live/goals.rs` judges the steps.
 //!
@@ -64,7 +64,7 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
+    /// Answers once all news of the arm about goals are published. News of a goal go by way of its owner, and none
     /// may come after the answer that the arm stands still.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = self.owners.iter();

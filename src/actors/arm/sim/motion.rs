@@ -1,6 +1,6 @@
 //! The arm's motion for those who lead it along a path, and the setpoint moved on by them alone.
 //!
-//! **Invariant:** a setpoint is moved on only from where its mover has put it: whoever else sets one takes over.
+//! **Invariant:** a setpoint is moved on only from where its mover has put it: another writer of it takes over.
 
 use actix::prelude::*;
 

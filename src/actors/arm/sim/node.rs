@@ -1,9 +1,9 @@
 //! The actor: asks the clock, advances the simulation, wakes for the next tick.
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
-//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET); what
-//! that leaves owed is taken up after [`BREATHER`]. However many messages wait, the wake-up comes: it is looked for at
-//! the end of every [turn](super::turn).
+//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps
+//! beyond that are taken after [`BREATHER`]. However many messages wait, the wake-up comes: it is looked for at the
+//! end of every [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
@@ -154,7 +154,7 @@ impl<const N: usize> ArmSim<N> {
         self.advance_to_now(ctx);
     }
 
-    /// To be called at every call: who calls once is likely to call again at once.
+    /// To be called at every call: a client that calls once is likely to call again at once.
     pub(super) fn attend_call(&mut self, ctx: &mut Context<Self>) {
         self.attend(ctx);
         stay_awake();

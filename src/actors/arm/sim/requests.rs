@@ -1,4 +1,5 @@
-//! Calls and messages of clients to the arm: what each asks is in `services::arm`, and what it does in `live`.
+//! Calls and messages of clients to the arm. The questions are in `services::arm`, and their effects in
+//! `live`.
 //!
 //! **Invariant:** the arm advances to now before it answers.
 

@@ -1,4 +1,4 @@
-//! Steps of a paused arm that clients ask for: those who ask for more than a row take turns.
+//! Steps of a paused arm that clients ask for: requests for more than a row take turns.
 //!
 //! It is as if each had asked for single steps, one after the other, so what others ask takes effect in between.
 //!

@@ -3,14 +3,14 @@
 //! An actor's mailbox is emptied before anything else of it is looked at. So whoever keeps it full would keep the arm
 //! from its tick; the end of a turn lets the thread look up.
 //!
-//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, whatever waits for it:
-//! [`TURN`], one message, and one row of steps that were asked for. Steps that are due have their own budget.
+//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, however much waits for
+//! it: [`TURN`], one message, and one row of steps. Steps that are due have their own budget.
 
 use std::time::{Duration, Instant};
 
 use crate::actors::resources::work_clock;
 
-/// Work on messages in a row: what a tick may come late.
+/// Work on messages in a row: a tick may be late by that.
 pub const TURN: Duration = Duration::from_millis(1);
 /// Messages in a row, some hundred microseconds of usual ones.
 pub const TURN_MESSAGES: usize = 64;

@@ -3,7 +3,8 @@
 //! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
 //! time.
 //!
-//! **Invariant:** nothing here knows the arm; whatever is asked, the arm and the other clients go on.
+//! **Invariant:** nothing here knows the arm. The arm and the other clients go on during every
+//! request.
 
 mod services;
 

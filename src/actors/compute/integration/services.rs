@@ -1,4 +1,4 @@
-//! The question to `integration`: what it is, how it is read, and how its answer is written, a slice at a time.
+//! The question to `integration`, how it is read, and how its answer is written, a slice at a time.
 //!
 //! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
 //! thread.

@@ -4,8 +4,8 @@
 
 use std::time::{Duration, Instant};
 
-/// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
-/// may be delayed, long beside the cost of changing over.
+/// How long one computation may keep a worker before the next one has its turn. It is short beside the 5 ms that a
+/// client may be delayed, and long beside the cost of changing over.
 pub const SLICE: Duration = Duration::from_millis(1);
 
 /// Whether a computation wants another turn.

@@ -21,7 +21,7 @@ pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
 }
 
 impl OpReader<'_> {
-    /// A frame that cannot be read to its end. What stands before the fault counts for an answer only.
+    /// A frame that cannot be read to its end. Members before the fault count for an answer only.
     pub(super) fn refused(self, problem: Problem) -> Incoming {
         let op = self.known_op().unwrap_or_default();
         let reader = OpReader { op, ..self };

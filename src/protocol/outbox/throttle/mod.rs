@@ -1,4 +1,5 @@
-//! `throttle_rate` and `queue_length`: what one connection asked to have held back, topic by topic.
+//! `throttle_rate` and `queue_length`: the messages that one connection asked to have held back,
+//! topic by topic.
 //!
 //! It is told the time, and knows no clock. Only the [outbox](crate::protocol::outbox) uses it.
 //!
@@ -100,7 +101,7 @@ impl Throttles {
         self.count
     }
 
-    /// Sets the throttle of a topic. What is held back beyond `queue_length` goes.
+    /// Sets the throttle of a topic. Messages held back beyond `queue_length` are dropped.
     pub(super) fn set(&mut self, topic: &Arc<str>, interval: Duration, queue_length: usize) {
         let queue_length = queue_length.max(1);
         let throttle = self

@@ -1,7 +1,7 @@
 //! Answers to the questions of rosapi, from the catalog and from what clients have registered.
 //!
-//! Clients appear as the node `/gateway`, as they do behind any rosbridge. What has to be asked of the arm (parameters,
-//! time) is answered elsewhere.
+//! Clients appear as the node `/gateway`, as they do behind any rosbridge. Questions for the arm (parameters, time) are
+//! answered elsewhere.
 //!
 //! **Invariant:** what an answer lists is served: the lists are made from the catalog and the registry's own, for every
 //! answer.

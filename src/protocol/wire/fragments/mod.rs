@@ -37,7 +37,7 @@ pub struct Piece {
     pub total: usize,
 }
 
-/// Why a piece is not taken; what came of its message is forgotten.
+/// Why a piece is not taken; the pieces of its message are forgotten.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FragmentError {
     /// There is no piece of such a number.

@@ -186,7 +186,7 @@ impl FramePlace {
     fn payload(&self) -> Option<u64> {
         let (_, extended) = self.head.split_at(2);
         let (bytes, length) = match self.head[1] & 0x7f {
-            126 => (2, u64::from(u16::from_be_bytes([extended[0], extended[1]]))),
+            126 => (2, u64::from(u16::from_be_bytes(*extended.first_chunk()?))),
             127 => (8, u64::from_be_bytes(*extended.first_chunk()?)),
             short => (0, u64::from(short)),
         };
