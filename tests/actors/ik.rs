@@ -79,10 +79,6 @@ impl<const N: usize> IkBench<N> {
         numbers(&values["positions"]).try_into().unwrap()
     }
 
-    async fn read_and_refuse(&mut self, args: Value) -> String {
-        self.client.refusal(Service::Solve, &args).await
-    }
-
     async fn ask(&self, target: Target) -> Result<[f64; N], SolveError> {
         let answer = ask(&self.ik.clone().recipient(), Solve(target)).await;
         answer.expect("the node answers")
@@ -154,25 +150,6 @@ fn lengths_are_asked_of_the_arm_at_every_call() {
 }
 
 #[test]
-fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
-    in_virtual_time(async {
-        let mut bench = IkBench::new([1.0, 1.0], [0.0; 2]);
-        for (args, sentence) in [
-            (json!({"y": 1}), "x is required"),
-            (json!({"x": 1}), "y is required"),
-            (json!({}), "x is required; y is required"),
-            (json!({"x": "1", "y": 1}), "x must be a number"),
-            (json!({"x": null, "y": 1}), "x must be a number"),
-            (json!({"x": true, "y": [1]}), "y must be a number"),
-        ] {
-            let why = bench.read_and_refuse(args).await;
-            assert!(why.contains(sentence), "{why}");
-        }
-        assert_eq!(bench.asked.get(), 0, "nobody is asked about nothing");
-    });
-}
-
-#[test]
 fn two_links_ignore_phi_even_a_malformed_one() {
     in_virtual_time(async {
         let mut bench = IkBench::new([1.0, 1.0], [0.0; 2]);
@@ -183,22 +160,6 @@ fn two_links_ignore_phi_even_a_malformed_one() {
                 .await;
             assert_eq!(with_phi, plain);
         }
-    });
-}
-
-#[test]
-fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
-    in_virtual_time(async {
-        let mut bench = IkBench::new([1.0; 3], [0.1, 0.2, 0.3]);
-        let why = bench
-            .read_and_refuse(json!({"x": 1, "y": 1, "phi": "north"}))
-            .await;
-        assert!(why.starts_with("phi must be a number"), "{why}");
-        let open = bench.read_and_solve(json!({"x": 1, "y": 1})).await;
-        let null = bench
-            .read_and_solve(json!({"x": 1, "y": 1, "phi": null}))
-            .await;
-        assert_eq!(open, null);
     });
 }
 
