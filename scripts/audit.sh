@@ -67,8 +67,7 @@ else
     say "ADVISORIES NOT CHECKED: no copy of the database in $database (ADVISORY_DB names another folder)"
 fi
 
-# The clients in tests/clients/roslibrust and ros2/tests/ros2-client are left out: they stand for somebody else's
-# programs, and have what those have.
+# The client in tests/clients/roslibrust is left out: it stands for somebody else's program.
 for package in . benches/equal_error fuzz python ros2; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"

@@ -18,7 +18,7 @@ cd "$(dirname "$0")/.."
 seconds=${TIME:-60}
 runs=${RUNS:-}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
-all="frame series op fields expression inverse_kinematics simulation study cbor http connection websocket runtime"
+all="frame op fields cbor http connection websocket runtime"
 
 say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }
@@ -43,11 +43,10 @@ mkdir -p "$folder"
 table=$folder/table.txt
 : >"$table"
 
-# The words that a target's inputs are made of, where they are text.
+# The words of a target's inputs.
 dictionary() {
     case $1 in
-        inverse_kinematics | simulation | study) ;;
-        expression | http) echo "-dict=fuzz/dictionaries/$1.dict" ;;
+        http) echo "-dict=fuzz/dictionaries/$1.dict" ;;
         *) echo "-dict=fuzz/dictionaries/json.dict" ;;
     esac
 }
@@ -58,7 +57,7 @@ run() {
     shift
     words=$(dictionary "$target")
     # None of these needs 2 GB.
-    "$programs/$target" "$@" ${words:+"$words"} -rss_limit_mb=2048 -print_final_stats=1 \
+    "$programs/$target" "$@" "$words" -rss_limit_mb=2048 -print_final_stats=1 \
         -artifact_prefix="$folder/failures/$target/" >>"$log" 2>&1
 }
 
@@ -85,7 +84,6 @@ repeat() {
 # Executions of a target for each of RUNS: about what it does in five milliseconds.
 share() {
     case $1 in
-        study) echo 2 ;;
         runtime) echo 5 ;;
         connection | websocket) echo 10 ;;
         http) echo 50 ;;

@@ -5,7 +5,6 @@
 //! | [`json`], [`cbor`], [`cdr`] | second readings, slow and strict |
 //! | [`admission`] | a second opinion on who may in |
 //! | [`limits`] | what an execution may cost in time and memory |
-//! | [`numbers`] | numbers where they are awkward |
 //! | [`book`] | what clients have said, to compare what others hear with |
 //! | [`session`] | scripts for clients, and what must hold of what they hear |
 //! | [`client`] | a client on an in-memory pipe, which speaks as `pendularm-client` does |
@@ -20,6 +19,5 @@ pub mod cdr;
 pub mod client;
 pub mod json;
 pub mod limits;
-pub mod numbers;
 pub mod session;
 pub mod stage;

@@ -1,7 +1,7 @@
-"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE [NODE].
+"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE.
 
 The router is eclipse-zenoh, the other ROS 2 nodes are zenoh-ros2-sdk, hashes and definitions are those of rosbags
-(Jazzy). NODE is a program with a node of the crate ros2-client, if one was built.
+(Jazzy).
 """
 
 import contextlib
@@ -20,7 +20,6 @@ from peers_stage import (
     DOMAIN,
     JAZZY,
     LATCHED,
-    NODE,
     Peer,
     command_line,
     free_port,
@@ -229,13 +228,6 @@ def test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session):
     return cut.payload.to_string()
 
 
-def test_a_node_of_another_crate_is_at_home(port):
-    command = [*NODE, f"tcp/127.0.0.1:{port}", str(DOMAIN)]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
-    assert ran.returncode == 0, ran.stderr
-    return "; ".join(ran.stdout.splitlines())
-
-
 def test_the_router_comes_back(port, bridge, router, states):
     router.end()
     bridge.said("has gone; looking for it")
@@ -326,8 +318,6 @@ def main():
     say(f"refused: {test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session)}")
     say(f"a goal with {test_a_goal_is_sent_as_an_action(peer, session)} messages of feedback")
     say(f"a path with {test_a_path_is_sent_as_an_action(peer, session, states)} messages of feedback")
-    if NODE:
-        say(f"ros2-client: {test_a_node_of_another_crate_is_at_home(port)}")
     router, session = test_the_router_comes_back(port, bridge, router, states)
     arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
     test_another_arm_has_its_namespace(address, port, session)

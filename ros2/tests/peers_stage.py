@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
-ARM, BRIDGE, *NODE = sys.argv[1:]
+ARM, BRIDGE = sys.argv[1:]
 DOMAIN = 7
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 LATCHED = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
-# the first time. It installs into the build folder. CLIENT=1 builds a node of the crate ros2-client too, which takes
-# minutes. BENCH=1 measures instead, with a release build. BENCH=quick only tries that the two hosts work.
+# the first time. It installs into the build folder. BENCH=1 measures instead, with a release build. BENCH=quick only tries
+# that the two hosts work.
 set -euo pipefail
 program=$(realpath "$1")
 target=$(realpath -m "${2:-target/ros2}")
@@ -28,10 +28,5 @@ fi
 echo "test-ros2: the bridge, and its own tests"
 cargo test --quiet --locked --target-dir "$target"
 cargo build --quiet --locked --target-dir "$target"
-node=()
-if [ "${CLIENT:-}" = 1 ]; then
-    cargo build --quiet --locked --manifest-path tests/ros2-client/Cargo.toml --target-dir "$target"
-    node=("$target/debug/ros2-client-peer")
-fi
-timeout 300 "$environment/bin/python" tests/peers.py "$program" "$target/debug/pendularm-ros2" "${node[@]}"
+timeout 300 "$environment/bin/python" tests/peers.py "$program" "$target/debug/pendularm-ros2"
 timeout 300 "$environment/bin/python" tests/hosts.py "$program" "$target/debug/pendularm-ros2"

@@ -40,6 +40,7 @@ mod paths;
 #[cfg(feature = "record")]
 #[cfg(feature = "record")]
 mod recorder;
+mod refusals;
 mod registry;
 #[cfg(feature = "record")]
 mod replay;

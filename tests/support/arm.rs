@@ -87,29 +87,6 @@ pub fn is_near(state: &Value, positions: &[f64], tolerance: f64) -> bool {
         .all(|(is, wanted)| (is - wanted).abs() < tolerance)
 }
 
-/// The gravity load by the textbook: about joint `i`, each link beyond it pulls with its weight at its centre of mass, so
-/// `G_i = g sum_k m_k (x_k - x_i)` with `x_k` the centre of link `k` and `x_i` the joint, measured along the horizontal.
-pub fn gravity_load(lengths: &[f64], masses: &[f64], gravity: f64, q: &[f64]) -> Vec<f64> {
-    let mut angle = 0.0;
-    let mut joint = 0.0;
-    let (mut joints, mut centres) = (Vec::new(), Vec::new());
-    for (length, turn) in lengths.iter().zip(q) {
-        angle += turn;
-        joints.push(joint);
-        centres.push(joint + 0.5 * length * angle.cos());
-        joint += length * angle.cos();
-    }
-    joints
-        .iter()
-        .enumerate()
-        .map(|(i, joint)| {
-            (i..q.len())
-                .map(|k| gravity * masses[k] * (centres[k] - joint))
-                .sum()
-        })
-        .collect()
-}
-
 /// A check that a right runtime passes on a quiet machine and a wrong one never does may fail now and then on a busy one.
 pub fn in_one_of_three_tries(what: &str, attempt: impl Fn() -> Result<(), String>) {
     let mut failures = Vec::new();

@@ -96,27 +96,6 @@ fn only_who_sent_a_goal_can_cancel_it_and_its_pursuer_says_how_it_ends() {
 }
 
 #[test]
-fn goals_end_with_the_client_that_pursued_them() {
-    let runtime = Runtime::start();
-    let (mut dancer, mut client) = (dancer(&runtime), runtime.connect());
-    client.send(&goal("a", true));
-    with_op(&mut dancer, "send_action_goal");
-    drop(dancer);
-    let end = with_op(&mut client, "action_result");
-    assert_eq!(
-        (&end["id"], &end["status"], &end["result"]),
-        (&json!("a"), &json!(6), &json!(false))
-    );
-    assert_eq!(end["values"], "the provider of /dance is gone");
-    client.send(&goal("b", true));
-    let end = with_op(&mut client, "action_result");
-    assert_eq!(
-        (&end["status"], &end["values"]),
-        (&json!(0), &json!("action: no action is called /dance"))
-    );
-}
-
-#[test]
 fn a_goal_outlives_its_sender_and_then_nobody_hears_of_it() {
     let runtime = Runtime::start();
     let (mut dancer, mut client) = (dancer(&runtime), runtime.connect());

@@ -40,19 +40,6 @@ fn ids(frames: &[Value]) -> Vec<u64> {
 }
 
 #[test]
-fn a_half_closed_client_gets_the_answers_to_all_that_it_sent() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let mut frames = String::new();
-    for id in 0..100 {
-        frames += &json!({"op": "call_service", "service": "/arm_sim/pause", "id": id}).to_string();
-    }
-    client.send_bytes(frames.as_bytes());
-    half_close(&client);
-    assert_eq!(ids(&rest(&mut client)), (0..100).collect::<Vec<_>>());
-}
-
-#[test]
 fn a_half_closed_client_gets_the_results_of_its_computations() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
@@ -63,31 +50,6 @@ fn a_half_closed_client_gets_the_results_of_its_computations() {
     half_close(&client);
     let frames = rest(&mut client);
     assert_eq!(ids(&frames), (0..25).collect::<Vec<_>>());
-    assert!(frames.iter().all(|frame| frame["result"] == true));
-}
-
-#[test]
-fn a_half_closed_client_gets_the_answer_of_a_provider() {
-    let runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    provide(&mut caller, "/mine");
-    for id in [1, 2] {
-        caller.send(&json!({"op": "call_service", "service": "/s", "id": id}));
-    }
-    half_close(&caller);
-    let calls = [provider.receive(), provider.receive()];
-    // The end of the stream has been seen once what the caller provides is withdrawn.
-    let is_listed = |services: &Value| services["services"].to_string().contains("/mine");
-    while is_listed(&provider.ask("/rosapi/services", json!({}))) {}
-    for call in calls {
-        provider.send(
-            &json!({"op": "service_response", "service": "/s", "id": call["id"],
-            "values": {}, "result": true}),
-        );
-    }
-    let frames = rest(&mut caller);
-    assert_eq!(ids(&frames), [1, 2]);
     assert!(frames.iter().all(|frame| frame["result"] == true));
 }
 

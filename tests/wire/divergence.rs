@@ -21,50 +21,6 @@ fn arm_status(message: &Value) -> &Value {
 }
 
 #[test]
-fn a_diverged_arm_holds_its_last_finite_state_and_says_when_and_why() {
-    for links in [2, 3] {
-        let runtime = Runtime::with_links(links);
-        let mut client = runtime.connect();
-        client.subscribe("/diagnostics");
-        diverge(&mut client, links);
-        let told = client.receive_where("a divergence", |frame| {
-            frame["topic"] == "/diagnostics" && arm_status(&frame["msg"])["level"] == 2
-        });
-        let arm = arm_status(&told["msg"]);
-        let message = arm["message"].as_str().unwrap();
-        assert!(
-            message.starts_with("diverged: ") && message.contains("step"),
-            "{message}"
-        );
-        assert_eq!(
-            arm["values"][0],
-            json!({"key": "state", "value": "diverged"})
-        );
-        assert!(
-            arm["values"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .all(|entry| entry["value"].is_string())
-        );
-
-        client.subscribe("/joint_states");
-        let held = state(&mut client);
-        assert!(
-            numbers(&held["position"]).iter().any(|q| q.abs() > 1e3),
-            "the instability shows: {held}"
-        );
-        assert!(
-            message.contains(&format!("t = {}", stamp(&held))),
-            "{message} {held}"
-        );
-        for _ in 0..20 {
-            assert_eq!(client.message("/joint_states"), held);
-        }
-    }
-}
-
-#[test]
 fn nothing_but_a_reset_moves_a_diverged_arm() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
@@ -140,32 +96,6 @@ fn a_diverged_arm_that_is_paused_is_diverged_still() {
     assert_eq!(arm_status(&after)["message"], "paused");
 }
 
-/// A weightless arm at rest stays finite whatever the timestep is; its clock does not.
-#[test]
-fn a_step_after_which_the_clock_would_not_be_finite_is_not_taken() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.ask("/arm_sim/pause", json!({"data": true}));
-    client.ask("/arm_sim/set_params", json!({"gravity": 0}));
-    client.ask("/arm_sim/reset", json!({}));
-    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e308}));
-    let ended = client.call("/arm_sim/step", json!({"steps": 2}));
-    assert_eq!(ended["result"], false, "{ended}");
-    assert_eq!(ended["values"]["steps"], 1);
-    assert_eq!(ended["values"]["time"], 1e308);
-    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
-    client.subscribe("/diagnostics");
-    let message = client.message("/diagnostics");
-    let message = arm_status(&message)["message"].as_str().unwrap();
-    assert!(message.contains("step 2 from t = 1"), "{message}");
-    client.ask("/arm_sim/reset", json!({}));
-    let stepped = client.ask("/arm_sim/step", json!({"steps": 2}));
-    assert_eq!(
-        (&stepped["steps"], &stepped["time"]),
-        (&json!(2), &json!(0.002))
-    );
-}
-
 #[test]
 fn enormous_setpoints_and_gains_leave_the_runtime_answering_in_valid_json() {
     let runtime = Runtime::start();
@@ -201,22 +131,47 @@ fn enormous_setpoints_and_gains_leave_the_runtime_answering_in_valid_json() {
     });
 }
 
-/// The lesson of the whole: what is unstable at 20 ms is not at 1 ms.
 #[test]
-fn the_same_loop_is_stable_at_a_smaller_timestep() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.subscribe("/joint_states");
-    client.ask("/pid_controller/enable", json!({"data": true}));
-    send_trajectory(&mut client, &trajectory(&[1.0, 1.0]));
-    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.05}));
-    state_where(&mut client, "an unstable arm", |state| {
-        numbers(&state["velocity"]).iter().any(|v| v.abs() > 1e3)
-    });
-    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
-    client.ask("/arm_sim/reset", json!({}));
-    send_trajectory(&mut client, &trajectory(&[1.0, 1.0]));
-    state_where(&mut client, "a settled arm", |state| {
-        crate::arm::is_near(state, &[1.0, 1.0], 0.02)
-    });
+fn extreme_parameters_leave_the_runtime_answering_in_valid_json() {
+    for links in [2, 3] {
+        let runtime = Runtime::with_links(links);
+        let mut client = runtime.connect();
+        for topic in ["/joint_states", "/clock", "/diagnostics"] {
+            client.subscribe(topic);
+        }
+        let all = |value: f64| json!(vec![value; links]);
+        for (field, value) in [
+            ("masses", all(1e-320)),
+            ("masses", all(1e308)),
+            ("lengths", all(1e-320)),
+            ("lengths", all(1e308)),
+            ("gravity", json!(1e308)),
+            ("gravity", json!(5e-324)),
+        ] {
+            let mut request = json!({});
+            request[field] = value.clone();
+            for enabled in [false, true] {
+                let values = client.ask("/arm_sim/set_params", request.clone());
+                assert_eq!(values[field], value);
+                client.ask("/pid_controller/enable", json!({"data": enabled}));
+                client.ask("/arm_sim/reset", json!({}));
+                // Each frame is parsed strictly on its way in.
+                for topic in ["/joint_states", "/clock", "/joint_states"] {
+                    client.message(topic);
+                }
+                client.ask("/arm_sim/pause", json!({"data": true}));
+                client.ask("/arm_sim/pause", json!({"data": false}));
+            }
+            client.ask(
+                "/arm_sim/set_params",
+                json!({"gravity": 9.81, "masses": vec![1.0; links], "lengths": vec![1.0; links]}),
+            );
+        }
+        // And back in order.
+        client.ask("/pid_controller/enable", json!({"data": false}));
+        client.ask("/arm_sim/reset", json!({}));
+        let fallen = state_where(&mut client, "a falling arm", |state| stamp(state) > 0.3);
+        assert!(numbers(&fallen["position"])[0] < -0.05, "{fallen}");
+        state(&mut client);
+    }
 }

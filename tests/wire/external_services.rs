@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** a call is answered once, by its provider or with the reason why not, and under its caller's own id.
 
-use std::time::{Duration, Instant};
-
 use crate::common::{Client, Runtime, forwarded, provide, respond};
 use serde_json::{Value, json};
 
@@ -160,62 +158,6 @@ fn a_service_of_the_runtime_itself_cannot_be_taken_over() {
         );
     }
     client.settle();
-}
-
-#[test]
-fn when_a_provider_goes_its_calls_fail_and_its_services_are_gone() {
-    let runtime = Runtime::start();
-    let mut caller = runtime.connect();
-    let mut provider = runtime.connect();
-    provide(&mut provider, "/s");
-    call(&mut caller, "/s", json!(1));
-    forwarded(&mut provider);
-    drop(provider);
-    let status = failure(&mut caller, &json!(1));
-    assert!(status.contains("gone"), "{status}");
-    call(&mut caller, "/s", json!(2));
-    let status = failure(&mut caller, &json!(2));
-    assert!(status.contains("no provider"), "{status}");
-}
-
-#[test]
-fn a_given_timeout_is_honoured_and_what_comes_later_is_stale() {
-    let runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    let began = Instant::now();
-    caller.send(&json!({"op": "call_service", "service": "/s", "id": 1, "timeout": 0.3}));
-    let frame = forwarded(&mut provider);
-    let status = failure(&mut caller, &json!(1));
-    assert!(status.contains("timeout"), "{status}");
-    assert!(began.elapsed() >= Duration::from_millis(300));
-    assert!(
-        began.elapsed() < Duration::from_secs(8),
-        "the default is 10 s"
-    );
-    respond(&mut provider, &frame, json!({}));
-    assert_eq!(provider.status()["level"], "error");
-    caller.settle();
-    assert!(caller.kept.is_empty(), "answered twice: {:?}", caller.kept);
-}
-
-#[test]
-fn a_timeout_that_is_none_is_refused_by_name() {
-    let runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    for timeout in ["0", "-1", "NaN", "1e999", "\"5\"", "null", "[1]"] {
-        caller.send_bytes(
-            format!(
-                "{{\"op\":\"call_service\",\"service\":\"/s\",\"id\":1,\"timeout\":{timeout}}}"
-            )
-            .as_bytes(),
-        );
-        let status = failure(&mut caller, &json!(1));
-        assert!(status.contains("timeout"), "{timeout}: {status}");
-    }
-    provider.settle();
-    assert!(provider.kept.is_empty(), "forwarded: {:?}", provider.kept);
 }
 
 #[test]

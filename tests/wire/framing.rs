@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** whatever is sent, the connection works afterwards, and nothing inside a malformed frame is executed.
 
-use std::net::Shutdown;
-
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
 
@@ -46,16 +44,6 @@ fn call_of_length(length: usize, id: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_frame_may_end_in_carriage_return_and_newline_and_blank_lines_are_ignored() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(format!("\r\n\n  \n{SET_GRAVITY}\r\n\r\n\n").as_bytes());
-    assert_eq!(client.receive()["values"]["gravity"], 1.0);
-    client.settle();
-    assert!(client.kept.is_empty(), "{:?}", client.kept);
-}
-
-#[test]
 fn a_frame_may_come_one_byte_at_a_time() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
@@ -63,43 +51,6 @@ fn a_frame_may_come_one_byte_at_a_time() {
         client.send_bytes(&[*byte]);
     }
     assert_eq!(client.receive()["values"]["gravity"], 1.0);
-}
-
-#[test]
-fn many_frames_may_come_in_one_packet() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let frames: String = (0..500)
-        .map(|id| {
-            format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"id\":{id}}}\n")
-        })
-        .collect();
-    client.send_bytes(frames.as_bytes());
-    for id in 0..500 {
-        assert_eq!(client.receive()["id"], id);
-    }
-}
-
-#[test]
-fn a_call_is_answered_though_no_newline_follows() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(SET_GRAVITY.as_bytes());
-    assert_eq!(client.receive()["values"]["gravity"], 1.0);
-    client.send_bytes(format!("{SET_GRAVITY}{SET_GRAVITY} {SET_GRAVITY}").as_bytes());
-    for _ in 0..3 {
-        assert_eq!(client.receive()["result"], true);
-    }
-}
-
-#[test]
-fn braces_and_brackets_inside_strings_do_not_count() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(
-        br#"{"pad":"}]\"}{[\\","op":"call_service","service":"/arm_sim/pause","id":"}"}"#,
-    );
-    assert_eq!(client.receive()["id"], "}");
 }
 
 #[test]
@@ -115,12 +66,6 @@ fn every_frame_of_the_runtime_is_one_line() {
 }
 
 #[test]
-fn pretty_printed_json_is_malformed() {
-    let pretty = "{\n  \"op\": \"call_service\",\n  \"args\": {\"gravity\": 1},\n  \"service\": \"/arm_sim/set_params\"\n}\n";
-    malformed(pretty.as_bytes(), 5);
-}
-
-#[test]
 fn a_line_that_opens_with_anything_else_is_one_malformed_frame() {
     for opening in [
         "garbage ", "[", "\"", "42 ", "}", "]", "null,", "/", "\u{feff}",
@@ -130,58 +75,6 @@ fn a_line_that_opens_with_anything_else_is_one_malformed_frame() {
             1,
         );
     }
-}
-
-#[test]
-fn an_object_that_its_line_does_not_complete_is_one_malformed_frame() {
-    // The inner object is complete, and would be an operation by itself.
-    malformed(
-        format!("{{\"op\":\"call_service\",\"args\":{SET_GRAVITY}\n").as_bytes(),
-        1,
-    );
-    malformed(format!("{{\"a\":\"{SET_GRAVITY}\n").as_bytes(), 1);
-    malformed(format!("{{\"a\":]{SET_GRAVITY}\n").as_bytes(), 1);
-}
-
-#[test]
-fn a_balanced_object_that_is_no_json_is_one_malformed_frame() {
-    for text in [
-        "{\"op\":}",
-        "{op:1}",
-        "{\"a\":1,}",
-        "{\"a\" 1}",
-        "{\"a\":01}",
-        "{\"a\":+1}",
-    ] {
-        malformed(text.as_bytes(), 1);
-    }
-}
-
-#[test]
-fn bad_utf8_is_one_malformed_frame() {
-    malformed(b"{\"op\":\"\xff\xfe\"}\n", 1);
-    malformed(b"\xc3\x28 no object\n", 1);
-}
-
-#[test]
-fn an_object_without_a_string_op_is_told_that() {
-    for frame in [
-        "{}\n",
-        "{\"op\":7}",
-        "{\"op\":null}",
-        "{\"op\":{\"op\":\"publish\"}}",
-    ] {
-        let texts = malformed(frame.as_bytes(), 1);
-        assert!(texts[0].contains("op"), "{texts:?}");
-    }
-}
-
-#[test]
-fn a_frame_of_four_mebibytes_is_accepted() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(&call_of_length(MAX_FRAME, "longest"));
-    assert_eq!(client.receive()["id"], "longest");
 }
 
 #[test]
@@ -214,64 +107,6 @@ fn a_longer_frame_gets_one_error_and_is_skipped_to_its_end() {
     assert_eq!(client.receive()["level"], "error");
     assert_eq!(gravity(&mut client), 9.81);
     assert!(client.kept.is_empty(), "{:?}", client.kept);
-}
-
-#[test]
-fn deep_nesting_is_a_malformed_frame_and_never_a_stack_overflow() {
-    for (open, close) in [("[", "]"), ("{\"a\":", "}")] {
-        let deep = format!(
-            "{{\"a\":{}1{}}}",
-            open.repeat(300_000),
-            close.repeat(300_000)
-        );
-        malformed(deep.as_bytes(), 1);
-    }
-    // Cut off in the middle, by a newline.
-    malformed(format!("{{\"a\":{}\n", "[".repeat(1_000_000)).as_bytes(), 1);
-}
-
-#[test]
-fn a_frame_that_the_stream_cuts_off_is_malformed() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(b"{\"op\":\"call_service\",\"args\":{}");
-    client.stream().shutdown(Shutdown::Write).unwrap();
-    assert_eq!(client.receive()["level"], "error");
-    assert!(client.is_closed());
-}
-
-#[test]
-fn unknown_fields_are_ignored() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send_bytes(
-        br#"{"zzz":[1,{"op":"nonsense"}],"op":"call_service","service":"/arm_sim/pause","id":1,"qos":{}}"#,
-    );
-    assert_eq!(client.receive()["result"], true);
-}
-
-#[test]
-fn numbers_that_are_not_finite_are_rejected_by_name() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    for number in ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"] {
-        client.send_bytes(
-            format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"id\":1,\"args\":{{\"gravity\":{number},\"masses\":[1,{number}],\"lengths\":[2,2]}}}}\n")
-                .as_bytes(),
-        );
-        let response = client.receive();
-        assert_eq!(response["result"], false, "{response}");
-        let status = response["status"].as_str().unwrap();
-        assert!(
-            status.contains("gravity") && status.contains("masses"),
-            "{status}"
-        );
-        assert_eq!(
-            response["values"]["lengths"],
-            json!([2.0, 2.0]),
-            "{response}"
-        );
-    }
 }
 
 #[test]

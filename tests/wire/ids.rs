@@ -71,23 +71,6 @@ fn a_status_carries_the_id_of_the_frame_that_it_answers() {
 }
 
 #[test]
-fn where_no_id_came_none_is_sent() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    for frame in [
-        "{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\"}",
-        "{\"op\":\"call_service\",\"service\":\"/none\"}",
-        "{\"op\":\"subscribe\",\"topic\":\"/t\"}",
-        "{\"op\":\"nonsense\"}",
-        "no frame\n",
-    ] {
-        client.send_bytes(frame.as_bytes());
-        let answer = client.receive();
-        assert!(answer.get("id").is_none(), "{answer}");
-    }
-}
-
-#[test]
 fn a_forwarded_call_comes_back_under_the_callers_own_id() {
     let runtime = Runtime::start();
     let (mut caller, mut provider) = (runtime.connect(), runtime.connect());

@@ -31,6 +31,7 @@ mod closing;
 mod command;
 #[path = "../support/common.rs"]
 mod common;
+mod computations;
 #[path = "../support/diagnostics.rs"]
 mod diagnostics;
 mod divergence;
@@ -42,19 +43,15 @@ mod faults_threads;
 mod follow_path;
 mod fragments;
 mod framing;
-mod gains;
 mod hostile_log;
 mod hostile_pages;
 mod hostile_users;
 mod hostile_websocket;
 mod http;
 mod ids;
-mod ik;
 mod ik_action;
 mod ik_trial;
-mod integration_step;
 mod joint_states;
-mod joint_trajectory;
 #[path = "../support/json.rs"]
 mod json;
 mod latched;
@@ -67,8 +64,6 @@ mod opening;
 mod options;
 mod order;
 mod parameters;
-mod pause_reset;
-mod pid;
 mod places;
 #[cfg(target_os = "linux")]
 mod present;
@@ -81,10 +76,7 @@ mod record_words;
 mod rosapi;
 mod series;
 mod services;
-mod set_integrator;
-mod set_params;
 mod shutdown;
-mod smoke;
 mod stamps;
 mod step_disturb;
 mod study;

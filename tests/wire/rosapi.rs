@@ -59,21 +59,6 @@ fn every_question_is_answered_under_both_prefixes_with_the_fields_of_the_catalog
 }
 
 #[test]
-fn a_question_without_its_field_is_refused_by_name() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    for question in Rosapi::ALL {
-        let service = Service::Rosapi(question);
-        for field in service.fields().iter().filter(|field| field.required) {
-            let why = client.refusal(service.name(), json!({}));
-            assert!(why.contains(field.name), "{question:?}: {why}");
-            let why = client.refusal(service.name(), json!({field.name: 5}));
-            assert!(why.contains(field.name), "{question:?}: {why}");
-        }
-    }
-}
-
-#[test]
 fn topics_are_the_catalogs_and_the_clients_as_long_as_they_use_them() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
@@ -121,79 +106,6 @@ fn topics_are_the_catalogs_and_the_clients_as_long_as_they_use_them() {
 }
 
 #[test]
-fn every_topics_type_is_told_to_its_end_in_the_form_that_parsers_take() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let all = client.ask("/rosapi/topics_and_raw_types", json!({}));
-    for ((topic, type_name), text) in texts(&all["topics"])
-        .into_iter()
-        .zip(texts(&all["types"]))
-        .zip(texts(&all["typedefs_full_text"]))
-    {
-        let line = "=".repeat(80);
-        let parts: Vec<&str> = text.split(&format!("{line}\nMSG: ")).collect();
-        let defined: Vec<&str> = parts[1..]
-            .iter()
-            .filter_map(|one| one.lines().next())
-            .collect();
-        // Every type that a field has is primitive or defined below.
-        for (index, part) in parts.iter().enumerate() {
-            for line in part.lines().skip(usize::from(index > 0)) {
-                let kind = line.split(' ').next().unwrap().trim_end_matches("[]");
-                assert!(
-                    !kind.contains('/') || defined.contains(&kind),
-                    "{topic}: {line}"
-                );
-            }
-        }
-        let details = client.ask("/rosapi/message_details", json!({"type": type_name}));
-        assert_eq!(
-            details["typedefs"].as_array().unwrap().len(),
-            parts.len(),
-            "{topic}"
-        );
-    }
-    let at = texts(&all["topics"])
-        .iter()
-        .position(|one| *one == "/joint_states")
-        .unwrap();
-    let text = texts(&all["typedefs_full_text"])[at];
-    assert!(text.contains("float64[] effort  # N m\n"), "{text}");
-    assert!(
-        text.contains("\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp"),
-        "{text}"
-    );
-}
-
-#[test]
-fn a_types_details_name_its_fields_with_types_and_lengths() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    for spelling in ["sensor_msgs/msg/JointState", "sensor_msgs/JointState"] {
-        let details = client.ask("/rosapi/message_details", json!({"type": spelling}));
-        let state = &details["typedefs"][0];
-        assert_eq!(state["type"], "sensor_msgs/JointState");
-        assert_eq!(
-            state["fieldnames"],
-            json!(["header", "name", "position", "velocity", "effort"])
-        );
-        assert_eq!(state["fieldtypes"][2], "float64");
-        assert_eq!(state["fieldarraylen"], json!([-1, 0, 0, 0, 0]));
-        assert_eq!(details["typedefs"][1]["type"], "std_msgs/Header");
-    }
-    let details = client.ask(
-        "/rosapi/service_request_details",
-        json!({"type": "pendularm_interfaces/SetGains"}),
-    );
-    assert_eq!(
-        details["typedefs"][0]["fieldnames"],
-        json!(["kp", "ki", "kd"])
-    );
-    let why = client.refusal("/rosapi/message_details", json!({"type": "no/such"}));
-    assert!(why.starts_with("type"), "{why}");
-}
-
-#[test]
 fn services_are_told_with_type_and_node_those_of_clients_too() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
@@ -231,25 +143,6 @@ fn services_are_told_with_type_and_node_those_of_clients_too() {
         json!({"service": "rosapi/Topics"}),
     );
     assert_eq!(providers["providers"], json!(["/rosapi"]));
-}
-
-#[test]
-fn the_nodes_details_tell_every_topic_and_service_of_the_catalog() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let (mut topics, mut services) = (0, 0);
-    let nodes = client.ask("/rosapi/nodes", json!({}));
-    for node in texts(&nodes["nodes"]) {
-        let details = client.ask("/rosapi/node_details", json!({"node": node}));
-        topics += details["publishing"].as_array().unwrap().len();
-        topics += details["subscribing"].as_array().unwrap().len();
-        services += details["services"].as_array().unwrap().len();
-    }
-    // `/joint_trajectory` has a subscriber and a publisher within the runtime.
-    assert_eq!(topics, Topic::ALL.len() + 1);
-    assert_eq!(services, Service::ALL.len() + 2 * Rosapi::ALL.len());
-    let nobody = client.ask("/rosapi/node_details", json!({"node": "/nobody"}));
-    assert_eq!(nobody["services"], json!([]));
 }
 
 #[test]

@@ -7,13 +7,6 @@ use crate::arm::{in_one_of_three_tries, let_simulate, stamp, state, state_where,
 use crate::common::{Client, PATIENCE, Runtime, signal};
 use serde_json::json;
 
-/// An arm that nothing moves: what such a timestep would make of a swing is not the question here.
-fn still_arm(client: &mut Client, timestep: f64) {
-    client.ask("/arm_sim/set_params", json!({"gravity": 0}));
-    client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
-    client.ask("/arm_sim/reset", json!({}));
-}
-
 /// How far simulation time is ahead of `epoch`'s wall time: the largest of some messages, since what delays a message
 /// on its way to us only makes it less.
 fn lead(client: &mut Client, epoch: Instant) -> f64 {
@@ -40,49 +33,6 @@ fn simulation_time_runs_at_wall_time() {
             .then_some(())
             .ok_or(format!("{share}"))
     });
-}
-
-#[test]
-fn coarse_timesteps_run_at_wall_time_too() {
-    for timestep in [0.1, 0.37] {
-        in_one_of_three_tries("at most a step and half a second behind", || {
-            let runtime = Runtime::start();
-            let mut client = runtime.connect();
-            client.subscribe("/joint_states");
-            // The reset is from after it.
-            let began = Instant::now();
-            still_arm(&mut client, timestep);
-            let later = state_where(&mut client, "time", |state| stamp(state) > 2.5);
-            let (time, wall) = (stamp(&later), began.elapsed().as_secs_f64());
-            assert!(time <= wall + 0.05, "{time} {wall} at {timestep}");
-            assert!(
-                ((time / timestep).round() * timestep - time).abs() < 1e-8,
-                "{time} is no multiple of {timestep}"
-            );
-            // Whole steps: one may be in progress.
-            (time > wall - timestep - 0.5)
-                .then_some(())
-                .ok_or(format!("{time} {wall} at {timestep}"))
-        });
-    }
-}
-
-#[test]
-fn a_step_of_two_seconds_is_taken_every_two_seconds() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let began = Instant::now();
-    still_arm(&mut client, 2.0);
-    client.subscribe("/joint_states");
-    let mut times = vec![0.0];
-    while times.last() != Some(&4.0) && began.elapsed() < PATIENCE {
-        let time = stamp(&client.message("/joint_states"));
-        let wall = began.elapsed().as_secs_f64();
-        assert!(time <= wall + 0.05, "{time} s of simulation after {wall} s");
-        times.push(time);
-    }
-    times.dedup();
-    assert_eq!(times, [0.0, 2.0, 4.0]);
 }
 
 /// A microsecond is at the edge of what a machine can follow, and beyond it without optimisation: nothing is asserted of the
@@ -157,45 +107,6 @@ fn a_stalled_process_catches_up_a_quarter_of_a_second_and_drops_the_rest() {
         right
             .then_some(())
             .ok_or(format!("caught up {caught_up} s of {stall} s"))
-    });
-}
-
-#[test]
-fn setting_what_is_set_already_costs_no_time() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    still_arm(&mut client, 0.5);
-    client.subscribe("/joint_states");
-    let began = Instant::now();
-    // Were each to start the step afresh, no step would ever be done.
-    while stamp(&state(&mut client)) < 1.0 {
-        assert!(began.elapsed() < PATIENCE, "no step is done");
-        client.ask(
-            "/arm_sim/set_integrator",
-            json!({"timestep": 0.5, "method": "rk4"}),
-        );
-        client.ask("/arm_sim/pause", json!({"data": false}));
-        client.ask("/pid_controller/enable", json!({"data": false}));
-        client.call("/arm_sim/set_integrator", json!({"timestep": -1}));
-    }
-}
-
-#[test]
-fn a_new_timestep_starts_its_step_afresh() {
-    in_one_of_three_tries("no step is done", || {
-        let runtime = Runtime::start();
-        let mut client = runtime.connect();
-        still_arm(&mut client, 0.9);
-        client.subscribe("/joint_states");
-        for round in 0..6 {
-            client.ask(
-                "/arm_sim/set_integrator",
-                json!({"timestep": if round % 2 == 0 { 0.8 } else { 0.9 }}),
-            );
-            ticks(&mut client, 12);
-        }
-        let time = stamp(&state(&mut client));
-        (time == 0.0).then_some(()).ok_or(format!("{time} s"))
     });
 }
 

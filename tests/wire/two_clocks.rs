@@ -88,36 +88,6 @@ fn the_law_runs_once_a_period_and_a_timestep_keeps_the_period_that_was_asked_for
 }
 
 #[test]
-fn a_bad_field_of_a_period_is_named_and_the_other_takes_effect() {
-    let (_runtime, mut client, _) = paused();
-    for bad in [
-        json!(-1e-3),
-        json!("0.01"),
-        json!(null),
-        json!([0.01]),
-        json!(true),
-    ] {
-        let answer = client.call(PERIOD, json!({"period": bad, "delay": true}));
-        assert_eq!(answer["result"], false);
-        assert!(
-            answer["status"].as_str().unwrap().starts_with("period "),
-            "{answer}"
-        );
-        assert_eq!(
-            answer["values"],
-            json!({"period": 0.0, "effective_period": 1e-3, "delay": true})
-        );
-        client.ask(PERIOD, json!({"delay": false}));
-    }
-    let answer = client.call(PERIOD, json!({"period": 0.02, "delay": 1}));
-    assert!(
-        answer["status"].as_str().unwrap().starts_with("delay "),
-        "{answer}"
-    );
-    assert_eq!(answer["values"]["period"], 0.02);
-}
-
-#[test]
 fn the_control_period_is_a_parameter_of_the_arm() {
     let (_runtime, mut client, _) = paused();
     let set = json!({"name": "/arm_sim:control_period", "value": "0.02"});

@@ -23,48 +23,6 @@ fn a_goal_is_reached_at_the_very_step_that_completes_the_dwell() {
     });
 }
 
-/// The arm is looked at between two wake-ups: after 250 steps the goal is active, after 251 it is not.
-#[test]
-fn not_a_step_earlier_and_not_a_step_later() {
-    in_virtual_time(async {
-        for (wait, reached) in [(250, false), (251, true)] {
-            let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-            client.subscribe(RESULT).await;
-            stage.send_goal(here(0.25)).await;
-            pass(ms(wait)).await;
-            assert_eq!(stage.cancel().await.is_ok(), !reached);
-            client.settle().await;
-            let outcome = if reached { "reached" } else { "preempted" };
-            assert_eq!(client.messages(RESULT)[0]["outcome"], outcome);
-        }
-    });
-}
-
-/// Even there the order stands: response, trajectory, feedback, result.
-#[test]
-fn a_success_hold_of_0_is_content_with_the_first_step_after_response_and_trajectory() {
-    in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        for topic in [RESULT, FEEDBACK, "/joint_trajectory"] {
-            client.subscribe(topic).await;
-        }
-        client.heard.clear();
-        let at_once = json!({"x": 2, "y": 0, "epsilon": 0.1, "success_hold": 0});
-        let values = client.ask(SEND, at_once).await;
-        let goal = values["goal_id"].as_str().unwrap().to_owned();
-        client.messages_for(ms(100), RESULT).await;
-        let expected = [
-            SEND.to_owned(),
-            "/joint_trajectory".to_owned(),
-            format!("{FEEDBACK} {goal}"),
-            format!("{RESULT} {goal} reached"),
-        ];
-        assert_eq!(client.story(), expected);
-        let elapsed = number(&client.messages(FEEDBACK)[0]["elapsed"]);
-        assert!((elapsed - STEP).abs() < ROUNDING);
-    });
-}
-
 /// The end effector leaves epsilon for 20 ms, because the first link is longer for so long; the 250 ms count from its return.
 #[test]
 fn any_excursion_starts_the_dwell_over_and_new_lengths_count_at_once() {

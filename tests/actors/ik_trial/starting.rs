@@ -172,25 +172,3 @@ fn stop_ends_the_trial_and_leaves_nothing_in_flight() {
         assert_eq!(client.messages(RESULT).len(), 1, "and no replacement");
     });
 }
-
-#[test]
-fn args_with_more_entries_than_the_service_has_fields_are_rejected_and_change_nothing() {
-    in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        let values = json!({"duration": 60.0, "epsilon": 1e-9, "success_hold": 0.0});
-        for args in [json!([60, 1e-9, 0]), json!({"epsilon": null})] {
-            assert_eq!(client.ask(START, args).await, values);
-        }
-        let before = status(&mut client).await;
-        let response = client.call(START, json!([5, 1, 1, 1])).await;
-        assert_eq!(response["values"], values);
-        assert!(response["status"].as_str().unwrap().starts_with("args "));
-        for service in [SKIP, STOP] {
-            let why = client.refusal(service, json!([1])).await;
-            assert!(why.starts_with("args "), "{why}");
-        }
-        let after = status(&mut client).await;
-        assert_eq!(after["target"], before["target"]);
-        assert_eq!(after["running"], true);
-    });
-}

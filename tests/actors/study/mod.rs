@@ -23,7 +23,7 @@ use pendularm::actors::arm::sim::{
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{
-    NotPlanned, NotRun, PlanRun, PredictStability, RunOffline, Study, SuggestGains,
+    NotPlanned, PlanRun, PredictStability, RunOffline, Study, SuggestGains,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::node::Unserved;

@@ -403,6 +403,15 @@ pub const FAULTS: &[Planted] = &[
     }),
     planted("reset-4", "keeps the integral", |_| after_calls(RESET, 3, |msg| msg["effort"][0] = json!(0.003))),
     planted("reset-5", "the clock goes on", |_| topic(STATES, |msg, _| add(&mut msg["header"]["stamp"]["sec"], 5.0))),
+    planted("reset-6", "switches the controller off", |_| {
+        Box::new(move |side, _, frame| {
+            if side == Side::Client && is(&frame, "service", RESET) {
+                let off = json!({"op": "call_service", "id": "proxy", "service": ENABLE, "args": {"data": false}});
+                return vec![frame, off];
+            }
+            vec![frame]
+        })
+    }),
     planted("enable-1", "starts enabled", |_| answer(ENABLE, |frame, _| frame["values"]["data"] = json!(true))),
     planted("enable-1", "has an effort at the start", |_| topic(STATES, |msg, _| msg["effort"][0] = json!(0.5))),
     planted("enable-2", "cannot be disabled", |_| request(ENABLE, |args| replace(args, "data", &json!(false), &json!(true)))),

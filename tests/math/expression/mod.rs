@@ -35,17 +35,3 @@ pub(crate) fn rejection(text: &str) -> String {
         Err(error) => error.to_string(),
     }
 }
-
-#[track_caller]
-pub(crate) fn assert_values(table: &[(&str, f64)]) {
-    for &(text, expected) in table {
-        assert_eq!(value(text), expected, "{text}");
-    }
-}
-
-#[track_caller]
-pub(crate) fn assert_rejections(table: &[(&str, &str)]) {
-    for &(text, expected) in table {
-        assert_eq!(rejection(text), expected, "{text:?}");
-    }
-}

@@ -1,9 +1,7 @@
 //! The fields of a request: absent, null, within an object, by position, repeated, refused by another layer.
 
 use pendularm::protocol::catalog::Service;
-use pendularm::protocol::op::Arguments;
 use pendularm::protocol::op::fields::{Bound, Fields, Reason, RejectedField};
-use serde_json::value::RawValue;
 
 use super::{args, reading};
 
@@ -16,20 +14,6 @@ fn an_absent_optional_field_is_no_rejection() {
         )
     });
     assert_eq!((value, status.as_str()), ((None, None), ""));
-}
-
-#[test]
-fn an_absent_required_field_is_rejected() {
-    let (value, status) = reading(Service::Solve, r#"{"x":1}"#, |fields| {
-        let finite = Bound::Finite;
-        (
-            fields.number("x", finite),
-            fields.number("y", finite),
-            fields.number("phi", finite),
-        )
-    });
-    assert_eq!(value, (Some(1.0), None, None));
-    assert_eq!(status, "y is required");
 }
 
 #[test]
@@ -91,23 +75,6 @@ fn a_reason_given_from_outside_for_a_member_names_it_with_its_object() {
 }
 
 #[test]
-fn the_good_fields_of_a_request_count_though_others_are_bad() {
-    let request = r#"{"gravity":-1,"masses":[1,2],"lengths":[1],"extra":null}"#;
-    let (value, status) = reading(Service::SetParams, request, |fields| {
-        (
-            fields.number("gravity", Bound::NonNegative),
-            fields.numbers("masses", 2, Bound::Positive),
-            fields.numbers("lengths", 2, Bound::Positive),
-        )
-    });
-    assert_eq!(value, (None, Some(vec![1.0, 2.0]), None));
-    assert_eq!(
-        status,
-        "gravity must be at least 0, got -1; lengths must have 2 entries, got 1"
-    );
-}
-
-#[test]
 fn a_positional_array_is_read_in_documented_order() {
     let (value, status) = reading(Service::SendGoal, "[1,2,null,0.5]", |fields| {
         let mut read = |name| fields.number(name, Bound::Finite);
@@ -132,18 +99,6 @@ fn a_positional_array_may_have_as_many_entries_as_the_service_has_fields() {
         )
     });
     assert_eq!(read, ((Some(vec![1.0, 2.0]), Some(0.5)), String::new()));
-}
-
-#[test]
-fn a_positional_array_with_too_many_entries_is_rejected_naming_args() {
-    let args = args("[1,2,3]");
-    let rejection = Fields::read(&args, Service::SetIntegrator).unwrap_err();
-    assert_eq!(
-        rejection.to_string(),
-        "args must have at most 2 entries, got 3"
-    );
-    let args = Arguments::Positional(RawValue::from_string("[1]".to_owned()).unwrap().into());
-    assert!(Fields::read(&args, Service::Reset).is_err());
 }
 
 #[test]

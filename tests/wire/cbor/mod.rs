@@ -5,7 +5,6 @@
 #![cfg(feature = "web")]
 mod choice;
 mod decoder;
-mod plain;
 mod raw;
 
 use self::decoder::Cbor;

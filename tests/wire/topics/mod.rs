@@ -4,7 +4,6 @@
 //! receiver, nothing is still on its way.
 
 mod publishing;
-mod refusals;
 mod subscriptions;
 
 use crate::common::{Client, Runtime};

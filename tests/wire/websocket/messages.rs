@@ -114,43 +114,6 @@ fn topics_go_both_ways_between_tcp_and_websocket() {
     assert_eq!(client.message("/reply"), json!({"data": [1, 2]}));
 }
 
-/// Line ends within a message are white space; a frame over TCP must stay on its line.
-#[test]
-fn a_pretty_printed_message_is_one_frame_and_passes_on_as_one_line() {
-    let runtime = Runtime::start();
-    let mut socket = Socket::open(runtime.address);
-    let mut client = runtime.connect();
-    client.subscribe("/chat");
-    socket.send(&json!({"op": "advertise", "topic": "/chat"}));
-    let msg = json!({"text": "one \"two\"", "list": [1, {"deep": "{\n}"}]});
-    let frame = json!({"op": "publish", "topic": "/chat", "msg": msg});
-    let pretty = serde_json::to_string_pretty(&frame).unwrap();
-    assert!(pretty.lines().count() > 5);
-    socket.send_text(&pretty);
-    assert_eq!(client.message("/chat"), msg);
-}
-
-#[test]
-fn a_line_end_within_a_string_is_malformed_and_nothing_inside_is_executed() {
-    let runtime = Runtime::start();
-    let mut socket = Socket::open(runtime.address);
-    socket.send(&json!({"op": "set_level", "level": "error"}));
-    let inner =
-        "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}";
-    socket.send_text(&format!("{{\"op\":\"x\",\"a\":\"\n{inner}\n\"}}"));
-    socket.send_text(&format!("not an object\n{inner}\n"));
-    socket.send_text(&format!("[\n{inner}\n]"));
-    for _ in 0..3 {
-        let status = socket.receive();
-        assert_eq!(
-            (&status["op"], &status["level"]),
-            (&json!("status"), &json!("error"))
-        );
-    }
-    let response = socket.call("/arm_sim/set_params", json!({}));
-    assert_eq!(response["values"]["gravity"], 9.81);
-}
-
 #[test]
 fn a_client_may_provide_a_service_over_websocket() {
     let runtime = Runtime::start();

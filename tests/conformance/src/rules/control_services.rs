@@ -68,6 +68,7 @@ pub const RULES: &[Rule] = &[
     rule("reset-3", "The setpoint is reset too", "no effort and no motion after it", resets_setpoint),
     rule("reset-4", "The integral is reset too", "no effort after it", resets_integral),
     rule("reset-5", "The simulation clock starts at zero", "a stamp below 1 s, or wall time in the stamps", zero_clock),
+    rule("reset-6", "A reset keeps every setting", "method, timestep, parameters, gains, pause and enable as before", keeps_settings),
 ];
 
 const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
@@ -358,4 +359,29 @@ fn zero_clock(bench: &mut Bench) -> Got {
     // Wall time counts from 1970.
     must(!(1.0..1e9).contains(&stamp), || format!("{stamp} s"))?;
     Ok(format!("{stamp:.3} s"))
+}
+
+fn keeps_settings(bench: &mut Bench) -> Got {
+    bench.accepted(SET_INTEGRATOR, &json!({"method": "verlet", "timestep": 0.002}))?;
+    bench.set_arm(&uneven(bench.links))?;
+    bench.set_gains(4.0, 3.0, 2.0)?;
+    bench.enable(true)?;
+    bench.pause(true)?;
+    let services: [(&str, &[&str]); 5] = [
+        (SET_INTEGRATOR, &["method", "timestep"]),
+        (SET_PARAMS, &PARAMS),
+        ("/pid_controller/set_gains", &["kp", "ki", "kd"]),
+        ("/pid_controller/enable", &["data"]),
+        ("/arm_sim/pause", &["data"]),
+    ];
+    let mut before = Vec::new();
+    for (service, _) in services {
+        before.push(bench.accepted(service, &json!({}))?);
+    }
+    bench.reset()?;
+    for ((service, members), before) in services.into_iter().zip(&before) {
+        let after = bench.accepted(service, &json!({}))?;
+        same(before, &after, members).map_err(|why| format!("{service}: {why}"))?;
+    }
+    Ok("all as before".to_owned())
 }

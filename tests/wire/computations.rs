@@ -2,10 +2,22 @@
 
 use std::time::Duration;
 
-use super::{SERVICE, response, with};
 use crate::arm::{in_one_of_three_tries, stamp, state};
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
+
+const SERVICE: &str = "/arm_sim/integration_step";
+
+/// A good request with one field replaced.
+fn with(field: &str, value: Value) -> Value {
+    let mut request = json!({"function": "t", "x0": 0.0, "xdot0": 0.0, "dt": 0.1, "steps": 10, "integrator": "rk4"});
+    request[field] = value;
+    request
+}
+
+fn response(client: &mut Client) -> Value {
+    client.receive_where("response", |frame| frame["op"] == "service_response")
+}
 
 /// A request of seconds of work and a small answer: a sum of 2001 terms (4001 nodes), 4 times in each of 100,000 steps.
 /// A test that sends it does not wait for its end.

@@ -1,0 +1,369 @@
+//! Refusals of fields: one table of all services, in virtual time.
+//!
+//! `rows.txt` has the table for 2 links. A row is a service, a field, a literal for it, and the status that the client gets.
+
+use std::collections::BTreeMap;
+
+use crate::stage::start_goal_nodes;
+use crate::system::in_virtual_time;
+use crate::virtual_time::{Gateway, Peer, WIDE};
+use actix::prelude::*;
+use pendularm::actors::arm::ik_action::GoalTracker;
+use pendularm::actors::arm::sim::ArmSim;
+use pendularm::actors::compute::integration::Integration;
+use pendularm::actors::compute::study::Study;
+use pendularm::actors::compute::workers::WorkerPool;
+use pendularm::actors::gateway::registry::Attach;
+use pendularm::actors::ros::parameters::Parameters;
+use pendularm::actors::ros::rosapi::ArmParameters;
+use pendularm::actors::ros::tf_web::TfRepublisher;
+use pendularm::actors::wire::Nodes;
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm::protocol::catalog::Service;
+use serde_json::{Value, json};
+use tokio::time::sleep;
+
+/// Fields that take any value: unknown parts of other people's types, and the name of a record, which has a disk.
+const TAKE_ANYTHING: [&str; 6] = [
+    "depth",
+    "source_frames",
+    "angular_thres",
+    "trans_thres",
+    "timeout",
+    "name",
+];
+
+/// Services whose fields apply one by one, with valid values that are not the present ones.
+const FIELD_BY_FIELD: [(&str, &str); 7] = [
+    (
+        "/arm_sim/set_integrator",
+        r#"{"method":"euler","timestep":0.002}"#,
+    ),
+    (
+        "/arm_sim/set_params",
+        r#"{"gravity":2.0,"masses":[2.0,3.0],"lengths":[0.5,0.25]}"#,
+    ),
+    ("/arm_sim/pause", r#"{"data":true}"#),
+    (
+        "/arm_sim/set_state",
+        r#"{"position":[0.1,0.2],"velocity":[0.3,0.4]}"#,
+    ),
+    ("/pid_controller/enable", r#"{"data":true}"#),
+    (
+        "/pid_controller/set_gains",
+        r#"{"kp":[1.0,2.0],"ki":[3.0,4.0],"kd":[5.0,6.0]}"#,
+    ),
+    (
+        "/pid_controller/set_period",
+        r#"{"period":0.02,"delay":true}"#,
+    ),
+];
+
+/// Service, field, literal, status.
+type Row = [&'static str; 4];
+
+fn rows(table: &'static str) -> Vec<Row> {
+    let row = |line: &'static str| line.splitn(4, " | ").collect::<Vec<_>>().try_into();
+    table.lines().map(|line| row(line).unwrap()).collect()
+}
+
+fn rows_of_2_links() -> Vec<Row> {
+    rows(include_str!("rows.txt"))
+}
+
+/// The first row of each field, in the order of the catalogue.
+fn first_rows(service: Service) -> Vec<Row> {
+    let rows = rows_of_2_links();
+    let of = |name: &str| {
+        rows.iter()
+            .find(|row| row[0] == service.name() && row[1] == name)
+    };
+    let fields = service.fields().iter();
+    fields.filter_map(|field| of(field.name)).copied().collect()
+}
+
+/// A gateway with the nodes of all services but rosapi and the recorder; the arm is paused.
+async fn start<const N: usize>() -> (Gateway, Peer)
+where
+    Gains<N>: Default,
+{
+    let gateway = Gateway::bare().await;
+    let publish = || gateway.registry.clone().recipient();
+    let gauges = std::sync::Arc::clone(&gateway.gauges);
+    let arm = ArmSim::<N>::new(Arm::default(), Gains::default(), publish(), gauges).start();
+    let mut nodes = Nodes::default();
+    ArmSim::attach(&arm, &mut nodes);
+    let pose = arm.clone().recipient();
+    start_goal_nodes(
+        &gateway.registry,
+        pose,
+        GoalTracker::of(&arm),
+        1,
+        &mut nodes,
+    );
+    let pool = WorkerPool::without_threads();
+    let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
+    Study::attach(&study, &mut nodes);
+    Integration::attach(&Integration::new(pool.clone()).start(), &mut nodes);
+    let parameters = Parameters::new(ArmParameters::of(&arm)).start();
+    Parameters::attach(&parameters, &mut nodes);
+    let frames = TfRepublisher::new(arm.recipient(), publish()).start();
+    TfRepublisher::attach(&frames, &mut nodes);
+    gateway.registry.send(Attach(nodes)).await.unwrap();
+    // The pool's work, in this thread.
+    actix_rt::spawn(async move {
+        loop {
+            while pool.turn() {}
+            sleep(std::time::Duration::from_millis(1)).await;
+        }
+    });
+    let mut client = gateway.connect(WIDE);
+    call(&mut client, "/arm_sim/pause", "{\"data\":true}").await;
+    call(&mut client, "/arm_sim/reset", "{}").await;
+    (gateway, client)
+}
+
+async fn call(client: &mut Peer, service: &str, args: &str) -> Value {
+    let frame = format!("{{\"op\":\"call_service\",\"service\":\"{service}\",\"args\":{args}}}\n");
+    client.send_text(&frame).await;
+    client
+        .receive_where(|frame| frame["op"] == "service_response")
+        .await
+}
+
+/// All settings, as the services that have some return them.
+async fn settings(client: &mut Peer) -> BTreeMap<&'static str, Value> {
+    let mut settings = BTreeMap::new();
+    for (service, _) in FIELD_BY_FIELD {
+        let answer = call(client, service, "{}").await;
+        assert_eq!(
+            (&answer["result"], &answer["status"]),
+            (&json!(true), &json!(""))
+        );
+        settings.insert(service, answer["values"].clone());
+    }
+    // A query would start a trial.
+    let trial = json!({"duration": 60.0, "epsilon": 0.02, "success_hold": 0.5});
+    settings.insert("/ik_trial/start", trial);
+    settings
+}
+
+/// A valid value for every required field.
+fn required(service: &str) -> &'static [(&'static str, &'static str)] {
+    match service {
+        "/arm_sim/integration_step" => &[
+            ("function", "\"t\""),
+            ("x0", "0"),
+            ("dt", "0.1"),
+            ("steps", "3"),
+            ("integrator", "\"rk4\""),
+        ],
+        "/arm_sim/step" => &[("steps", "1")],
+        "/arm_sim/disturb" => &[("effort", "[1,1]"), ("duration", "1")],
+        "/ik/solve" | "/ik_action/send_goal" => &[("x", "1"), ("y", "1")],
+        "/study/plan" => &[("error", "0.001")],
+        "/arm_sim/get_parameters"
+        | "/arm_sim/get_parameter_types"
+        | "/arm_sim/describe_parameters" => &[("names", "[]")],
+        "/arm_sim/set_parameters" => &[("parameters", "[]")],
+        _ => &[],
+    }
+}
+
+/// The required fields, with some replaced or added.
+fn request(service: &str, changes: &[(&str, &str)]) -> String {
+    let is_kept = |(name, _): &&(&str, &str)| changes.iter().all(|(field, _)| field != name);
+    let kept = required(service).iter().filter(is_kept);
+    let members: Vec<String> = kept
+        .chain(changes)
+        .map(|(name, value)| format!("\"{name}\":{value}"))
+        .collect();
+    format!("{{{}}}", members.join(","))
+}
+
+async fn assert_refused(client: &mut Peer, rows: &[Row]) {
+    let before = settings(client).await;
+    for [service, field, literal, status] in rows {
+        let answer = call(client, service, &request(service, &[(field, literal)])).await;
+        assert_eq!(answer["status"], *status, "{service} {field} {literal}");
+        assert_eq!(answer["result"], false, "{service} {field} {literal}");
+        let nothing = json!({});
+        let values = before.get(service).unwrap_or(&nothing);
+        assert_eq!(&answer["values"], values, "{service} {field} {literal}");
+    }
+    assert_eq!(settings(client).await, before, "nothing has changed");
+}
+
+#[test]
+fn every_bad_literal_is_refused_with_its_row_and_changes_nothing() {
+    in_virtual_time(async {
+        let (_gateway, mut client) = start::<2>().await;
+        assert_refused(&mut client, &rows_of_2_links()).await;
+        let (_gateway, mut client) = start::<3>().await;
+        assert_refused(&mut client, &rows(include_str!("rows_3_links.txt"))).await;
+    });
+}
+
+#[test]
+fn every_field_of_every_service_has_a_row() {
+    let mut rows = rows_of_2_links();
+    rows.extend(self::rows(include_str!("rows_3_links.txt")));
+    for service in Service::ALL {
+        let fields = service.fields().iter().map(|field| field.name);
+        for field in fields.filter(|name| !TAKE_ANYTHING.contains(name)) {
+            let has_row = rows
+                .iter()
+                .any(|row| row[0] == service.name() && row[1] == field);
+            assert!(has_row, "{} {field}", service.name());
+        }
+    }
+}
+
+#[test]
+fn all_that_is_wrong_is_listed_at_once() {
+    in_virtual_time(async {
+        let (_gateway, mut client) = start::<2>().await;
+        for service in Service::ALL {
+            let rows = first_rows(service);
+            let bad: Vec<_> = rows.iter().map(|row| (row[1], row[2])).collect();
+            if bad.is_empty() {
+                continue;
+            }
+            let answer = call(&mut client, service.name(), &request(service.name(), &bad)).await;
+            let mut got: Vec<&str> = answer["status"].as_str().unwrap().split("; ").collect();
+            let mut statuses: Vec<&str> = rows.iter().map(|row| row[3]).collect();
+            got.sort_unstable();
+            statuses.sort_unstable();
+            assert_eq!(got, statuses, "{service:?}");
+        }
+    });
+}
+
+#[test]
+fn a_required_field_that_is_absent_is_named() {
+    in_virtual_time(async {
+        let (_gateway, mut client) = start::<2>().await;
+        for service in Service::ALL {
+            let names = required(service.name()).iter().map(|(name, _)| name);
+            let statuses: Vec<String> = names.map(|name| format!("{name} is required")).collect();
+            if !statuses.is_empty() {
+                let answer = call(&mut client, service.name(), "{}").await;
+                assert_eq!(answer["status"], statuses.join("; "), "{service:?}");
+                assert_eq!(answer["values"], json!({}), "{service:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn valid_fields_take_effect_beside_a_rejected_one() {
+    in_virtual_time(async {
+        for (service, good) in FIELD_BY_FIELD {
+            let good: Value = serde_json::from_str(good).unwrap();
+            for row in first_rows(Service::from_name(service).unwrap()) {
+                let (_gateway, mut client) = start::<2>().await;
+                let mut expected = call(&mut client, service, "{}").await["values"].clone();
+                let others = good.as_object().unwrap().iter();
+                let others: Vec<_> = others.filter(|(name, _)| *name != row[1]).collect();
+                let texts: Vec<String> =
+                    others.iter().map(|(_, value)| value.to_string()).collect();
+                let mut members = vec![(row[1], row[2])];
+                for ((name, value), text) in others.iter().zip(&texts) {
+                    members.push((name.as_str(), text));
+                    expected[name.as_str()] = (*value).clone();
+                }
+                let answer = call(&mut client, service, &request(service, &members)).await;
+                assert_eq!(answer["status"], row[3], "{service}");
+                for name in good.as_object().unwrap().keys() {
+                    assert_eq!(answer["values"][name], expected[name], "{service} {row:?}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn valid_fields_are_echoed_alone_and_by_their_places() {
+    in_virtual_time(async {
+        for (service, good) in FIELD_BY_FIELD {
+            let (_gateway, mut client) = start::<2>().await;
+            let good: Value = serde_json::from_str(good).unwrap();
+            let fields = Service::from_name(service).unwrap().fields();
+            for field in fields {
+                let mut expected = call(&mut client, service, "null").await["values"].clone();
+                expected[field.name] = good[field.name].clone();
+                let text = good[field.name].to_string();
+                let args = request(service, &[(field.name, &text)]);
+                let answer = call(&mut client, service, &args).await;
+                assert_eq!(answer["result"], true, "{answer}");
+                for field in fields {
+                    assert_eq!(
+                        answer["values"][field.name], expected[field.name],
+                        "{answer}"
+                    );
+                }
+            }
+            let (_gateway, mut client) = start::<2>().await;
+            let places: Vec<&Value> = fields.iter().map(|field| &good[field.name]).collect();
+            let answer = call(&mut client, service, &json!(places).to_string()).await;
+            assert_eq!(answer["result"], true, "{answer}");
+            for field in fields {
+                assert_eq!(answer["values"][field.name], good[field.name], "{answer}");
+            }
+        }
+    });
+}
+
+#[test]
+fn null_in_an_optional_field_means_absent_where_a_bad_field_rejects_all() {
+    in_virtual_time(async {
+        for (service, field) in [
+            ("/arm_sim/integration_step", "xdot0"),
+            ("/arm_sim/step", "effort"),
+            ("/ik/solve", "phi"),
+            ("/ik_action/send_goal", "epsilon"),
+            ("/ik_action/send_goal", "success_hold"),
+            ("/ik_trial/start", "duration"),
+            ("/ik_action/cancel_goal", "goal_id"),
+        ] {
+            let (_gateway, mut client) = start::<3>().await;
+            if service.ends_with("cancel_goal") {
+                call(&mut client, "/ik_action/send_goal", "{\"x\":1,\"y\":1}").await;
+            }
+            let answer = call(&mut client, service, &request(service, &[(field, "null")])).await;
+            assert_eq!(answer["result"], true, "{service} {field}: {answer}");
+        }
+    });
+}
+
+#[test]
+fn arguments_of_another_form_and_too_many_are_refused() {
+    in_virtual_time(async {
+        let (_gateway, mut client) = start::<2>().await;
+        let before = settings(&mut client).await;
+        let nothing = json!({});
+        for service in Service::ALL {
+            let most = service.fields().len();
+            let many = format!("[{}null]", "null,".repeat(most));
+            for args in ["5", "\"x\"", "true", &many] {
+                if service.name().starts_with("/recorder") {
+                    continue;
+                }
+                let answer = call(&mut client, service.name(), args).await;
+                let status = if args == many {
+                    format!("args must have at most {most} entries, got {}", most + 1)
+                } else {
+                    format!("args must be an object or an array, got {args}")
+                };
+                let got = answer["status"].as_str().unwrap();
+                assert!(got.starts_with(&status), "{service:?} {args}: {got}");
+                assert_eq!(answer["result"], false, "{service:?} {args}");
+                let is_reset = service == Service::Reset;
+                let values = before.get(service.name()).unwrap_or(&nothing);
+                assert!(is_reset || answer["values"] == *values, "{answer}");
+            }
+        }
+        assert_eq!(settings(&mut client).await, before, "nothing has changed");
+    });
+}
