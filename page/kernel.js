@@ -80,7 +80,11 @@ onmessage = async ({ data }) => {
 };`;
 
 export class Kernel {
+  /** The one that runs, for a script around the page: it may send frames too, and hear those that come. @type {Kernel | null} */
+  static current = null;
+
   constructor() {
+    Kernel.current = this;
     this.readyState = /** @type {number} */ (WebSocket.CONNECTING);
     this.send = (/** @type {string} */ _frame) => {};
     this.stop = () => {};

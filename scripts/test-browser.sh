@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The page, tried in headless Chromium (Debian's `chromium`), which is installed if it is missing and this may be done.
-# PENDULARM names a program that is there; without it one is built. Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
+# PENDULARM names a program that is there; without it one is built. FORM=file tries the page in one file, without a program. Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,7 +15,11 @@ fi
 # The page is judged by axe, of the same version everywhere.
 [ -f node_modules/axe-core/axe.min.js ] || npm ci --silent --no-audit --no-fund
 target=${CARGO_TARGET_DIR:-target}
-if [ -z "${PENDULARM:-}" ]; then
+if [ "${FORM:-}" = file ]; then
+    bash scripts/page.sh
+    export RUNS="$target/runs.txt"
+    "${CARGO:-cargo}" run --locked --quiet --package pendularm-wasm --example runs >"$RUNS"
+elif [ -z "${PENDULARM:-}" ]; then
     "${CARGO:-cargo}" build --locked
     export PENDULARM="$target/debug/pendularm"
 fi

@@ -9,11 +9,14 @@ import re
 import time
 import unittest
 
+from alone import Alone
 from chromium import Browser
 from png import Image
 from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
+# Which page is tried: that of a server, or the one in a file.
+IS_FILE = os.environ.get("FORM") == "file"
 # A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
 FOREIGN = "elsewhere.example"
 
@@ -25,6 +28,11 @@ def browser():
     if _browser is None:
         _browser = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
     return _browser
+
+
+def needs_server(why):
+    """A test that the page in a file has no part in, and the reason."""
+    return unittest.skipIf(IS_FILE, why)
 
 
 def close_browser():
@@ -40,12 +48,14 @@ class PageTest(unittest.TestCase):
     course = False  # whether the test is of the course; else the workbench is opened
 
     def setUp(self):
-        self.runtime = Runtime(links=self.links)
+        self.runtime = Alone(self.links) if IS_FILE else Runtime(links=self.links)
         self.addCleanup(self.runtime.__exit__)
         self.page = self.open(**self.view)
 
     def open(self, fragment="", **view):
         page = browser().page(self.runtime.url + fragment, **view)
+        if IS_FILE:
+            self.runtime.page = page
         self.addCleanup(page.close)
         self.addCleanup(lambda: self.assertEqual(page.complaints, []))
         self.connected(page)
@@ -59,7 +69,7 @@ class PageTest(unittest.TestCase):
         if not self.course:
             page.run("document.body.dataset.view === 'course' && document.querySelector('#view-switch').click()")
         # The page's own modules, those that run, by name.
-        page.run("window.own = (name) => import('/' + name); 0")
+        page.run(f"window.own = {'async (name) => pendularm[name]' if IS_FILE else '(name) => import(`/${name}`)'}; 0")
 
     def tab(self, name):
         """Opens a panel beside the arm."""

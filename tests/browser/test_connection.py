@@ -5,7 +5,7 @@ import json
 import threading
 
 from runtime import Runtime
-from stage import FOREIGN, PageTest, browser
+from stage import FOREIGN, PageTest, browser, needs_server
 
 # Tries everything that a page can do to another address; none of it throws, all of it is told.
 INTRUDER = """
@@ -28,6 +28,7 @@ window.tried = (async () => {
 """
 
 
+@needs_server("no server, no connection that others could have or lose")
 class Reconnecting(PageTest):
     def test_it_comes_back_after_a_restart_of_the_runtime(self):
         self.runtime.call("/arm_sim/set_params", gravity=4)
@@ -84,6 +85,7 @@ class Reconnecting(PageTest):
         self.page.until("document.querySelectorAll('#masses-fields .field').length === 3")
 
 
+@needs_server("no server, no connection that others could have or lose")
 class Token(PageTest):
     options = ("--token", "open-sesame-and-some-more")
 
@@ -113,6 +115,7 @@ class Token(PageTest):
         self.assertEqual(page.run("document.querySelector('#arm')"), None)
 
 
+@needs_server("no server, no connection that others could have or lose")
 class Foreigners(PageTest):
     def serve(self):
         """A page of somebody else's, on a port of its own."""

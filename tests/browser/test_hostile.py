@@ -10,7 +10,7 @@ import threading
 import time
 
 from runtime import Runtime
-from stage import FOREIGN, PageTest, browser
+from stage import FOREIGN, PageTest, browser, needs_server
 
 FRAME = '{"op":"call_service","service":"/arm_sim/set_params","args":{"gravity":0}}'
 
@@ -89,6 +89,7 @@ def serve(case, html, port=0):
     return server.server_address[1], stop
 
 
+@needs_server("no server, no connection that others could have or lose")
 class Hostile(PageTest):
     def setUp(self):
         self.report = tempfile.TemporaryDirectory()
@@ -192,6 +193,7 @@ class Hostile(PageTest):
         self.unmoved()
 
 
+@needs_server("no server, no connection that others could have or lose")
 class Cookie(PageTest):
     """The token's cookie: not for scripts, and not sent along for a page of another site, even one that is let in."""
 

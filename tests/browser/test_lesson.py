@@ -4,6 +4,7 @@ import json
 import time
 
 from lesson import NUMBER, Lesson
+from stage import needs_server
 from runtime import Provider
 
 LESSONS = ["euler", "limit", "held", "stiff", "heavy", "chaos", "sag", "own"]
@@ -227,6 +228,7 @@ class Still(Lesson):
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
         self.wait(lambda: self.drawn(2) == 0, "it comes to rest")
 
+    @needs_server("it counts frames of a WebSocket")
     def test_a_paused_page_is_told_little(self):
         def hears():
             """Messages in three seconds, and how long these took."""

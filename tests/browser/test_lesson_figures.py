@@ -5,6 +5,7 @@ import math
 import time
 
 from lesson import NUMBER, Lesson
+from stage import needs_server
 
 
 class Right(Lesson):
@@ -102,6 +103,7 @@ class Right(Lesson):
         self.wait(lambda: offered() == advised(), "the second")
         self.assertNotEqual(offered(), first)
 
+    @needs_server("two tabs have an arm each")
     def test_setpoint_fields_show_what_the_arm_has(self):
         self.page.click("#servo")
         self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2)

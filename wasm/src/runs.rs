@@ -34,9 +34,8 @@ where
     let mut simulation = Simulation::<N>::new(Arm::default(), Gains::default());
     simulation.set_method(method);
     simulation.enable(on);
-    simulation.set_setpoint(Setpoint::at(std::array::from_fn(|i| {
-        [0.9, -1.3, 0.4][i % 3]
-    })));
+    let setpoint = std::array::from_fn(|i| if i == 1 { -1.3 } else { 0.9 });
+    simulation.set_setpoint(Setpoint::at(setpoint));
     simulation.advance(STEPS);
     let State { position, velocity } = *simulation.state();
     let servo = if on { "on" } else { "off" };

@@ -1,0 +1,59 @@
+"""The page in one file: the kernel's bits in this browser, a sandbox around it, and no worker."""
+
+import json
+import os
+import pathlib
+import unittest
+
+from alone import FILE
+from stage import IS_FILE, PageTest, browser
+
+# What the page shows, told to the page around it.
+REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
+  Number(document.querySelector("#sim-time").textContent)], "*"), 100);</script>"""
+SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Number(document.querySelector('#sim-time').textContent) > 0.2"
+
+
+@unittest.skipUnless(IS_FILE, "the page of a server has no kernel")
+class AloneTest(PageTest):
+    def test_the_runs_of_the_kernel_have_the_bits_of_the_native_ones(self):
+        native = pathlib.Path(os.environ["RUNS"]).read_text()
+        self.assertEqual(len(native.splitlines()), 16)
+        ours = self.page.run("""(async () => {
+          const packed = Uint8Array.from(atob(document.querySelector("#kernel-module").textContent), (one) => one.charCodeAt(0));
+          const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+          const bytes = await new Response(stream).arrayBuffer();
+          const { instance } = await WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } });
+          const { memory, compare, output } = instance.exports;
+          const length = compare();
+          return new TextDecoder().decode(new Uint8Array(memory.buffer, output(), length));
+        })()""")
+        self.assertEqual(ours, native)
+
+    def test_it_runs_in_a_sandboxed_frame_and_its_course_goes_on_there(self):
+        page = browser().page("about:blank")
+        self.addCleanup(page.close)
+        step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);</script>"""
+        page.run("addEventListener('message', ({ data }) => { window.heard = data; })")
+        page.run("""((text) => { const frame = document.createElement("iframe"); frame.sandbox = "allow-scripts"; frame.width = 1200;
+          frame.height = 800; frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(FILE.read_text() + step + REPORT))
+        page.until("window.heard && window.heard[0] === 'pill open' && window.heard[1] > 0.3", why="the arm runs in the frame")
+        self.assertEqual(page.complaints, [])
+
+    def test_without_a_worker_the_page_itself_runs_the_arm(self):
+        page = browser().page("about:blank")
+        self.addCleanup(page.close)
+        page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})
+        page.go(self.runtime.url)
+        page.until(SHOWN, why="the arm runs")
+        self.runtime.page = page
+        self.assertTrue(self.runtime.call("/study/gains")["result"])
+        self.assertEqual(page.complaints, [])
+
+    def test_an_address_chooses_the_number_of_links(self):
+        page = browser().page(f"{FILE.as_uri()}#step=2&links=3")
+        self.addCleanup(page.close)
+        page.until(SHOWN, why="the arm runs")
+        self.runtime.page = page
+        self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 3)
+        self.assertEqual(page.complaints, [])
