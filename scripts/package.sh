@@ -24,7 +24,7 @@ stage=$work/stage
 mkdir "$stage"
 
 commit=
-# 1. Our own files: those that git tracks; without git, everything but the entries of .gitignore.
+# 1. Our own files: the tracked ones; without git, everything but the entries of .gitignore.
 if [ "$(git rev-parse --show-toplevel 2>/dev/null)" = "$root" ]; then
     git ls-files -z >"$work/own"
     commit=$(git rev-parse --short=12 HEAD)

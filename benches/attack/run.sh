@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# `make attack`: what a healthy client has of the release program while hostile ones do their worst, one attack after the other, and the same
-# of redis and mosquitto under the attacks that apply to them.
+# `make attack`: the service of a healthy client of the release program during hostile ones, one attack after the other.
+# The same is measured of redis and mosquitto under the attacks that apply to them.
 #
 # Everything runs on free ports of loopback, bounded in time and connections; what is started is stopped by its id. redis-server and mosquitto
 # come from Debian's packages: as root they are installed if missing; where they can't be, ours is attacked alone. Some ten minutes.

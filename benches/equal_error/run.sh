@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The second half of `make bench-peers`: what an error costs, in pendularm, MuJoCo, Pinocchio, scipy, heyoka and the crate ode_solvers.
+# The second half of `make bench-peers`: the price of an error in pendularm, MuJoCo, Pinocchio, scipy, heyoka and the
+# crate ode_solvers.
 #
 # Uses the venv of benches/peers (its run.sh makes it) and adds requirements.txt to it; compiles this folder's programs, then runs
 # equal_error.py on one core. KEEP=1 keeps times and table in benches/results/<date>-<processor>/equal-error/.

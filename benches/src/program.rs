@@ -152,8 +152,8 @@ impl Log {
     }
 }
 
-/// For how long threads of a process were able to run and had no processor \[s\]: the one that serves clients, which is
-/// the first, and the arm's. 0 where the system does not say.
+/// For how long threads of a process were able to run and had no processor \[s\]: the first one, which serves clients,
+/// and the arm's. 0 where the system does not say.
 pub fn queued(pid: u32) -> Queues {
     let mut tasks = Vec::new();
     for entry in fs::read_dir(format!("/proc/{pid}/task"))
@@ -190,8 +190,8 @@ pub struct Queues {
 }
 
 impl Queues {
-    /// The time that all of them together have waited for a processor so far, or had one that another machine used instead,
-    /// and the time that the program's two have had one \[s\].
+    /// The time that all of them together have waited for a processor so far, or had one that another machine used
+    /// instead. Then the time that the program's two have had one \[s\].
     pub fn look(&self) -> (f64, f64) {
         let (mut waited, mut ran) = (stolen(), 0.0);
         for (index, task) in self.tasks.iter().enumerate() {

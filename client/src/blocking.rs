@@ -170,7 +170,7 @@ impl Client {
         self.send_bytes(&bytes);
     }
 
-    /// Stops sending; what is owed still comes.
+    /// Stops sending; waiting answers still come.
     #[track_caller]
     pub fn finish(&mut self) {
         let finished = self.stream.shutdown(Shutdown::Write);
@@ -347,8 +347,8 @@ impl Client {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
-    /// Frames that have come, and were not awaited, once the runtime has handled all that was sent: whatever it had for
-    /// this client by then stands before the answer to a call.
+    /// Frames that have come, and were not awaited, once the runtime has handled all that was sent. Its messages for
+    /// this client by then stand before the answer to a call.
     #[track_caller]
     pub fn so_far(&mut self) -> Vec<Value> {
         self.settle();

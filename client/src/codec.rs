@@ -1,6 +1,6 @@
 //! Bytes to messages and back, without I/O: one JSON object per line, or one per WebSocket message.
 //!
-//! **Invariant:** a strict reader: what no server may send is an error, not something to be lenient with.
+//! **Invariant:** a strict reader: a frame that no server may send is an error.
 
 use crate::Error;
 use crate::websocket::{ACCEPT, LAST, append, opcode};
@@ -29,7 +29,7 @@ pub enum Event {
     Close(Option<u16>, String),
 }
 
-/// One end of a connection: what has come of it, and how frames are written on it.
+/// One end of a connection: the bytes that have come, and how frames are written on it.
 #[derive(Debug)]
 pub struct Codec {
     framing: Framing,

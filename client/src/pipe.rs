@@ -73,7 +73,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The stream, for what is done against the rules. What was read of it and not asked for is not in it any more.
+    /// The stream, for what is done against the rules. Bytes that were read of it and not asked for are not in it
+    /// any more.
     pub fn stream(&mut self) -> &mut S {
         &mut self.stream
     }
@@ -103,7 +104,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         self.stream.write_all(bytes).await.expect("an open pipe");
     }
 
-    /// Stops sending; what is owed still comes.
+    /// Stops sending; waiting answers still come.
     pub async fn finish(&mut self) {
         self.stream.shutdown().await.expect("an open pipe");
     }

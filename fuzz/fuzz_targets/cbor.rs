@@ -1,8 +1,8 @@
 //! Messages as CBOR and as CDR: any JSON as a message of any type that the runtime knows, or of none.
 //!
-//! Asserted: the frame is CBOR that another reader takes, with the topic and all that was in the JSON: of a known type, every
-//! field of the type that was there, in its order. CDR is what another reader, which knows the type by the text of its definition
-//! alone, reads to the last byte as the same message, with a zero for what was not there.
+//! Asserted: the frame is CBOR that another reader takes, with the topic and all members of the JSON. Of a known type
+//! it has every field of the type that was there, in its order. CDR is read to the last byte as the same message, with
+//! a zero for a missing field. The reader of this check knows the type by the text of its definition alone.
 //!
 //! The runtime's own reading of the JSON takes no more memory than it has said before.
 //!
@@ -119,7 +119,7 @@ fn is_field(found: &Json, all: &Definition, field: &Field, value: &Value) -> boo
         };
     };
     let entry = |(found, value): (&Json, &Value)| match field.kind.as_str() {
-        // Arrays of these are packed: what is no such number is none.
+        // Arrays of these are packed: a value that is no such number is left out.
         "float64" => found.number() == value.as_f64(),
         "int32" => {
             let number = value.as_i64().and_then(|number| i32::try_from(number).ok());

@@ -1,8 +1,8 @@
 //! The field reader against a second reading of the same JSON.
 //!
-//! Asserted: for any arguments of any of the arm's services, both readings take the same fields with the same values, to
-//! the bit and within their bounds; every other field is refused by its name, once and in the order of reading; the status
-//! names it and is one bounded line.
+//! Asserted: for any arguments of any of the arm's services, both readings take the same fields with the same values,
+//! to the bit and within their bounds. Every other field is refused by its name, once and in the order of reading. The
+//! status names it and is one bounded line.
 //!
 //! Input: a byte that chooses the service, a byte that chooses how its fields are read, the text of `args`.
 
@@ -102,7 +102,7 @@ impl How {
     }
 }
 
-/// The second reading: what came under each name, and what was refused.
+/// The second reading: the values under each name, and the refusals.
 struct Model<'a> {
     values: Vec<(&'static str, Option<&'a Json>)>,
     null_is_absent: bool,

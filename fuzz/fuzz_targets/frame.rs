@@ -1,7 +1,7 @@
 //! The frame reader against a slow model that has all bytes at once and looks at them one by one.
 //!
 //! Asserted: reader and model find the same frames and complain of the same stretches, in the same order, however the
-//! stream is cut; what the reader keeps is bounded; it says that a line ended behind a frame only where one did.
+//! stream is cut. The reader keeps a bounded part. It says that a line ended behind a frame only where one did.
 //!
 //! Input: a byte that chooses the limit, a byte that chooses the cuts, the stream.
 

@@ -1,8 +1,8 @@
 //! The first bytes of a connection, and HTTP behind them, with and without a token to be shown.
 //!
-//! Asserted: the answer is lines of JSON, or well-formed HTTP answers of known headers, as long as they say, and then the
-//! end; a file is never one from outside the report's folder; who is let in with the first request, and who is not, is
-//! what a [second opinion](pendularm_fuzz::admission) says; whoever speaks JSON and does not show the token hears one line.
+//! Asserted: the answer is lines of JSON, or well-formed HTTP answers of known headers, as long as they say, and then
+//! the end. A file is never one from outside the report's folder. Admission with the first request is as a [second
+//! opinion](pendularm_fuzz::admission) says. A client that speaks JSON and does not show the token hears one line.
 //!
 //! Input: a byte of settings, a byte that says in which pieces the rest is sent, the rest.
 

@@ -1,8 +1,9 @@
 //! Frames into operations: any text that the frame reader lets through.
 //!
-//! Asserted: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object, and the start of an answer that then fails, gives an
-//! operation; names and numbers are those of the frame, bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
-//! JSON in which nothing but numbers that overflow has changed.
+//! Asserted: every frame gives one operation or one complaint, and its `id` as it came. Only a JSON object, and the
+//! start of an answer that then fails, gives an operation. Names and numbers are those of the frame, bounded, and so
+//! are repetitions in a complaint. A payload that is passed on or echoed is one line of strict JSON in which nothing
+//! but numbers that overflow has changed.
 //!
 //! Input: the frames.
 
@@ -59,7 +60,8 @@ fn judge(frame: &str) {
         assert!(is_refused || ends_a_call, "{frame:?} is no JSON");
         return;
     };
-    // A key that is no text makes a frame that is taken for no JSON; what stands behind it in an answer is not read.
+    // A key that is no text makes a frame that is taken for no JSON; the members behind it in an answer are not
+    // read.
     let is_no_json = matches!(incoming.op, Err(OpError::Status(Problem::NotJson(_))));
     let is_cut = id.is_none() && matches!(incoming.op, Ok(Op::BadAnswer { .. }));
     if !is_no_json && !is_cut {
@@ -99,7 +101,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             let line = check_line(&messages::publish_raw(topic, msg));
             check_passed_on(json.get("msg"), line.get("msg"));
             assert_eq!(line.get("topic").and_then(Json::text), Some(&**topic));
-            // The runtime's own subscribers read it further; whatever it is, they must not fail.
+            // The runtime's own subscribers read it further; they must not fail on any text.
             if *topic == *Topic::JointTrajectory.name() {
                 check_setpoint(msg.raw());
                 if let Some(heard) = heard {
@@ -205,7 +207,7 @@ fn check_name(json: &Json, member: &str, name: &str) {
     assert_eq!(json.get(member).and_then(Json::text), Some(name));
 }
 
-/// So many seconds, at most `longest`.
+/// This many seconds, at most `longest`.
 fn duration(seconds: f64, longest: Duration) -> Duration {
     Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }

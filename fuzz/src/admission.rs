@@ -1,4 +1,4 @@
-//! Who may in over HTTP: a second opinion, from the bytes of a request alone.
+//! Admission over HTTP: a second opinion, from the bytes of a request alone.
 //!
 //! It is written from the README's rules, not from the runtime's code, and knows one address: 127.0.0.1:9095.
 
@@ -40,8 +40,8 @@ struct Head {
     is_plain: bool,
 }
 
-/// The fate that a request must have, and whether that is certain: a request may be too odd to be read by anybody, and then must
-/// not be let in for what this makes of it. `None` if it is no whole GET or HEAD request.
+/// The fate that a request must have, and whether that is certain. A request may be too odd to be read by anybody, and
+/// then must not be let in because of this reading. `None` if it is no whole GET or HEAD request.
 #[must_use]
 pub fn judge(bytes: &[u8], rules: Rules<'_>) -> Option<(Opinion, bool)> {
     let head = read(bytes)?;
@@ -61,7 +61,8 @@ fn read(bytes: &[u8]) -> Option<Head> {
     let head = &bytes[..end];
     let bare = String::from_utf8_lossy(head).replace("\r\n", "");
     let mut is_plain = head.is_ascii() && end <= 8 * 1024 && !bare.contains(['\r', '\n']);
-    // A value may hold any byte: what is no text is not what is looked for, but stands there.
+    // A value may hold any byte: one that is no text is not the one that is looked for, but stands
+    // there.
     let mut lines = head
         .split(|&byte| byte == b'\n')
         .map(|line| String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)));

@@ -1,4 +1,5 @@
-//! A second reading of JSON (RFC 8259), one character after the other, strict: what it takes, every reader takes.
+//! A second reading of JSON (RFC 8259), one character after the other, strict: every reader takes the texts that
+//! it takes.
 //!
 //! Numbers keep their text. A string that holds half a surrogate pair is a string without a text.
 

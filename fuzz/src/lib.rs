@@ -10,7 +10,7 @@
 //! | [`client`] | a client on an in-memory pipe, which speaks as `pendularm-client` does |
 //! | [`stage`] | the runtime's side of it, in virtual time |
 //!
-//! A target panics where something does not hold; what it was given is then kept by the fuzzer.
+//! A target panics where something does not hold; the fuzzer then keeps its input.
 
 pub mod admission;
 pub mod book;

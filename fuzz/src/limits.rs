@@ -1,8 +1,8 @@
 //! The cost that one execution may have: processor time and memory, by the bytes of its input.
 //!
 //! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time
-//! counts. That is longer, too, where others empty the caches and share the core: the least of a few counts, so that a
-//! busy machine makes nothing fail and what is too dear by itself always does.
+//! counts. That is longer, too, where others empty the caches and share the core. The least of a few counts is taken,
+//! so that a busy machine makes nothing fail and an input that is too dear by itself always does.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,8 +21,9 @@ pub struct Allowance {
     pub memory_per_byte: usize,
 }
 
-/// For what reads bytes: linear in them. The fuzzer's own counting and the second reading make it about a microsecond a byte; the
-/// second reading, which converts numbers as the standard library does, takes up to ten where all of them are awkward.
+/// For what reads bytes: linear in them. The fuzzer's own counting and the second reading make it about a microsecond a
+/// byte. The second reading, which converts numbers as the standard library does, takes up to ten where all of them are
+/// awkward.
 pub const READING: Allowance = Allowance {
     time: Duration::from_millis(10),
     time_per_byte: Duration::from_micros(10),

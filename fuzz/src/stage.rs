@@ -32,7 +32,7 @@ use pendularm::protocol::op::fields::Fields;
 use serde_json::json;
 use tokio::io::{DuplexStream, duplex};
 
-/// Address that clients connect to: what `Host` has to say.
+/// Address that clients connect to: `Host` has to name it.
 pub const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 
 thread_local! {
@@ -79,7 +79,7 @@ struct NodeState {
     held: RefCell<VecDeque<Caller>>,
 }
 
-/// Little room for all clients together: what a few of them can fill in one execution.
+/// Little room for all clients together: a few of them can fill it in one execution.
 #[must_use]
 pub fn scarce() -> Memory {
     Memory::of(1, 1 << 20)

@@ -260,8 +260,8 @@ pub(crate) fn end_effector<'py>(
 
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
 ///
-/// `phi` [rad] is the heading of the last link of 3, and is not looked at for 2; `present` [rad] decides what the target
-/// leaves open, as `/ik/solve` does by the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
+/// `phi` [rad] is the heading of the last link of 3, and is not looked at for 2. `present` [rad] decides between the
+/// solutions, as `/ik/solve` does by the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
 #[pyfunction]
 #[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
 pub(crate) fn inverse_kinematics<'py>(

@@ -68,12 +68,12 @@ impl Divergence {
 
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
-/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`,
-/// `midpoint`, `verlet` or `rk4`; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each,
-/// and what is left out of it is as in a fresh runtime. The controller runs once per `control_period` [s], rounded to a
-/// whole number of timesteps, at least 1, and its effort is held in between; with `control_delay` it is applied one
-/// period later. Threads may share one. It can be neither copied nor pickled, and a process that is forked while
-/// another thread steps it must not use it.
+/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`,
+/// `verlet` or `rk4`; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each, and what
+/// is left out of it is as in a fresh runtime. The controller runs once per `control_period` [s], rounded to a whole
+/// number of timesteps, at least 1, and its effort is held in between. With `control_delay` it is applied one period
+/// later. Threads may share one. It can be neither copied nor pickled, and a process that is forked while another
+/// thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {

@@ -17,7 +17,7 @@
 //! with `Γ = ∂G/∂q`. Multiplied by x from both sides it is a cubic with real coefficients. By Hurwitz' rule all its
 //! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`. This holds for every x, so for every pose, if the
 //! matrices are so. Only `M` and `Γ` know the pose. `Γ` is bounded by its largest entries. The pose in which `P₃`
-//! first ceases to be positive is found by branch and bound: over a box of joint angles `M` is at least its value in
+//! first ceases to be positive is found by branch and bound. Over a box of joint angles `M` is at least its value in
 //! the middle, less the loss of its cosines.
 //!
 //! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no

@@ -5,8 +5,8 @@
 //! pendularm-equal-error time LINKS Q1 [Q2 ...]   a line per run: links,system,setting,error,seconds
 //! ```
 //!
-//! `equal_error.py` runs it beside the others, and says what all are given. The crate is handed our accelerations: what differs is
-//! the integrator. A run is repeated for a fiftieth of a second, and the shortest counts.
+//! `equal_error.py` runs it beside the others, and says what all are given. The crate is handed our accelerations: only
+//! the integrator differs. A run is repeated for a fiftieth of a second, and the shortest counts.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};

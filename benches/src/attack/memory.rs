@@ -1,4 +1,5 @@
-//! Aimed at memory: what waits for whoever does not read, what is held back, what is begun and not ended.
+//! Aimed at memory: messages that wait for a client that does not read, messages held back, and messages
+//! that are begun and not ended.
 
 use super::Attack;
 use super::script::{Client, call, each, filler, light, publish, subscribe};

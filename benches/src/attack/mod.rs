@@ -1,4 +1,4 @@
-//! Attacks: what hostile clients do, each for a few seconds, at one address of loopback.
+//! Attacks of hostile clients, each for a few seconds, at one address of loopback.
 //!
 //! An attack is a list of [clients](script::Client) and a sentence that says what they do; [`stage`] plays it. So
 //! `make attack` measures what a healthy client has of it, and `make soak` lets them come among all others.

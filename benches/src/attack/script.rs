@@ -14,7 +14,7 @@ use pendularm_client::websocket::{LAST, append, opcode};
 pub enum Door {
     /// Nothing: lines, or whatever it says.
     Tcp,
-    /// The handshake of a WebSocket; what it says in text follows as messages.
+    /// The handshake of a WebSocket; its later texts follow as messages.
     Web,
     /// A request line; the stage adds the line `Host:`, and the client says the rest.
     Http(String),
@@ -27,9 +27,9 @@ pub enum Ear {
     Deaf,
     /// All that comes, thrown away.
     Reads,
-    /// So many bytes every 100 ms.
+    /// This many bytes every 100 ms.
     Sips(usize),
-    /// Lines; what the function makes of each goes back.
+    /// Lines; the function's result for each goes back.
     Replies(fn(&str) -> Option<Vec<u8>>),
 }
 
@@ -193,7 +193,7 @@ impl Client {
         self
     }
 
-    /// So many of it.
+    /// This much of it.
     pub fn times(self, count: usize) -> Vec<Self> {
         vec![self; count]
     }

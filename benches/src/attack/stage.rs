@@ -1,6 +1,6 @@
 //! Plays hostile clients on real sockets: all of them behind one `epoll`, on the thread that asks for it.
 //!
-//! **Invariant:** bounded by what the script says: so many connections at once, at one address of loopback.
+//! **Invariant:** bounded by the script: its number of connections at once, at one address of loopback.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -210,7 +210,7 @@ impl<'a> Player<'a> {
         more && self.stream.is_some()
     }
 
-    /// Closes; who returns is due again.
+    /// Closes; a client that returns is due again.
     fn end(&mut self, now: Instant) {
         self.stream = None;
         self.due = self.client.returns.then_some(now + RETURN);

@@ -5,10 +5,11 @@
 //! default_gains search [SECONDS] [SEED]        better ones, from the shipped ones on, by random steps of all nine gains
 //! ```
 //!
-//! Asked is that at the first instant at which an arm within 0.02 rad and 0.02 m of its setpoint is slower than 0.01 rad/s, and ever
-//! after, the effort is within 2 % of the gravity load; of links of 1 kg and of 2 kg. Kept must be what the contract says of the
-//! defaults: within tolerance after 4 s, from rest and out of ten seconds of free swing; stable up to 3 ms in every pose with every
-//! method; `ki >= kp`; and turns of 2π at every joint do not diverge at 3 ms. The same seed finds the same gains in as many tries.
+//! Criterion: an arm within 0.02 rad and 0.02 m of its setpoint becomes slower than 0.01 rad/s. From that instant on
+//! the effort is within 2 % of the gravity load, of links of 1 kg and of 2 kg. The gains must keep the contract's
+//! promises of the defaults. They are within tolerance after 4 s, from rest and out of ten seconds of free swing. They
+//! are stable up to 3 ms in every pose with every method, and `ki >= kp`. Turns of 2π at every joint do not diverge at
+//! 3 ms. The same seed finds the same gains in as many tries.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::ControlFlow;
@@ -131,7 +132,8 @@ struct Seen {
     first: (f64, f64, f64),
     /// As `off`, from the first slow instant on wherever the arm is, once it has moved.
     anywhere: f64,
-    /// The largest acceleration of a joint where `off` was seen \[rad/s²\], times its speed's sign: what turns back is negative.
+    /// The largest acceleration of a joint where `off` was seen \[rad/s²\], times its speed's sign: an arm that turns
+    /// back has a negative one.
     turning: f64,
 }
 

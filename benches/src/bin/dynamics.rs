@@ -1,8 +1,9 @@
 //! Nanoseconds and instructions of the arm's motion, for 2 and 3 links.
 //!
-//! `cargo run --release --bin dynamics`: the shortest of many short runs, since other work only ever adds time. *Throughput*:
-//! independent states; *chained*: every result moves the next state, as in a simulation; *step*: `increment` alone; *simulation*:
-//! a step of the live arm with PID on, compensated sums and the check for divergence.
+//! `cargo run --release --bin dynamics`: the shortest of many short runs, since other work only ever adds time.
+//! *Throughput* is of independent states. *Chained*: every result moves the next state, as in a simulation. *Step* is
+//! `increment` alone. *Simulation* is a step of the live arm with PID on, compensated sums and the check for
+//! divergence.
 //!
 //! Instructions of 1000 calls, exact on a given compiler (arguments: links, gravity, what):
 //!

@@ -1,5 +1,5 @@
-//! The live arm's estimate of its error in the step ahead, so many times: what `scripts/measure-work.sh` counts the
-//! instructions of.
+//! The live arm's estimate of its error in the step ahead, repeated: `scripts/measure-work.sh` counts its
+//! instructions.
 //!
 //! `cargo run --release --bin estimate -- LINKS COUNT`
 //!

@@ -2,10 +2,10 @@
 //!
 //! `cargo run --release --bin fairness -- PATH/TO/pendularm [SECONDS]`
 //!
-//! The runtime with default settings, three phases of the same length: alone; beside a thread of this program that spins, which is what
-//! the machine does to anybody with one core less; beside a client that always has two `integration_step` requests of a million
-//! steps under way and throws the answers away. In each, a second client calls a small service every 2 ms, a third watches
-//! `/joint_states`, a fourth `/diagnostics`.
+//! The runtime with default settings, in three phases of the same length. First it is alone. Then a thread of this
+//! program spins beside it, as on a machine with one core less. Then a client always has two `integration_step`
+//! requests of a million steps under way and throws the answers away. In each, a second client calls a small service
+//! every 2 ms, a third watches `/joint_states`, a fourth `/diagnostics`.
 //!
 //! Delay of a joint state: how much later than the punctual it came, that is its arrival less its stamp, less the smallest such difference
 //! of the phase. The stamp is simulation time, so it holds what physics and delivery lost together.

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --bin maps -- ROUNDS`
 //!
-//! Milliseconds of the quickest round; the two take turns. What they answer is compared first.
+//! Milliseconds of the quickest round; the two take turns. Their answers are compared first.
 
 use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;

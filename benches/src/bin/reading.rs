@@ -1,7 +1,7 @@
 //! How fast what clients send is read, whatever they send: every reading function on every input that is meant to be
 //! slow.
 //!
-//! `reading [WORD]`: those rows alone whose function or input has that word.
+//! `reading [WORD]`: only the rows whose function or input has that word.
 //!
 //! The gateway's thread reads frames of up to 64 KiB, other threads longer ones; at the bar, 200 MB/s, 64 KiB are a
 //! third of a millisecond. Arguments and trajectories of ours are read once more, for what counts of them: in the
@@ -74,7 +74,7 @@ fn values() -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Processor time of this thread, where the system tells it: what others do on the machine then counts for less.
+/// Processor time of this thread, where the system tells it: other work of the machine then counts for less.
 fn now(began: Instant) -> Duration {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse().ok());

@@ -1,4 +1,4 @@
-//! One kind of work, so many times: what `scripts/measure-work.sh` counts the instructions of.
+//! One kind of work, repeated: `scripts/measure-work.sh` counts its instructions.
 //!
 //! `cargo run --release --bin work -- VARIANT COUNT`
 //!

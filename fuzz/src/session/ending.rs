@@ -47,8 +47,8 @@ impl Session {
         assert!(self.has_emptied(), "left when all have left: {left:?}");
     }
 
-    /// Lets the clients that are left tell one another and ask one another something, and nothing of that may be lost: all of them
-    /// read, and have done what they wanted to.
+    /// Lets the remaining clients tell and ask one another something, and nothing of that may be lost: all of them
+    /// read, and have done their part.
     pub(super) async fn exchange(&mut self) {
         let left: Vec<u8> = (0..CLIENTS as u8)
             .filter(|client| self.player(*client).is_owed())

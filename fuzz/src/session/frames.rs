@@ -19,7 +19,7 @@ impl Session {
         }
     }
 
-    /// Anything, up to the end of a line or message: what follows is read as ever.
+    /// Anything, up to the end of a line or message: later input is read as ever.
     pub(super) fn send_garbage(&mut self, client: u8, bytes: &[u8]) {
         let door = self.door;
         let player = self.player(client);

@@ -43,8 +43,8 @@ use text::{TOPICS, VALUES, fitting, put, quoted, service_name, service_of, topic
 /// Most steps of one execution, and its number of clients.
 const MAX_STEPS: usize = 48;
 const CLIENTS: usize = 3;
-/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time: an arm of tiny timesteps
-/// computes for five milliseconds of the processor's in every one.
+/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time. An arm of tiny
+/// timesteps computes for five milliseconds of the processor's in every one.
 const ARM_TIME: u16 = 200;
 const ARM_WAIT: u16 = 48;
 /// Longest that a caller lets a provider take; all is answered by then.
@@ -83,7 +83,7 @@ fn memory(is_scarce: bool) -> Memory {
     }
 }
 
-/// Who serves.
+/// The server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cast {
     Stub,
@@ -112,7 +112,7 @@ struct Player {
     answered: BTreeMap<String, u32>,
     /// Calls that came for it as a provider: id, service, and the caller's own id.
     forwarded: Vec<(String, String, String)>,
-    /// The messages that it heard in the end: whose, and which.
+    /// The messages that it heard in the end, with their senders.
     last: Vec<(u64, u64)>,
     book: Rc<RefCell<Book>>,
     /// The last message of each topic and sender.

@@ -22,7 +22,7 @@ pub enum Step<'a> {
     Garbage { client: u8, bytes: &'a [u8] },
     /// A client sends bytes that need be no message at all.
     Noise { client: u8, bytes: &'a [u8] },
-    /// So many milliseconds pass.
+    /// This many milliseconds pass.
     Wait(u16),
     /// A client stops or goes on reading.
     Pause { client: u8, paused: bool },

@@ -154,8 +154,9 @@ impl Batch {
         })
     }
 
-    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given): all arms, or those
-    /// that `arms` names as in `reset`, with one row for each of them or one for all. Clocks and controllers stay.
+    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given). These are all
+    /// arms, or the arms that `arms` names as in `reset`, with one row for each of them or one for all. Clocks and
+    /// controllers stay.
     #[pyo3(signature = (position, velocity=None, arms=None))]
     fn set_state(
         &self,

@@ -1,6 +1,6 @@
 //! The TCP connection to the arm: one JSON object per line.
 //!
-//! **Invariant:** a line is read when the one before it has been taken. What waits to be written is bounded.
+//! **Invariant:** a line is read when the one before it has been taken. Writes wait in bounded buffers.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! The message types: those of the runtime's own topics, and the types inside.
+//! The message types of the runtime's own topics, and the types inside.
 //!
 //! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its
 //! end.

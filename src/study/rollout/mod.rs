@@ -304,8 +304,8 @@ impl<const N: usize> Rollout<N> {
         self.references.as_ref().map(|_| &self.deviation)
     }
 
-    /// Errors against the loop whose law acts at every instant, if there is a law and a reference was asked for: those
-    /// of the method, and of holding the effort.
+    /// Errors of the method, and of holding the effort, against the loop whose law acts at every instant. There are
+    /// some if there is a law and a reference was asked for.
     #[must_use]
     pub fn from_ideal(&self) -> Option<&Deviation> {
         self.ideals.as_ref().map(|_| &self.from_ideal)

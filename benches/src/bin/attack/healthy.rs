@@ -1,4 +1,4 @@
-//! Who behaves: a caller, a watcher, newcomers. What they have of the server is what an attack is judged by.
+//! The healthy clients: a caller, a watcher, newcomers. An attack is judged by the service that they get.
 //!
 //! **Invariant:** calls are made when they are due, whether or not those before them are answered, so a
 //! standstill costs all of them.

@@ -48,7 +48,8 @@ impl Plan {
             .map(|words| words.split(',').map(str::to_owned).collect())
             .unwrap_or_default();
         if quick {
-            // A machine that stands still for seconds answers late; who is not answered at all waits for ever.
+            // A machine that stands still for seconds answers late; a client that is not answered at all waits
+            // for ever.
             let patience = Duration::from_secs(20);
             return Self {
                 attacked: Duration::from_millis(900),
@@ -164,7 +165,7 @@ fn attacked(
     Ok(())
 }
 
-/// The same attack on each server. Only ours is judged; what the others miss is marked as well.
+/// The same attack on each server. Only ours is judged; misses of the others are marked as well.
 fn beside_peers(servers: &Servers, plan: &Plan, missed: &mut Vec<String>) -> Result<(), String> {
     println!("-- beside redis and mosquitto, all as they come, nothing written to a disk");
     let calm = peers::Common {

@@ -1,9 +1,10 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
-//! `load ports N` prints N free ports of loopback. `load SERVER=ADDRESS=PID ... [--quick]` measures servers that run already, for
-//! `benches/load/run.sh`. Round after round every scene is played to each server in turn, by the same client on one thread; what is
-//! compared is the processor time that the server takes for a delivery, which hardly hangs on what else the machine does.
-//! Fails if a message is lost, comes twice or comes out of order. Linux only: the figures are read from `/proc`.
+//! `load ports N` prints N free ports of loopback. `load SERVER=ADDRESS=PID ... [--quick]` measures servers that run
+//! already, for `benches/load/run.sh`. Round after round every scene is played to each server in turn, by the same
+//! client on one thread. The processor time of the server for a delivery is compared: it hardly depends on other work
+//! of the machine. Fails if a message is lost, comes twice or comes out of order. Linux only: the figures are read from
+//! `/proc`.
 
 mod fleet;
 mod message;

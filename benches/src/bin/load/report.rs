@@ -163,8 +163,8 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     }
 }
 
-/// Largest processor time for a delivery, as a share of the better peer's, and whether what each takes at rest is left
-/// out of it: with few subscribers it is most of the figure, and ours simulates an arm meanwhile.
+/// Largest processor time for a delivery, as a share of the better peer's, and whether the time at rest is left out of
+/// it. With few subscribers that is most of the figure, and ours simulates an arm meanwhile.
 const fn most_of_peer(scene: &Scene) -> (f64, bool) {
     match (scene.pace, scene.subscribers) {
         (Pace::Flood, _) => (1.0, false),

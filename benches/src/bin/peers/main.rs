@@ -38,7 +38,7 @@ const SWING_STEPS: usize = 1000;
 const ROW: Duration = Duration::from_millis(200);
 const TIMESTEP: f64 = 1e-3;
 
-/// Steps that arms in lanes take in a call; what it takes to put them there is shared by so many.
+/// Steps of arms in lanes in a call; the cost of putting them there is shared by all of these.
 const ADVANCE: u64 = 200;
 
 fn main() {
@@ -148,8 +148,8 @@ fn live<const N: usize>((state, effort): &Case<N>, method: Method) -> Simulation
     simulation
 }
 
-/// [`ADVANCE`] steps of every case in lanes of these registers, each compared to the bit with those of an arm alone, whose
-/// first is compared with the step that the others are shown.
+/// [`ADVANCE`] steps of every case in lanes of these registers, each compared to the bit with those of an arm alone.
+/// The first step of that arm is compared with the step that the others are shown.
 fn check_lanes<const N: usize>(registers: Registers, cases: &[Case<N>], method: Method) {
     let bits = |state: &State<N>| [state.position, state.velocity].map(|x| x.map(f64::to_bits));
     let mut arms: Vec<Simulation<N>> = cases.iter().map(|case| live(case, method)).collect();

@@ -12,10 +12,10 @@ use crate::world::Deeds;
 pub const LATE: f64 = 0.1;
 /// How far simulation time may be off wall time: a thousandth.
 pub const RATE: f64 = 0.001;
-/// How long after a reset or a pause its traces may still be read: where the machine stands still the reader is late too,
-/// and has them all at once then. A clock that has really stopped stands for longer.
+/// How long after a reset or a pause its traces may still be read. Where the machine stands still the reader is late
+/// too, and has them all at once then. A clock that has really stopped stands for longer.
 const TRACE: Duration = Duration::from_secs(2);
-/// How often a stamp may be repeated: a message that is late by almost a period is followed at once by the next, and no
+/// How often a stamp may be repeated. A message that is late by almost a period is followed at once by the next, and no
 /// step may be due between them.
 const STILL: usize = 1;
 /// A gap of so much ends a run. The arm makes up for 250 ms and drops, as it says, what a machine owes it beyond that; gaps
@@ -25,8 +25,8 @@ const STALL: Duration = Duration::from_millis(200);
 const LEAST_RUN: f64 = 4.0;
 /// Messages at each end of a run, of which the least late one counts.
 const END: usize = 60;
-/// Messages at the beginning of a run that do not count: the last before a resume has the stamp of the pause, and the new
-/// timestep that is set then discards a part of a step.
+/// Messages at the beginning of a run that do not count. The last before a resume has the stamp of the pause, and the
+/// new timestep that is set then discards a part of a step.
 const BEGINNING: usize = 30;
 
 /// How late messages came \[s\].

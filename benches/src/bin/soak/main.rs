@@ -1,8 +1,9 @@
 //! Mixed clients coming and going for minutes, most of them badly behaved, and what the program makes of it.
 //!
-//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (kinds of clients and names of attacks, between commas; all) in the environment. Clients come in tides: a flood of them for up
-//! to 40 s, then all leave, and what the program still holds is measured while only the operator and the healthy
-//! clients are there. Exit status 1 if anything that must hold did not.
+//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (kinds of clients and names of attacks, between
+//! commas; all) in the environment. Clients come in tides: a flood of them for up to 40 s, then all leave. The memory
+//! of the program is measured while only the operator and the healthy clients are there. Exit status 1 if anything that
+//! must hold did not.
 //!
 //! Bounded: at most [`AT_ONCE`] lives at once, of [`PER_SECOND`] new ones a second, so that a machine of two cores is busy
 //! with the program rather than with this.

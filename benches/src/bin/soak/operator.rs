@@ -1,8 +1,8 @@
 //! The operator, who has the arm: settings, setpoints, goals, trials, pauses and resets, all the time; and who reads
 //! `/diagnostics` meanwhile.
 //!
-//! The settings keep the loop stable in every pose: masses and lengths do not fall below the default ones by more than
-//! a tenth, gains by a third, and timesteps stay at or below 2 ms, where the default arm holds until 4 ms.
+//! The settings keep the loop stable in every pose. Masses and lengths are at least nine tenths of the default ones,
+//! and gains two thirds. Timesteps stay at or below 2 ms, where the default arm holds until 4 ms.
 //!
 //! **Invariant:** the only client that moves the arm, so that what it set is what it finds.
 

@@ -9,14 +9,15 @@ use crate::statistics::line;
 use crate::tides::Outcome;
 use pendularm_benches::program::Vitals;
 
-/// Memory at the ebbs may rise by so much per hour at most \[kB\], beyond two standard errors of the rise: 30 bytes
-/// for each of the 140,000 clients of such an hour. A leak of one small thing per client is more.
+/// Largest rise per hour of the memory at the ebbs \[kB\], beyond two standard errors of the rise: 30 bytes for
+/// each of the 140,000 clients of such an hour. A leak of one small thing per client is more.
 const RISE: f64 = 4096.0;
 /// Ebbs that are needed to say so: with fewer, a table that has doubled once looks like a rise.
 const ENOUGH: usize = 12;
-/// And by so much in all, from the ebb after the first third to the end \[kB\]. Until then the allocator's tables grow to
-/// what the busiest moments take: 2 MiB for each GiB of addresses that it has ever used, and 128 bytes for each piece of them.
-/// A GiB more than until then, and 6 MiB of pieces, are no leak; what goes on after that is told by the rise.
+/// And by so much in all, from the ebb after the first third to the end \[kB\]. Until then the allocator's tables grow
+/// to the size of the busiest moments. They have 2 MiB for each GiB of addresses that it has ever used, and 128 bytes
+/// for each piece of them. A GiB more than until then, and 6 MiB of pieces, are no leak; later growth shows in the
+/// rise.
 const GROWTH: f64 = 8.0 * 1024.0;
 
 /// Prints all of it; true if everything holds.

@@ -1,9 +1,9 @@
 //! The healthy subscriber, and beside it what the machine itself is late by.
 //!
-//! Each on a thread of its own with blocking calls: a reader of `/joint_states`; a reader of messages that a bare process
-//! sends at the same rate; a thread that sleeps at the same rate; a caller that asks 20 times a second. The controls do
-//! nothing else, so what they are late by is the machine's doing. And the system itself says for how long threads were able
-//! to run and had no processor.
+//! Each has a thread of its own with blocking calls. One reads `/joint_states`, one reads messages that a bare process
+//! sends at the same rate, one sleeps at the same rate, and one calls 20 times a second. The controls do nothing else,
+//! so what they are late by is the machine's doing. And the system itself says for how long threads were able to run
+//! and had no processor.
 //!
 //! **Invariant:** every message is kept with the time at which it was read, and nothing is judged here.
 

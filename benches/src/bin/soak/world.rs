@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// How long anything may take before it counts as never: far beyond any answer's own limit (forwarded calls have 10 s),
-/// and long enough for a machine that is busy with other work.
+/// How long anything may take before it counts as never. It is far beyond any answer's own limit (forwarded calls have
+/// 10 s), and long enough for a machine that is busy with other work.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 /// Faults that are kept in full; the rest are counted. A program that is broken breaks for everyone.
 const MAX_FAULTS: usize = 20;

@@ -25,10 +25,10 @@ const BURST: u64 = 16;
 /// reason to drop any.
 const WINDOW: u64 = 256;
 
-/// Who publishes, and how fast.
+/// The publisher, and its rate.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// So many times a second.
+    /// This many times a second.
     Rate(f64),
     /// As fast as the slowest subscriber takes them.
     Flood,

@@ -126,7 +126,7 @@ fn push_rollout(client: &mut Client, rng: &mut fastrand::Rng) {
             .flatten()
             .filter_map(Value::as_f64)
             .collect();
-        // The fastest swings of this arm turn by some 0.02 rad a step, and Runge-Kutta 4 is off by the fifth power of that
+        // The fastest swings of this arm turn by some 0.02 rad a step. Runge-Kutta 4 is off by the fifth power of that
         // in each of 2000 steps, in parts of some 40 J: below 1e-3 J with room to spare.
         let drift = energy
             .iter()

@@ -1,7 +1,7 @@
 //! The attacks of `make attack`, one at a time and briefly, among all the others.
 //!
-//! **Invariant:** only those that leave the arm alone and need no program of their own: what the operator sees of the arm is its own doing, and
-//! whoever comes with the tide finds a place.
+//! **Invariant:** only attacks that leave the arm alone and need no program of their own. The operator sees only its
+//! own changes of the arm, and clients that come with the tide find a place.
 
 use std::rc::Rc;
 use std::time::{Duration, Instant};

@@ -30,7 +30,7 @@ pub struct Kind {
     pub name: &'static str,
     /// How often it comes, beside the others.
     pub weight: u32,
-    /// How many of it there may be at once: what costs the machine most comes one at a time.
+    /// How many of it there may be at once: the most expensive ones come one at a time.
     pub at_once: usize,
     /// Its actions.
     pub live: fn(Rc<World>, fastrand::Rng) -> Life,

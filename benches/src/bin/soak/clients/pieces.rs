@@ -52,7 +52,7 @@ pub async fn pieces(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Faul
     Ok(())
 }
 
-/// Cut into pieces of so many bytes; what is sent here is ASCII.
+/// Cut into pieces of this many bytes; the text is ASCII.
 fn cut(text: &str, size: usize, id: &Value) -> Vec<Value> {
     let chunks: Vec<&[u8]> = text.as_bytes().chunks(size).collect();
     let total = chunks.len();

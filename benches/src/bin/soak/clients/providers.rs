@@ -64,7 +64,7 @@ pub async fn provide(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fau
     let (own, one, other) = (rng.fork(), rng.fork(), rng.fork());
     let providing = async {
         let (too_many, complaints) = serve(provider, manner, &service, by, &done, own).await?;
-        // Answers to callers that have gone may be answers too many; those taken late were not.
+        // Answers to callers that have gone may be answers too many; late ones were not.
         let most = too_many + left.get();
         let least = match manner {
             Manner::Late => too_many.saturating_sub(left.get() + taken.get()),
@@ -284,8 +284,8 @@ fn wrong_answers(manner: Manner, answer: &Value, seen: &BTreeSet<String>) -> Vec
     if manner == Manner::Twice {
         return vec![wrong];
     }
-    // Calls are numbered in the order in which they are forwarded, and so those of this provider come to it: lower
-    // numbers that it has not seen are those of others.
+    // Calls are numbered in the order in which they are forwarded, and this provider's calls come in that order.
+    // Lower numbers that it has not seen belong to others.
     let id = answer["id"].as_str().unwrap_or_default();
     let Some((prefix, number)) = id.rsplit_once(':') else {
         return Vec::new();

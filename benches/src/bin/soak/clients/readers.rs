@@ -1,6 +1,7 @@
 //! Clients that read slowly, late or never.
 //!
-//! **Invariant:** answers wait for whoever reads in the end; whoever takes nothing while they wait is disconnected.
+//! **Invariant:** answers wait for a client that reads in the end; a client that takes nothing while they wait is
+//! disconnected.
 
 use std::rc::Rc;
 use std::time::{Duration, Instant};
@@ -20,7 +21,7 @@ const HOARD_STEPS: u64 = 100_000;
 const STALLED: Duration = Duration::from_secs(20);
 const STALLED_AT_LAST: Duration = Duration::from_secs(8);
 
-/// Subscribes to all that is sent often and reads a little of it now and then; what comes is in order and whole.
+/// Subscribes to all frequent topics and reads a little now and then; the messages are in order and whole.
 pub async fn slow(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fault> {
     let mut client =
         Client::with_buffer(&world, "slow reader", Door::any(&mut rng), Some(SMALL)).await?;

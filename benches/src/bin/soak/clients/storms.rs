@@ -1,6 +1,6 @@
 //! Subscriptions and advertisements by the hundred, made and withdrawn.
 //!
-//! **Invariant:** each subscription is confirmed once, under its id; what was withdrawn gives nothing.
+//! **Invariant:** each subscription is confirmed once, under its id; a withdrawn one gives nothing.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;

@@ -3,7 +3,7 @@
 //! It reads and writes frames as `pendularm-client` does. The socket is its own: it is deaf, sips, resets, and takes in
 //! what comes while it sends, which a client that waits for one thing at a time cannot.
 //!
-//! **Invariant:** no response passes unchecked: whoever asks for the next frame is told of it only after the ledger.
+//! **Invariant:** no response passes unchecked: the ledger sees each frame before its reader.
 
 mod reading;
 mod sending;
@@ -59,7 +59,7 @@ pub enum Came {
 
 /// A client.
 pub struct Client {
-    /// Who it is, for reports.
+    /// The client's name, for reports.
     pub name: String,
     /// The world, shared with all.
     pub world: Rc<World>,

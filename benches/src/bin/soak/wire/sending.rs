@@ -107,7 +107,7 @@ impl Client {
         written
     }
 
-    /// Stops sending; what is owed still comes.
+    /// Stops sending; waiting answers still come.
     pub async fn shut_down(&mut self) -> Result<(), Fault> {
         self.stream
             .shutdown()
