@@ -54,7 +54,7 @@ function startIntegrator() {
       said.show(answer.result ? "" : answer.status);
       check();
     } });
-    return el("label", { class: "segment", title: `${name} (key ${i + 1}), and the timestep that it bears` }, radio, el("span", {}, `${shortName(method)} `, limitLabel(method)));
+    return el("label", { class: "segment", title: `${name} (key ${i + 1}), and its largest stable timestep` }, radio, el("span", {}, `${shortName(method)} `, limitLabel(method)));
   }));
   byId("methods").after(said.element);
   const check = () => {

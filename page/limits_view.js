@@ -28,7 +28,7 @@ export function startLimits() {
 
 /** Where the limit of `method` is shown. @param {string} method */
 export function limitLabel(method) {
-  const label = el("small", { class: "bears" }, "…");
+  const label = el("small", { class: "limit" }, "…");
   labels.set(method, label);
   return label;
 }

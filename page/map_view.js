@@ -168,7 +168,7 @@ function describe() {
   const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.held)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
-    + `Higher gains bear less, too low ones hold the arm at no timestep. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
+    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
 }
 
 function goTo(left, top) {

@@ -46,7 +46,7 @@ export function answerInForce(/** @type {any} */ state) {
 /** Parts of a limit that are no news. */
 const NEWS = 0.05;
 
-/** Whether the motion bears another timestep than when the study was last asked: that limit changes as the arm moves. */
+/** Whether the motion has another limit than when the study was last asked: that limit changes as the arm moves. */
 export function motionHasChanged(/** @type {any} */ { stability, diagnostics }) {
   const [then, now] = [stability?.timestep_limit_motion, diagnostics?.timestep_limit_motion];
   if (then === undefined || !(now > 0)) return false;
@@ -143,7 +143,7 @@ export function periodText(/** @type {any} */ state) {
   return [...often, ...(period.delay ? ["delayed"] : [])].join(", ");
 }
 
-/** The pose that bears least, how surely that is known, and what shakes there first; empty where nothing limits. */
+/** The pose with the smallest limit, how surely that is known, and the motion that grows first there; empty where nothing limits. */
 export function worstText(/** @type {any} */ answer) {
   const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound, bound_is_proven: proven } = answer ?? {};
   if (!(least > 0) || !pose || !critical) return "";
@@ -151,7 +151,7 @@ export function worstText(/** @type {any} */ answer) {
   const sure = certified ? `${kind} to 1 %`
     : `the least that a search found${bound > 0 ? `; ${kind} is ${duration(bound)}` : ", without a bound"}`;
   const way = critical.frequency > 0 ? `at ${significant(critical.frequency, 3)} Hz` : "without swinging";
-  return `The pose that bears least, ${duration(least)} (${sure}), is (${pose.map((/** @type {number} */ q) => fixed(q, 2)).join(", ")}) rad: 10 % beyond it joint ${critical.joint + 1} `
+  return `The pose with the smallest limit, ${duration(least)} (${sure}), is (${pose.map((/** @type {number} */ q) => fixed(q, 2)).join(", ")}) rad: 10 % beyond it joint ${critical.joint + 1} `
     + `moves most, ${way}, ${significant(critical.growth_per_step, 3)} times further at every step.`;
 }
 
@@ -178,7 +178,7 @@ export function verdict(/** @type {any} */ state) {
     return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: above, ...known };
   }
   if (longest > everyPose) {
-    const others = everyPose > 0 ? `other poses bear only ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: there the gains themselves are at fault";
+    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: the gains are at fault there";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
   }
@@ -193,7 +193,7 @@ function excess(at, time, limit, where) {
     : `No timestep is stable, ${where}.`;
 }
 
-/** The timesteps that the present loop bears, here and everywhere, and the one to use; empty while that is not known. */
+/** The limits of the active loop, here and everywhere, and the timestep to use; empty while that is not known. */
 export function adviceText(/** @type {any} */ state) {
   const { limit, where, everyPose, advised } = limitInForce(state);
   if (!answerInForce(state) || Number.isNaN(limit)) return "";

@@ -119,7 +119,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         period.effective(self.simulation.timestep())
     }
 
-    /// The motion that is ahead of the arm, and the timestep that it bears.
+    /// The motion that is ahead of the arm, and its largest timestep.
     pub(super) fn motion(&self) -> Motion {
         let control = ControlLoop::in_force(&self.simulation);
         Motion::ahead(&control, self.simulation.state())

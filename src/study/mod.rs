@@ -3,7 +3,7 @@
 //! | module | answers |
 //! | --- | --- |
 //! | [`stability`] | the largest stable timestep, by the linearised loop ([`linear`], [`matrix`]) |
-//! | [`motion`] | the largest timestep that a motion bears |
+//! | [`motion`] | the largest timestep of a motion |
 //! | [`clocks`] | the largest stable control period, and the largest stable timestep at a control period |
 //! | [`control_loop`] | the loop that all of these speak of, and how it is stepped |
 //! | [`continuous`] | the same loop with its law in every stage |

@@ -1,4 +1,4 @@
-//! The largest timestep that a motion bears, which linearisation about a pose at rest can't tell.
+//! The largest timestep of a motion, which linearisation about a pose at rest can't tell.
 //!
 //! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
 //! until the run diverges. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the

@@ -298,7 +298,7 @@ impl<'a> Stepping<'a> {
         if rate == 0.0 {
             return None;
         }
-        // At timesteps that the fast modes bear, the slow ones do not notice the length of a step.
+        // At timesteps at which the fast modes are stable, the slow ones do not notice the length of a step.
         if modes.slow_growth && !self.delayed {
             return Some(0.0);
         }

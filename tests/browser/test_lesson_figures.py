@@ -45,7 +45,7 @@ class Right(Lesson):
 
         def shown():
             return self.page.run("Object.fromEntries([...document.querySelectorAll('#methods .segment')].map((one) =>"
-                                 " [one.querySelector('input').value, one.querySelector('.bears').textContent]))")
+                                 " [one.querySelector('input').value, one.querySelector('.limit').textContent]))")
 
         methods = ("euler", "midpoint", "verlet", "rk4")
         self.asked = {"gains": self.free()}

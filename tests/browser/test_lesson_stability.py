@@ -72,7 +72,7 @@ class BlowUp(Lesson):
 
     def test_a_click_in_the_map_goes_there(self):
         self.tab("stability")
-        self.page.until("document.querySelector('#map-text').textContent.includes('bear')")
+        self.page.until("document.querySelector('#map-text').textContent.includes('Higher gains')")
         self.keep("stability")
         box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
         # 10 ms is two thirds of the way from 0.1 ms to 100 ms; four times the gains is three quarters of the way up.

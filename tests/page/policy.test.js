@@ -40,7 +40,7 @@ test("within the limit of every pose it is stable", () => {
 test("within the limit of this pose alone it is not called stable", () => {
   const said = verdict(arm({ integrator: { method: "rk4", timestep: 0.006 } }));
   assert.equal(said.kind, "here");
-  assert.match(said.sentence, /at the setpoint \(0\.90, −1\.30\) rad, but other poses bear only 4\.32 ms/);
+  assert.match(said.sentence, /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/);
   assert.equal(said.advised, 0.8 * VALUES.minimum_over_poses_held);
 });
 
@@ -50,14 +50,14 @@ test("beyond the limit it says so, with the pose and what to use instead", () =>
   assert.match(said.sentence, /20 ms is above .* 13\.6 ms, at the setpoint/);
 });
 
-test("a motion that bears less than the pose decides, and is named by its speed", () => {
+test("a motion with a smaller limit than the pose decides, and is named by its speed", () => {
   const moving = { ...VALUES, timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
   const said = verdict(arm({ stability: moving, integrator: { method: "rk4", timestep: 0.006 } }));
   assert.equal(said.kind, "beyond");
   assert.equal(said.where, "moving at 12.5 rad/s");
 });
 
-test("what the gains bear is said of this pose, of every pose, and with what to use", () => {
+test("the limits of the gains are shown for this pose and for every pose, with the timestep to use", () => {
   assert.equal(adviceText(arm()), "Stable up to 13.6 ms, at the setpoint (0.90, −1.30) rad; in every pose up to 4.32 ms. Advised: 3.46 ms.");
   assert.match(adviceText(arm({ stability: { ...VALUES, minimum_over_poses_held: 0 } })), /; in every pose none is\.$/);
   assert.match(adviceText(arm({ stability: { ...VALUES, timestep_limit_held: 0 } })), /^No timestep is stable, at the setpoint/);
@@ -74,7 +74,7 @@ test("who shakes beyond the limit, or has diverged, is fast because of that: the
   }
 });
 
-test("the study is asked again once the motion bears another timestep", () => {
+test("the study is asked again once the motion has another limit", () => {
   const changed = (then, now) => motionHasChanged({ stability: { timestep_limit_motion: then }, diagnostics: { timestep_limit_motion: now } });
   assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));
   assert.ok(!changed(0.004, 0.0041) && !changed(null, Infinity) && !changed(0.004, NaN) && !changed(undefined, 0.004));
@@ -152,12 +152,12 @@ test("energy drifts only if nothing puts any in", () => {
   assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
 });
 
-test("the pose that bears least is named, with how surely it is known and what shakes there", () => {
+test("the pose with the smallest limit is named, with how surely it is known and the motion that grows there", () => {
   const answer = {
     ...VALUES, worst_pose: [0, 0.5], certified: true, bound_is_proven: true, minimum_over_poses_bound: 0.0043,
     critical: { growth_per_step: 1.214, frequency: 105.3, joint: 1 },
   };
-  assert.equal(worstText(answer), "The pose that bears least, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
+  assert.equal(worstText(answer), "The pose with the smallest limit, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
     + "10 % beyond it joint 2 moves most, at 105 Hz, 1.21 times further at every step.");
   assert.match(worstText({ ...answer, certified: false }), /\(the least that a search found; proven is 4\.3 ms\)/);
   assert.match(worstText({ ...answer, bound_is_proven: false }), /4\.32 ms \(bounded by an estimate to 1 %\)/);

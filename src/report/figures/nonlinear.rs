@@ -105,7 +105,7 @@ fn centres_between(ends: (f64, f64), count: usize) -> Vec<f64> {
     centres(&edges(ends, count))
 }
 
-/// Moves under the default gains: limited by the pose that bears least, and by their own speed.
+/// Moves under the default gains: limited by the pose with the smallest limit, and by their own speed.
 fn moves(columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {

@@ -54,7 +54,7 @@ pub struct Predicted<const N: usize> {
     pub limits: Limits<N>,
     /// The limits of control period and timestep.
     pub clocks: ClockLimits,
-    /// The motion that is ahead of the arm as it is now, and what timestep it bears.
+    /// The motion that is ahead of the arm as it is now, and its largest timestep.
     pub motion: Motion,
     /// Whether the arm is left to itself.
     pub is_free: bool,
@@ -121,7 +121,7 @@ impl StabilityValues {
             motion,
             ..
         } = predicted;
-        let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+        let limit = Some(motion.timestep).filter(|timestep| timestep.is_finite());
         Self {
             control_period_limit: clocks.period,
             timestep_limit: clocks.timestep,
@@ -140,7 +140,7 @@ impl StabilityValues {
                 frequency: critical.frequency,
                 joint: critical.joint,
             }),
-            timestep_limit_motion: bears,
+            timestep_limit_motion: limit,
             motion_speed: motion.speed,
             advised_timestep: limits.advised_for(motion),
             advised_duration: predicted.is_free.then_some(FREE_SECONDS),

@@ -21,7 +21,7 @@ pub const MAX_UNFINISHED: usize = 8;
 pub const MAX_PIECES: usize = 4096;
 /// Bytes that a piece takes beside its text: its place among the others, and the allocator's own.
 pub const PIECE_BYTES: usize = 128;
-/// How long a message may take to come: longer than the slowest network that a person would bear.
+/// How long a message may take to come: longer than over the slowest usable network.
 pub const MAX_AGE: Duration = Duration::from_secs(60);
 
 /// A piece of a message.
