@@ -106,7 +106,7 @@ function startServo() {
   button.addEventListener("click", () => switchServo(!state.enabled));
   watch("enabled", (on) => {
     button.setAttribute("aria-checked", String(on));
-    setText(byId("servo-text"), on ? "Servo on" : "Servo off");
+    setText(byId("servo-text"), on ? "Controller on" : "Controller off");
     byId("gains-off").hidden = on;
     for (const key of ["kp", "ki", "kd"]) byId(`${key}-fields`).classList.toggle("off", !on);
   });

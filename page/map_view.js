@@ -1,5 +1,5 @@
 // @ts-check
-// The stability map: gains against timestep, where the held servo is stable and where not, the present point in it.
+// The stability map: gains against timestep, where the loop with held efforts is stable and where not, the present point in it.
 // A click goes there; so do the arrow keys.
 // Invariant: the boundary is that of the arm's own settings, drawn as far as it is known; a click sends what it shows.
 
@@ -168,7 +168,7 @@ function describe() {
   const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.held)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
-    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
+    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the controller is on"}; click to go elsewhere.`);
 }
 
 function goTo(left, top) {

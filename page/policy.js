@@ -25,7 +25,7 @@ const AFTER_DIVERGENCE = 0.5;
 /** A free swing that takes longer to double its energy loses its sense for other reasons first [s]. */
 const SLOW_GROWTH = 600;
 
-/** The question whose answer is about the loop in force: with the servo off that is the arm left to itself. */
+/** The question whose answer is about the loop in force: with the controller off that is the arm left to itself. */
 export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
   if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
   return {

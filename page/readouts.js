@@ -101,6 +101,6 @@ export function describeArm() {
   const { x, y } = endEffector();
   const degrees = Array.from(state.position.subarray(0, state.links), (q) => fixed((q * 180) / Math.PI, 0));
   const goal = state.goal?.outcome === "active" ? ` Target at x ${fixed(state.goal.target.x, 2)}, y ${fixed(state.goal.target.y, 2)} metres, ${fixed(state.goal.distance, 2)} metres away.` : "";
-  setText(byId("arm-text"), `${state.links} links, ${runState()}, servo ${state.enabled ? "on" : "off"}. Joints at ${degrees.join(", ")} degrees. `
+  setText(byId("arm-text"), `${state.links} links, ${runState()}, controller ${state.enabled ? "on" : "off"}. Joints at ${degrees.join(", ")} degrees. `
     + `End effector at x ${fixed(x, 2)}, y ${fixed(y, 2)} metres.${goal}`);
 }

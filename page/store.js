@@ -29,7 +29,7 @@ export const state = {
   stabilityMissing: false,
   motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
   estimate: null, // message of /arm_sim/error_estimate
-  pushed: false, // whether an effort has acted with the servo off since energy is counted
+  pushed: false, // whether an effort has acted with the controller off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
   view: "course", // or "workbench"

@@ -95,7 +95,7 @@ function choose() {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "servo", kind: "calm", text: "The servo is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the servo on", () => switchServo(true)]] };
+    return { key: "servo", kind: "calm", text: "The controller is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the controller on", () => switchServo(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm doesn't move.", buttons: [["Run", togglePause]] };

@@ -62,7 +62,7 @@ function show(trial) {
   byId("trial-progress").value = trial.duration > 0 ? Math.min(1, trial.elapsed / trial.duration) : 0;
   setText(byId("trial-error"), trial.error == null ? "" : `${fixed(trial.error, 3)} m to go`);
   const waits = trial.running && trial.action_status === "preempted";
-  setText(byId("trial-note"), waits ? "Another goal took over: skip to go on." : trial.running && state.enabled === false ? "The servo is off: nothing will be reached." : "");
+  setText(byId("trial-note"), waits ? "Another goal took over: skip to go on." : trial.running && state.enabled === false ? "The controller is off: nothing will be reached." : "");
   if (wasRunning && !trial.running) announce(`Trial over: ${count}.`);
   wasRunning = trial.running;
 }

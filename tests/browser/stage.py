@@ -100,7 +100,7 @@ class PageTest(unittest.TestCase):
         return tuple(int(one) for one in re.findall(r"\d+", text)[:3])
 
     def settle(self, positions):
-        """The servo holds the arm at `positions`, and then it is paused: a picture that does not change."""
+        """The controller holds the arm at `positions`, and then it is paused: a picture that does not change."""
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.run(f"""own('runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
         self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")

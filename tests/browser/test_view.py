@@ -99,7 +99,7 @@ class TwoLinks(View, Sums, PageTest):
 
     def test_the_arm_is_told_in_a_sentence(self):
         self.settle([0.5, 0.5])
-        self.page.until("document.querySelector('#arm-text').textContent.includes('paused, servo on. Joints at 29, 29 degrees')")
+        self.page.until("document.querySelector('#arm-text').textContent.includes('paused, controller on. Joints at 29, 29 degrees')")
 
     def test_what_is_written_can_be_saved_as_csv(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 30)")

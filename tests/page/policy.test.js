@@ -19,7 +19,7 @@ function arm(changed = {}) {
   return { ...state, stabilityAsked: changed.stabilityAsked ?? JSON.stringify(question(state)) };
 }
 
-test("the question with the servo off is about the arm left to itself", () => {
+test("the question with the controller off is about the arm left to itself", () => {
   assert.deepEqual(question(arm({ enabled: false })).gains, { kp: [0, 0], ki: [0, 0], kd: [0, 0] });
   assert.deepEqual(question(arm()).gains.kp, [1000, 250]);
 });
