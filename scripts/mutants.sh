@@ -5,10 +5,10 @@
 #
 # `--sample N` takes N mutants out of all, drawn by their names, so that the same ones come again when other lines have moved theirs.
 #
-# `actors`, only when it is asked for, is src/actors with src/web. The layers below (src/math, src/protocol, src/study
-# and so on) are a crate of their own, compiled once. Mutants that their own tests miss are tried again, unless --near
-# is given: with the simulation's seeds, and on the wire, against the built program. A mutant that is noticed only there
-# is `elsewhere`.
+# `actors`, only when it is asked for, is src/actors with src/live, src/services and src/web. The layers below (src/math,
+# src/protocol, src/study and so on) are a crate of their own, compiled once. Mutants that their own tests miss are tried again,
+# unless --near is given: with the simulation's seeds, and on the wire, against the built program. A mutant that is noticed only
+# there is `elsewhere`.
 #
 # `--check` only lays the layers out and checks that each compiles alone; it needs no cargo-mutants.
 #
@@ -74,9 +74,9 @@ lay_out_around() { # folder
     } >"$1/below/Cargo.toml"
     cp -R "$root"/{page,client,docs,scripts} "$root"/*.md "$1/"
     cp -R "$root/fuzz/src" "$1/fuzz/"
-    cp -R "$root"/src/{web,options,main.rs,plan.rs} "$1/src/"
+    cp -R "$root"/src/{live,services,web,options,main.rs,plan.rs} "$1/src/"
     cp -R "$root"/tests/{faults,simulate,wire} "$1/tests/"
-    printf 'examine_globs = ["src/actors/**", "src/web/**"]\n' >"$1/.cargo/mutants.toml"
+    printf 'examine_globs = ["src/actors/**", "src/live/**", "src/services/**", "src/web/**"]\n' >"$1/.cargo/mutants.toml"
     # Unit tests don't get it from Cargo.
     printf '[env]\nCARGO_TARGET_TMPDIR = "%s"\n' "$1/tmp" >"$1/.cargo/config.toml"
 }
@@ -94,7 +94,7 @@ lay_out() { # layer, folder
     {
         echo '[package]'; echo 'name = "pendularm"'; grep '^\(edition\|version\|description\)' "$root/Cargo.toml"; echo 'autotests = false'; echo '[workspace]'
         if [ "$1" = actors ]; then
-            section features; section dependencies; echo 'below = { path = "below" }'; section dev-dependencies
+            section features; section dependencies; echo 'below = { path = "below" }'; section dev-dependencies | grep -v pendularm-wasm
             for test in faults simulate wire; do
                 echo '[[test]]'; echo "name = \"$test\""; echo "path = \"tests/$test/main.rs\""
                 if [ "$test" = simulate ]; then echo 'harness = false'; fi
@@ -115,14 +115,14 @@ lay_out() { # layer, folder
         echo 'extern crate self as pendularm;'
         if [ "$1" = actors ]; then
             echo "pub use below::{$(IFS=,; echo "${below[*]}")};"
-            echo 'pub mod options; pub mod plan; pub mod web;'
+            echo 'pub mod live; pub mod options; pub mod plan; pub mod services; pub mod web;'
         fi
         echo "pub mod $1;"
         echo '#[cfg(test)] mod idle;'
         # Modules that the tests share stand at the root of their crate, under their own names.
         sed -n 's|^#\[path = "../support/\(.*\)\.rs"\]$|#[cfg(test)] #[path = "../tests/support/\1.rs"] mod \1;|p' "$root/tests/$1/main.rs"
         sed -n 's/^mod \([a-z_]*\);$/\1/p' "$root/tests/$1/main.rs" | while read -r name; do
-            if [ "$name" = default_gains ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
+            if [ "$name" = default_gains ] || [ "$name" = kernel ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
             # Tests run in the order of their names: unit tests come first, those that take a second last.
             case $name in
                 expression | arm_turns | memory | memory_kinds | pacing | recorder | replay | slow | study) order=zz ;;

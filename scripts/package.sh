@@ -32,7 +32,7 @@ if [ "$(git rev-parse --show-toplevel 2>/dev/null)" = "$root" ]; then
     [ -z "$(git status --porcelain)" ] || say "note: the tree differs from the last commit; tracked files go in as they are"
 else
     say "no git here: taking every file but the generated ones"
-    find . \( -path ./target -o -path ./benches/peers/.venv -o -path ./vendor -o -path ./.cargo -o -path ./dist -o -path ./report -o -path ./python/target -o -path ./.venv -o -path ./.git \
+    find . \( -path ./target -o -path ./benches/peers/.venv -o -path ./vendor -o -path ./.cargo -o -path ./dist -o -path ./report -o -path ./pendularm.html -o -path ./python/target -o -path ./.venv -o -path ./.git \
         -o -name node_modules -o -path "./submission.tar.gz" \) -prune -o -type f -printf '%P\0' >"$work/own"
 fi
 tar -c --null --verbatim-files-from -T "$work/own" | tar -x -C "$stage"

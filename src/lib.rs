@@ -1,22 +1,24 @@
 //! pendularm: a real-time planar robot arm that any rosbridge client can drive.
 //!
-//! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure: bytes
-//! and JSON) and `actors` (joins the two, one actor per node). `math` and `protocol` do not know each other.
+//! Layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure: bytes and
+//! JSON), `services` and `live` (pure: join the two), and `actors` (one actor per node). `math` and `protocol` do not
+//! know each other.
 //!
 //! Beside them [`study`] (pure: `math` measured against theory), `report` (clock, files and drawings around the study)
 //! and `web`, the way in for browsers.
 //!
 //! | feature | default | adds |
 //! | --- | --- | --- |
-//! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `output`, `plan`, and the program |
+//! | `services` | yes | `protocol`, `services`, `live`: the live arm and its services as plain values |
+//! | `runtime` | yes | `actors`, `options`, `logging`, `output`, `plan`, and the program |
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: runs on record, read back and replayed |
 //! | `cli` | yes | `command`: commands that ask a running one, completions |
 //!
-//! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
-//! no more, and compiles `glam` and `thiserror` beside it. With `batch`, and `fearless_simd`, a step of Runge-Kutta on
+//! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs no more, and
+//! compiles `glam`, `libm` and `thiserror` beside it. With `batch`, and `fearless_simd`, a step of Runge-Kutta on
 //! x86-64 takes a tenth (2 links) to a fifth (3) fewer instructions.
 //!
 //! ```

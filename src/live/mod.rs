@@ -5,7 +5,7 @@
 //! computed by `math::pacer`, and each step by `math::simulation`.
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. The
-//! simulation is changed from outside by [`LiveArm::change`] alone.
+//! simulation is changed from outside by `change` alone.
 
 mod counts;
 mod goals;

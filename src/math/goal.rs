@@ -6,6 +6,7 @@
 //! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the end effector farther
 //! than `epsilon` from the target.
 
+use crate::math::elementary::hypot;
 use std::fmt;
 
 use glam::DVec2;
@@ -142,7 +143,7 @@ impl Goal {
     pub fn distance(&self, end_effector: DVec2) -> f64 {
         let off = end_effector - self.target;
         // `DVec2::length` would overflow for an end effector that a diverging arm has thrown beyond 1e154 m.
-        off.x.hypot(off.y)
+        hypot(off.x, off.y)
     }
 
     /// Simulation time since the goal's start \[s\].

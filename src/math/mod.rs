@@ -5,6 +5,7 @@
 pub mod arm;
 pub mod count;
 pub mod dynamics;
+pub(crate) mod elementary;
 pub mod expression;
 pub mod goal;
 pub mod integrator;

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
 use super::stability::{Modes, Sampling, Stepping};
+use crate::math::elementary::{atan2, hypot};
 use crate::math::integrator::Method;
 
 /// The factor beyond its limit at which a loop is looked at: nothing grows at the limit itself.
@@ -43,8 +44,8 @@ pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Cr
         .max_by(|one, other| growth(one).total_cmp(&growth(other)))?;
     let (re, im) = (1.0 + period * fastest.re, period * fastest.im);
     let found = Critical {
-        growth_per_step: re.hypot(im),
-        frequency: im.abs().atan2(re) / (TAU * period),
+        growth_per_step: hypot(re, im),
+        frequency: atan2(im.abs(), re) / (TAU * period),
         joint: furthest(&generator, fastest, linear.joints())?,
     };
     (found.growth_per_step.is_finite() && found.frequency.is_finite()).then_some(found)
@@ -75,7 +76,7 @@ fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
     let image = |i: usize| -> f64 { x.iter().enumerate().map(|(j, x)| shifted[(i, j)] * x).sum() };
     let reach = |i: usize| {
         let across = if mu.im == 0.0 { 0.0 } else { image(i) / mu.im };
-        x.get(i).map_or(0.0, |x| x.hypot(across))
+        x.get(i).map_or(0.0, |x| hypot(*x, across))
     };
     (0..joints).max_by(|&i, &j| reach(i).total_cmp(&reach(j)))
 }

@@ -23,6 +23,7 @@ use super::stability::LimitSearch;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
+use crate::math::elementary::{cbrt, pow};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::Simulation;
@@ -273,7 +274,7 @@ impl<const N: usize> GainsSearch<N> {
         let load = gravity_load(&self.control.arm, &[0.0; N]);
         let carries = (0..N).map(|i| {
             let springs = (ABOVE_GRAVITY * load[i].abs() / kp[i]).sqrt();
-            let integrals = (2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i])).cbrt();
+            let integrals = cbrt(2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i]));
             springs.max(integrals)
         });
         largest(carries).max(DEFAULT_SETTLING / self.requirements.settling_time)
@@ -372,5 +373,5 @@ fn inertia<const N: usize>(arm: &Arm<N>, weight: f64) -> [f64; N] {
         });
         1.0 / largest(accelerations)
     };
-    std::array::from_fn(|i| mass[i.min(N - 1)][i].powf(1.0 - weight) * free(i).powf(weight))
+    std::array::from_fn(|i| pow(mass[i.min(N - 1)][i], 1.0 - weight) * pow(free(i), weight))
 }

@@ -47,6 +47,7 @@ use super::control_loop::ControlLoop;
 use super::symmetric::{Symmetric, is_positive};
 use crate::math::arm::Arm;
 use crate::math::dynamics::{coupling, mass_matrix, weight_moment};
+use crate::math::elementary::sin_cos;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 
@@ -212,12 +213,13 @@ impl<const N: usize> Proof<N> {
                 between += middle[j];
                 reach += half[j];
                 let product = coupling(&self.arm, i, j);
-                links[i][j] = product * between.cos();
+                let (sin, cos) = sin_cos(between);
+                links[i][j] = product * cos;
                 links[j][i] = links[i][j];
                 if reach > 0.0 {
                     let turn: f64 = reach.min(PI);
-                    let lost = between.cos().abs() * (1.0 - turn.cos())
-                        + between.sin().abs() * turn.min(FRAC_PI_2).sin();
+                    let lost = cos.abs() * (1.0 - sin_cos(turn).1)
+                        + sin.abs() * sin_cos(turn.min(FRAC_PI_2)).0;
                     let (one, other) = (coupling(&self.arm, i, i), coupling(&self.arm, j, j));
                     let scale = (one / other).sqrt();
                     links[i][i] -= product * lost.min(2.0) * scale;

@@ -9,6 +9,8 @@
     reason = "indices run over 0..N of N×N matrices, as they do in the formulas"
 )]
 
+use crate::math::elementary::hypot;
+
 /// A symmetric matrix, row by row.
 pub(super) type Symmetric<const N: usize> = [[f64; N]; N];
 
@@ -31,8 +33,8 @@ pub(super) fn eigen<const N: usize>(matrix: &Symmetric<N>) -> [(f64, [f64; N]); 
                 }
                 turned = true;
                 let theta = 0.5 * (a[q][q] - a[p][p]) / off;
-                let t = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
+                let t = 1.0_f64.copysign(theta) / (theta.abs() + hypot(theta, 1.0));
+                let c = 1.0 / hypot(t, 1.0);
                 let s = t * c;
                 for row in &mut a {
                     (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);

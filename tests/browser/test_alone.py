@@ -16,9 +16,9 @@ SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Num
 
 @unittest.skipUnless(IS_FILE, "the page of a server has no kernel")
 class AloneTest(PageTest):
-    def test_the_runs_of_the_kernel_have_the_bits_of_the_native_ones(self):
+    def test_runs_and_answers_of_the_kernel_have_the_bits_of_the_native_ones(self):
         native = pathlib.Path(os.environ["RUNS"]).read_text()
-        self.assertEqual(len(native.splitlines()), 16)
+        self.assertEqual(len(native.splitlines()), 32)
         ours = self.page.run("""(async () => {
           const packed = Uint8Array.from(atob(document.querySelector("#kernel-module").textContent), (one) => one.charCodeAt(0));
           const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));

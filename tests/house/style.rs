@@ -13,8 +13,8 @@ use crate::tree::{files_in, rust_files};
 /// Longest file, in lines.
 const MAX_LINES: usize = 800;
 /// Folders of what is kept as source, tests and tools too, and the extensions of its languages.
-const FOLDERS: [&str; 9] = [
-    "src", "tests", "benches", "fuzz", "client", "python", "ros2", "page", "scripts",
+const FOLDERS: [&str; 10] = [
+    "src", "tests", "benches", "fuzz", "client", "python", "ros2", "page", "wasm", "scripts",
 ];
 const LANGUAGES: [&str; 5] = ["rs", "py", "js", "mjs", "sh"];
 /// Longest line, in characters.

@@ -3,17 +3,41 @@
 //! **Invariant:** nothing of a run depends on the machine.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
+use crate::Kernel;
+
+/// Questions to the study and to inverse kinematics, whose answers are compared too: the service, and its arguments.
+const QUESTIONS: [(&str, &str); 8] = [
+    ("/study/stability", "{}"),
+    (
+        "/study/stability",
+        r#"{"integrator":"verlet","control_period":0.004,"params":{"gravity":3.7}}"#,
+    ),
+    (
+        "/study/stability",
+        r#"{"integrator":"euler","gains":{"kp":0,"ki":0,"kd":0}}"#,
+    ),
+    ("/study/gains", "{}"),
+    (
+        "/study/rollout",
+        r#"{"reference":true,"samples":20,"duration":3}"#,
+    ),
+    ("/study/plan", r#"{"error":0.001,"duration":1}"#),
+    ("/ik/solve", r#"{"x":0.7,"y":0.9,"phi":0.4}"#),
+    ("/ik/solve", r#"{"x":-0.31,"y":-1.27,"phi":2.4}"#),
+];
+
 /// Steps of a run.
 pub const STEPS: u64 = 20_000;
 
-/// One line for each run, by each method, with both numbers of links, without and with the
-/// controller: its name, and the bits of its last state, effort and time.
+/// First one line for each run, by each method, with both numbers of links, without and with the
+/// controller: its name, and the bits of its last state, effort and time. Then one for each answer.
 #[must_use]
 pub fn text() -> String {
     let mut text = String::new();
@@ -23,7 +47,25 @@ pub fn text() -> String {
             line::<3>(&mut text, method, on);
         }
     }
+    answers::<2>(&mut text);
+    answers::<3>(&mut text);
     text
+}
+
+/// The answers to all questions, of an arm whose time stands still.
+fn answers<const N: usize>(text: &mut String)
+where
+    Arm<N>: Default,
+    Gains<N>: Default,
+{
+    let mut kernel = Kernel::<N>::new(|| Duration::ZERO, 0);
+    for (service, args) in QUESTIONS {
+        kernel.receive(&format!(
+            r#"{{"op":"call_service","service":"{service}","args":{args}}}"#
+        ));
+        while kernel.compute(Duration::MAX) {}
+        text.push_str(&String::from_utf8_lossy(&kernel.take_frames()));
+    }
 }
 
 fn line<const N: usize>(text: &mut String, method: Method, on: bool)

@@ -5,6 +5,7 @@
 //!
 //! **Invariant:** an angle that is in range already comes back bit for bit.
 
+use crate::math::elementary::{atan2, sin_cos};
 use std::f64::consts::PI;
 
 /// `angle` \[rad\] in (-π, π].
@@ -13,8 +14,8 @@ pub fn wrap(angle: f64) -> f64 {
     if -PI < angle && angle <= PI {
         return angle;
     }
-    let (sin, cos) = angle.sin_cos();
-    let wrapped = sin.atan2(cos);
+    let (sin, cos) = sin_cos(angle);
+    let wrapped = atan2(sin, cos);
     if wrapped > -PI { wrapped } else { PI }
 }
 
@@ -25,9 +26,12 @@ pub fn turn(from: f64, to: f64) -> f64 {
     if difference.abs() <= PI {
         return difference;
     }
-    let (sin_from, cos_from) = from.sin_cos();
-    let (sin_to, cos_to) = to.sin_cos();
-    (sin_to * cos_from - cos_to * sin_from).atan2(cos_to * cos_from + sin_to * sin_from)
+    let (sin_from, cos_from) = sin_cos(from);
+    let (sin_to, cos_to) = sin_cos(to);
+    atan2(
+        sin_to * cos_from - cos_to * sin_from,
+        cos_to * cos_from + sin_to * sin_from,
+    )
 }
 
 /// `solution` \[rad\] with each joint shifted by whole turns to within π of `present`, so that a wound-up arm does not

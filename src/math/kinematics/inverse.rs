@@ -21,6 +21,7 @@
 use glam::DVec2;
 
 use super::{Reach, Target, Unreachable, heading, turn, wrap};
+use crate::math::elementary::{atan2, hypot};
 
 /// How far outside the reach a target still counts as on its edge, as a share of the sum of the lengths. It is far
 /// above the rounding of a boundary computed elsewhere (1e-13), and far below anything that could be meant (1 nm per
@@ -141,18 +142,18 @@ impl Chain {
         target: &Target,
     ) -> Result<(), Unreachable> {
         let DVec2 { x, y } = target.position;
-        match self.judged(reach, end_effector.x.hypot(end_effector.y)) {
+        match self.judged(reach, hypot(end_effector.x, end_effector.y)) {
             Ok(()) => Ok(()),
             Err(Outside::Beyond) => Err(Unreachable::Beyond {
                 x,
                 y,
-                distance: x.hypot(y),
+                distance: hypot(x, y),
                 limit: reach.outer * self.unit,
             }),
             Err(Outside::TooClose) => Err(Unreachable::TooClose {
                 x,
                 y,
-                distance: x.hypot(y),
+                distance: hypot(x, y),
                 limit: reach.inner * self.unit,
             }),
         }
@@ -169,7 +170,7 @@ impl Chain {
             return Err(Unreachable::NotFinite("phi"));
         }
         let wrist = end_effector - self.l3 * DVec2::from_angle(phi);
-        let distance = wrist.x.hypot(wrist.y);
+        let distance = hypot(wrist.x, wrist.y);
         let reach = self.wrist_reach();
         let Err(side) = self.judged(reach, distance) else {
             return Ok((wrist, wrap(phi)));
@@ -208,25 +209,25 @@ impl Chain {
             target,
         )?;
         let present = heading(present);
-        let present_phi = present.y.atan2(present.x);
+        let present_phi = atan2(present.y, present.x);
 
         // This is asked first, so that a present orientation is kept bit for bit, even on the edge of what is
         // admissible. On the base itself all orientations are admissible or none.
         let reach = self.wrist_reach();
         let wrist = end_effector - self.l3 * present;
         let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);
-        let present_distance = wrist.x.hypot(wrist.y);
+        let present_distance = hypot(wrist.x, wrist.y);
         let admissible = reach.inner - rounding..=reach.outer + rounding;
         if admissible.contains(&present_distance) || end_effector == DVec2::ZERO {
             return Ok((wrist, present_phi));
         }
 
-        let distance = end_effector.x.hypot(end_effector.y);
-        let bearing = end_effector.y.atan2(end_effector.x);
+        let distance = hypot(end_effector.x, end_effector.y);
+        let bearing = atan2(end_effector.y, end_effector.x);
         let (sin, cos) = half_angle(distance, self.l3, reach.inner);
-        let least = 2.0 * sin.atan2(cos);
+        let least = 2.0 * atan2(sin, cos);
         let (sin, cos) = half_angle(distance, self.l3, reach.outer);
-        let greatest = 2.0 * sin.atan2(cos);
+        let greatest = 2.0 * atan2(sin, cos);
         let offset = wrap(turn(bearing, present_phi));
         let nearest = offset.abs().max(least).min(greatest);
         let phi = wrap(bearing + if offset < 0.0 { -nearest } else { nearest });
@@ -241,17 +242,17 @@ impl Chain {
         present: &[f64; N],
     ) -> [f64; N] {
         let reach = self.wrist_reach();
-        let r = wrist.x.hypot(wrist.y).max(reach.inner).min(reach.outer);
+        let r = hypot(wrist.x, wrist.y).max(reach.inner).min(reach.outer);
         let (sin, cos) = half_angle(self.l1, self.l2, r);
-        let bend = 2.0 * cos.atan2(sin);
+        let bend = 2.0 * atan2(cos, sin);
         let (sin, cos) = half_angle(self.l1, r, self.l2);
-        let lead = 2.0 * sin.atan2(cos);
+        let lead = 2.0 * atan2(sin, cos);
         let pose = |side: f64| -> [f64; N] {
             // On the base itself the wrist has no bearing, and any first joint will do.
             let q1 = if wrist == DVec2::ZERO {
                 present.first().copied().map_or(0.0, wrap)
             } else {
-                wrap(wrist.y.atan2(wrist.x) - side * lead)
+                wrap(atan2(wrist.y, wrist.x) - side * lead)
             };
             let q2 = wrap(side * bend);
             std::array::from_fn(|i| match i {

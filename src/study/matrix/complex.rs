@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** plain arithmetic; infinities and NaN are passed on.
 
+use crate::math::elementary::hypot;
 use std::ops::{Add, Mul, Sub};
 
 /// A complex number.
@@ -24,7 +25,7 @@ impl Complex {
     /// Modulus, without overflow on the way.
     #[must_use]
     pub fn modulus(self) -> f64 {
-        self.re.hypot(self.im)
+        hypot(self.re, self.im)
     }
 
     #[inline]

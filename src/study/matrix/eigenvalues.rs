@@ -12,6 +12,7 @@
 )]
 
 use super::{Complex, Matrix, largest};
+use crate::math::elementary::{exp2, hypot, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.
 const MAX_SWEEPS: usize = 60;
@@ -41,12 +42,12 @@ impl Matrix {
                 let others = || (0..n).filter(move |&j| j != i);
                 let row: f64 = others().map(|j| self[(i, j)].abs()).sum();
                 let column: f64 = others().map(|j| self[(j, i)].abs()).sum();
-                let exponent = (0.5 * (row / column).log2()).round();
+                let exponent = (0.5 * log2(row / column)).round();
                 // Zero rows and columns have no scale to match.
                 if row == 0.0 || column == 0.0 || exponent == 0.0 || exponent.abs() > 900.0 {
                     continue;
                 }
-                let factor = exponent.exp2();
+                let factor = exp2(exponent);
                 if column * factor + row / factor < 0.95 * (column + row) {
                     settled = false;
                     for j in 0..n {
@@ -183,7 +184,7 @@ impl Hessenberg {
         let mut rotations = Vec::with_capacity(last - first);
         for k in first..last {
             let (a, b) = (self.at(k, k), self.at(k + 1, k));
-            let length = a.modulus().hypot(b.modulus());
+            let length = hypot(a.modulus(), b.modulus());
             let (c, s) = if length == 0.0 {
                 (Complex::real(1.0), Complex::ZERO)
             } else {

@@ -16,6 +16,7 @@ use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::dynamics::forward_dynamics;
+use crate::math::elementary::{ln, pow};
 use crate::math::integrator::two_sum;
 use crate::math::trig;
 use series::PowerSeries;
@@ -99,7 +100,7 @@ impl<const N: usize> TaylorReference<N> {
             shorter: SHORTER.map(|factor| (factor, power(factor, order - LAST))),
             allowances: std::array::from_fn(|i| {
                 let missing = length_in_f64(LAST - 1 - i) / length_in_f64(order);
-                tolerance.powf(-missing)
+                pow(tolerance, -missing)
             }),
             cuts: 1.0,
             coefficients: 0,
@@ -252,7 +253,7 @@ impl<const N: usize> TaylorReference<N> {
     reason = "clamped to small whole numbers"
 )]
 fn order_for(tolerance: f64) -> usize {
-    ((3.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, HIGHEST)
+    ((3.0 - 0.5 * ln(tolerance)).ceil() as usize).clamp(6, HIGHEST)
 }
 
 fn power(base: f64, exponent: usize) -> f64 {

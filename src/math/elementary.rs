@@ -1,0 +1,43 @@
+//! Elementary functions that have the same bits on every platform: those of the standard library are the platform's.
+//!
+//! **Invariant:** arguments in radians; results as accurate as a C library's, to a unit in the last place or so.
+
+/// Sine and cosine.
+pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
+    libm::sincos(angle)
+}
+
+/// Angle of the point (`x`, `y`), in [-π, π].
+pub(crate) fn atan2(y: f64, x: f64) -> f64 {
+    libm::atan2(y, x)
+}
+
+/// Length of (`x`, `y`), without overflow on the way.
+pub(crate) fn hypot(x: f64, y: f64) -> f64 {
+    libm::hypot(x, y)
+}
+
+/// `base` to the power of `exponent`.
+pub(crate) fn pow(base: f64, exponent: f64) -> f64 {
+    libm::pow(base, exponent)
+}
+
+/// Cube root.
+pub(crate) fn cbrt(x: f64) -> f64 {
+    libm::cbrt(x)
+}
+
+/// Natural logarithm.
+pub(crate) fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
+/// Logarithm to base 2.
+pub(crate) fn log2(x: f64) -> f64 {
+    libm::log2(x)
+}
+
+/// 2 to the power of `x`.
+pub(crate) fn exp2(x: f64) -> f64 {
+    libm::exp2(x)
+}
