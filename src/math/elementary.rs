@@ -1,4 +1,4 @@
-//! Elementary functions that have the same bits on every platform: those of the standard library are the platform's.
+//! Elementary functions that have the same bits on every platform; the standard library's are the platform's.
 //!
 //! **Invariant:** arguments in radians; results as accurate as a C library's, to a unit in the last place or so.
 

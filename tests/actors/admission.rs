@@ -1,6 +1,7 @@
 //! The way in where a token is asked for: from connecting to the token, whatever a client says or keeps to itself.
 //!
-//! **Invariant:** virtual time and in-memory pipes only; whoever has the token gets in at once, whatever the others do.
+//! **Invariant:** virtual time and in-memory pipes only. The holder of the token gets in at once, whatever the others
+//! do.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -71,7 +72,7 @@ impl Guarded {
         ours
     }
 
-    /// So many connections that say nothing.
+    /// This many connections that say nothing.
     fn silent(&self, count: usize) -> Vec<DuplexStream> {
         (0..count).map(|_| self.connect()).collect()
     }
@@ -304,7 +305,8 @@ fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
     });
 }
 
-/// So many guesses that most wait too long to be answered: none of them keeps the holder out, and in all no more are answered.
+/// Enough guesses that most wait too long to be answered: none of them keeps the holder out, and in all no more are
+/// answered.
 #[test]
 fn a_flood_of_guesses_is_answered_no_faster_and_keeps_out_nobody() {
     in_virtual_time(async {

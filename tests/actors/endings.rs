@@ -95,8 +95,8 @@ fn goals_whose_action_server_goes() {
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
 }
 
-/// Eight clients that have registered much leave together: who calls then is answered while most of that still stands,
-/// and in the end none of it does.
+/// Eight clients that have registered much leave together. A caller is answered while most of that still stands, and
+/// in the end none of it does.
 #[test]
 fn registrations_of_those_who_leave() {
     let registrations = |n: usize| {
@@ -154,7 +154,8 @@ fn registrations_of_those_who_leave() {
     });
 }
 
-/// Who has stopped sending is still spoken with, and can answer nothing: what it provided is unknown at once.
+/// A client that has stopped sending still gets messages, and can answer nothing: its services are unknown at
+/// once.
 #[test]
 fn services_and_actions_of_who_has_stopped_sending() {
     in_virtual_time(async {

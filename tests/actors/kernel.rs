@@ -1,6 +1,7 @@
 //! The kernel of the page without a server beside the runtime: the same frames at the same times have the same answers.
 //!
-//! Both begin at one instant of virtual time. What only one of them can know is left out: how long work took.
+//! Both begin at one instant of virtual time. Only one of them can know how long work took, so that is left
+//! out.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -208,7 +209,7 @@ fn is_of_the_study(service: &str, args: &Value) -> bool {
     fields.is_empty() || known.iter().any(|name| fields.contains_key(*name))
 }
 
-/// Those that the page asks, and one more; the others need a server.
+/// The services of the page, and one more; the others need a server.
 const SERVED: [&str; 20] = [
     "/arm_sim/set_params",
     "/arm_sim/set_integrator",

@@ -1,6 +1,6 @@
 //! The listener on a real socket, with the real clock.
 //!
-//! **Invariant:** who has been accepted stays connected when the listening ends; who comes later is not accepted.
+//! **Invariant:** an accepted client stays connected when the listening ends; a later one is not accepted.
 
 use std::sync::Arc;
 

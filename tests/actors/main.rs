@@ -1,4 +1,4 @@
-//! The nodes in virtual time: what they say, to whom and when.
+//! The nodes in virtual time: their messages, the receivers and the times.
 
 #![allow(
     clippy::cast_possible_truncation,

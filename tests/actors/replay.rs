@@ -1,4 +1,4 @@
-//! Recorded steps taken again: those along a path, and those of a record that lies.
+//! Recorded steps taken again, along a path, and from a record that lies.
 
 use crate::system::in_virtual_time;
 use pendularm::record::{AT_ONCE, Content, MAX_LEAP, RecordEntry, ReplayError, replay};

@@ -1,4 +1,4 @@
-//! The node `rosapi`: what it asks of the arm for other nodes and for clients.
+//! The node `rosapi`: its questions to the arm, for other nodes and for clients.
 
 use crate::system::in_virtual_time;
 use actix::prelude::*;
@@ -128,7 +128,8 @@ fn a_question_without_its_field_or_with_arguments_of_another_form_is_refused() {
     });
 }
 
-/// A list of thousands is made for those alone who are about to write it: whoever waits holds none.
+/// A list of thousands is made only for a client that is about to write it: one that waits holds
+/// none.
 #[test]
 fn the_list_is_made_once_there_is_a_place_to_write_it() {
     in_virtual_time(async {

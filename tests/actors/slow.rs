@@ -1,4 +1,4 @@
-//! Clients that take for ever: a frame that has begun has a minute, whatever carries it; who says nothing may stay.
+//! Clients that take for ever: a frame that has begun has a minute, over every transport; a silent client may stay.
 //!
 //! **Invariant:** virtual time, so a minute here is exactly that.
 

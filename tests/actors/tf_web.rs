@@ -1,4 +1,4 @@
-//! Frames for web viewers in virtual time: who gets which, how often, and until when.
+//! Frames for web viewers in virtual time: their receivers, their rates and their ends.
 //!
 //! **Invariant:** virtual time, so messages are counted.
 

@@ -12,7 +12,7 @@ import subprocess
 import threading
 
 BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
-# Far longer than anything takes [s]; who waits so long has failed.
+# Far longer than anything takes [s]; a longer wait is a failure.
 PATIENCE = 30
 
 

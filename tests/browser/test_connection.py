@@ -51,7 +51,7 @@ class Reconnecting(PageTest):
         self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
         self.page.click("#compare-form button[type=submit]")
         self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('not connected')")
-        # It tries again and again meanwhile, and fails: what was said stays.
+        # It tries again and again meanwhile, and fails: the message stays.
         tries = "own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })"
         self.page.run(tries)
         self.page.until("window.tries >= 2", why="two more changes")

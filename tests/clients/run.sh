@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Clients that nobody here wrote, unmodified, against the built program: run.sh PROGRAM. Needs a network the first time,
-# python3, node (20 or newer) with npm, cargo, and Chromium, which is installed if it is missing and this may be done. What it installs stays in here, in folders that git ignores.
+# python3, node (20 or newer) with npm, cargo, and Chromium, which is installed if it is missing and this may be done.
+# It installs into folders in here, which git ignores.
 set -euo pipefail
 program=$(realpath "$1")
 cd "$(dirname "$0")"

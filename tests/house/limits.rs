@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use crate::papers::{table, text};
 use crate::tree::{root, rust_files};
 
-/// The rows of the table: what, limit, beyond it, constant.
+/// The rows of the table: name, limit, effect beyond it, constant.
 fn rows() -> Vec<Vec<String>> {
     let rows = table(
         &text("docs/protocol.md"),

@@ -26,7 +26,7 @@ pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        // `make report` writes there; `src/report` is ours. What the fuzz targets begin with is any bytes.
+        // `make report` writes there; `src/report` is ours. The seeds of the fuzz targets are any bytes.
         let made = [root().join("report"), root().join("fuzz/seeds")].contains(&path);
         if made
             || NOT_OURS
@@ -88,7 +88,7 @@ fn every_test_file_and_fuzz_target_opens_by_saying_what_it_is_for() {
     }
 }
 
-/// Layers: what the innermost may not know. The words are looked for in code, comments apart.
+/// Layers that the innermost may not know. The words are looked for in code, comments apart.
 #[test]
 fn pure_layers_know_only_what_they_may() {
     let world = [
@@ -135,7 +135,7 @@ fn pure_layers_know_only_what_they_may() {
     }
 }
 
-/// Who may write `unsafe`: nobody; where a tool can't do without, the package denies it, and its source says where and why.
+/// Nobody may write `unsafe`. Where a tool can't do without, the package denies it, and its source says where and why.
 #[test]
 fn every_package_forbids_unsafe_code() {
     let all = files(root());

@@ -155,7 +155,7 @@ fn a_reset_a_switch_a_timestep_another_period_and_the_end_of_driving_begin_a_per
         simulation.step();
         assert_ne!(*simulation.effort(), control.effort, "{what}");
     }
-    // What is in force already begins nothing.
+    // A value that is in force already begins nothing.
     let mut simulation = reaching(1e-3, every(0.01));
     simulation.advance(14);
     let before = simulation.clone();

@@ -128,8 +128,8 @@ fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
     }
 }
 
-/// Held effort is stable up to a timestep that depends on the pose, most of all on how far the arm is bent. What is
-/// left of the jolt that gravity gives at the start shrinks at a rate of 1/s at least: to less than 1e-3 rad in 8 s.
+/// Held effort is stable up to a timestep that depends on the pose, most of all on how far the arm is bent. The rest
+/// of the jolt that gravity gives at the start shrinks at a rate of 1/s at least: to less than 1e-3 rad in 8 s.
 #[test]
 fn every_pose_is_stable_with_every_method_at_three_milliseconds() {
     fn check<const N: usize>(gains: Gains<N>, poses: impl Iterator<Item = [f64; N]>) {

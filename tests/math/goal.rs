@@ -8,7 +8,7 @@ const TARGET: DVec2 = dvec2(1.0, 0.5);
 const THERE: DVec2 = TARGET;
 const AWAY: DVec2 = dvec2(1.5, 0.5);
 
-/// A timestep whose multiples, and those of a second, are exact: what is counted here is rules, not rounding.
+/// A timestep whose multiples, and those of a second, are exact: the test counts rules, not rounding.
 const H: f64 = 0.125;
 
 fn goal(success_hold: f64) -> Goal {

@@ -1,4 +1,4 @@
-//! The one-step methods: what they evaluate, where, and how exact they are, against 50-digit values.
+//! The one-step methods: their evaluations, and how exact they are, against 50-digit values.
 
 use std::cell::Cell;
 

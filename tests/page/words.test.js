@@ -47,7 +47,7 @@ test("an axis is linear while values are sane, logarithmic once they explode", (
   const distance = axis.place(1e11) - axis.place(1e9);
   assert.ok(Math.abs(axis.place(1e7) - axis.place(1e5) - distance) < 1e-6);
   assert.ok(axis.place(1) > axis.place(0));
-  // The scale ends; what goes beyond stays at its edge.
+  // The scale ends; values beyond stay at its edge.
   assert.equal(axis.place(1e148), axis.place(1e12));
 });
 

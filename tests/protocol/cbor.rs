@@ -135,7 +135,7 @@ fn an_array_of_float64_is_a_typed_array_in_which_null_is_nan() {
     );
 }
 
-/// Tag 78, a string of 4 bytes per number, little-endian; what an `int32` can't hold is 0.
+/// Tag 78, a string of 4 bytes per number, little-endian; a value that an `int32` can't hold is 0.
 #[test]
 fn an_array_of_int32_is_a_typed_array_too() {
     let definition = json!({"fieldarraylen": [-1, 258, 3_000_000_000_u64, "x"]});
@@ -198,7 +198,7 @@ fn what_does_not_fit_its_type_is_written_as_it_is() {
     expected.extend(text("x"));
     expected.push(0xf5);
     assert_eq!(typed("geometry_msgs/Vector3", json!({"x": true})), expected);
-    // A type that nobody here knows: whatever it is.
+    // A type that nobody here knows.
     assert_eq!(
         typed("demo/X", json!({"x": null})),
         [0xa1, 0x61, b'x', 0xf6]

@@ -1,7 +1,7 @@
 //! A message as it is read for its other forms: the same values as `serde_json`'s own, in a few bytes for each byte of
 //! text.
 //!
-//! **Invariant:** the other reading shares no code with ours; what names mean that come twice is what it makes of them.
+//! **Invariant:** the other reading shares no code with ours; it decides the meaning of names that come twice.
 
 use pendularm::protocol::catalog::types;
 use pendularm::protocol::limits::MAX_FRAME;

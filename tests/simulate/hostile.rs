@@ -1,6 +1,6 @@
 //! Hostile clients: all that has ever made a server like this one stand still, swell or lie, in sizes that virtual time bears.
 //!
-//! Nothing is owed to them. What they must not do is show in what honest clients hear.
+//! Nothing is owed to them. Honest clients must not hear anything of it.
 
 use std::cell::Cell;
 use std::rc::Rc;

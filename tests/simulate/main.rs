@@ -152,7 +152,7 @@ fn watch(began: Instant) {
     });
 }
 
-/// The last line of a failure: what is missing, and the command that shows it again.
+/// The last line of a failure: the fault, and the command that shows it again.
 fn tell(seed: u64, failure: &Failure) {
     println!(
         "{failure}\nmake simulate SEED={seed}: {:.160}",

@@ -33,7 +33,7 @@ use crate::pipe::{Fate, MEANT, Pipe};
 
 /// The cost of a look at the clock of work: a dozen to what the arm may work at a time, three to a slice.
 const LOOK: Duration = Duration::from_micros(400);
-/// Address that clients connect to: what `Host` has to say.
+/// Address that clients connect to: `Host` has to name it.
 const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 /// Most virtual time that passes without a look at what came.
 const GLANCE: Duration = Duration::from_millis(20);

@@ -99,7 +99,7 @@ fn moves_and_swings_are_lost_at_long_steps_only() {
     }
 }
 
-/// A link folded back onto the one before, under a tip a billion times heavier: what is lost lies in the angles' last bits.
+/// A link folded back onto the one before, under a tip a billion times heavier: the loss lies in the angles' last bits.
 #[test]
 fn folded_arms_with_a_heavy_tip_lose_what_the_angles_have_lost() {
     let lost = digits_lost(1e9, PoseShape::Folded, 200).unwrap();

@@ -1,4 +1,4 @@
-//! `pendularm report`: files, resuming, refusals. What is in them is the study's own business.
+//! `pendularm report`: files, resuming, refusals. Their contents are tested in the study.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -234,8 +234,8 @@ fn swing_error(start: State<2>, timestep: f64, duration: f64) -> (Option<f64>, f
     (deviation.known(), off, deviation.largest_uncertainty())
 }
 
-/// 1.34e-12 was served where 4.41e-12 was true; 4.06 rad for 3.78 after 27 s of chaos, 2.92 for 0.94 after 30 s. What is
-/// served now is true within its uncertainty, and where that is of one size with the error none is.
+/// 1.34e-12 was served where 4.41e-12 was true; 4.06 rad for 3.78 after 27 s of chaos, 2.92 for 0.94 after 30 s. The
+/// served value is now true within its uncertainty, and where that is of one size with the error none is.
 #[test]
 fn an_error_that_is_hardly_known_is_not_served() {
     let beside = State::at_rest([0.4, -0.3]);

@@ -168,7 +168,7 @@ fn the_reference_is_what_small_steps_tend_to() {
         ..swing()
     };
     let error = run(request).deviation().unwrap().largest();
-    // (w h)^4 with w of some 5/s is 6e-14; what is left is rounding.
+    // (w h)^4 with w of some 5/s is 6e-14; the rest is rounding.
     assert!(error < 1e-13, "{error:e}");
 }
 

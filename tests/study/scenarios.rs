@@ -1,4 +1,4 @@
-//! The named scenes of the study: those that are quick, here; the others in the report.
+//! The named scenes of the study: the quick ones here, the others in the report.
 
 use pendularm::report::experiments::scenarios::{Scenario, all, live};
 

@@ -33,7 +33,7 @@ pub fn trajectory(positions: &[f64]) -> Value {
     json!({"points": [{"positions": positions}]})
 }
 
-/// Sends a message to `/joint_trajectory`; what is called next happens after it.
+/// Sends a message to `/joint_trajectory`; later calls happen after it.
 pub fn send_trajectory(client: &mut Client, msg: &Value) {
     client.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg}));
 }

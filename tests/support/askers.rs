@@ -117,7 +117,7 @@ struct Asking<T> {
 
 impl<T: Send> Asker<T> for Asking<T> {
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
-        // Who looks for the answer once it is said to be there finds it.
+        // A caller that looks for the answer once it is said to be there finds it.
         let _ = self.answer.send(answer);
         let _ = self.answered.send(self.connection);
     }

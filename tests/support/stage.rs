@@ -239,7 +239,7 @@ impl Client {
         self.receive().await
     }
 
-    /// Hears all that was said until now; what it asks for that itself is not remembered.
+    /// Hears all messages until now; its own questions for that are not remembered.
     pub async fn settle(&mut self) {
         self.0.settle().await;
         self.heard.pop();

@@ -41,7 +41,7 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
     let dropped = gateway_count(&mut client, "messages_dropped");
     assert!(dropped > 200, "{dropped} of 400");
 
-    // Of those that still wait more grow too old.
+    // More of the messages that still wait grow too old.
     let mut received = vec![];
     while received.last() != Some(&399) {
         received.push(deaf.message("/t")["n"].as_u64().unwrap());

@@ -1,4 +1,4 @@
-//! The end of a connection: what it withdraws, what it still owes, and what outlives it.
+//! The end of a connection: its registrations, its last answers, and the state that outlives it.
 //!
 //! **Invariant:** a client that has only stopped sending gets every answer that it is owed.
 

@@ -19,7 +19,7 @@ fn ask_steps(client: &mut Client, function: &str, steps: u64, id: usize) {
             "integrator": "rk4"}}));
 }
 
-/// Hundreds of computations without end have theirs; whoever comes then is not refused, and what they asked for goes with them.
+/// Hundreds of computations without end have theirs. A newcomer is not refused, and their requests go with them.
 #[test]
 fn however_many_computations_wait_a_newcomers_is_done_and_light_calls_are_answered() {
     let runtime = Runtime::with(&["--clients", "1024"]);

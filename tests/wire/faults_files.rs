@@ -24,7 +24,7 @@ fn processor_seconds(runtime: &Runtime) -> f64 {
     (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
 }
 
-/// A client that is one too many: what it is told, and the end.
+/// A client that is one too many: its message, and the end.
 fn is_refused(client: &mut Client) -> String {
     let status = client.receive();
     assert_eq!(status["level"], "error", "{status}");

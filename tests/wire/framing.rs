@@ -1,4 +1,4 @@
-//! Frames: what is one, what is none, and that a malformed one costs nobody anything else.
+//! Frames, other bytes, and that a malformed frame costs nobody anything else.
 //!
 //! **Invariant:** whatever is sent, the connection works afterwards, and nothing inside a malformed frame is executed.
 

@@ -340,7 +340,8 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
     }
     let repeated = "GET / HTTP/1.1\r\nHost: caf\u{e9}.\u{202e}example\r\n\r\n";
     exchange(address, repeated.as_bytes());
-    // The end gives the log little time: what a busy machine has not written by then is missing.
+    // The end gives the log little time: lines that a busy machine has not written by then are
+    // missing.
     runtime.await_line("caf\u{e9}.");
     let log = runtime.end();
     assert_records(&log);

@@ -37,7 +37,7 @@ fn every_goal_has_exactly_one_result_whatever_clients_do_at_the_same_time() {
             })
         })
         .collect();
-    // Who does not read for a second misses results.
+    // A client that does not read for a second misses results.
     let (stop, stopped) = std::sync::mpsc::channel::<()>();
     let reading = std::thread::spawn(move || {
         while let Err(std::sync::mpsc::TryRecvError::Empty) = stopped.try_recv() {

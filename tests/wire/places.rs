@@ -14,7 +14,7 @@ fn serving(clients: &str) -> Logged {
     Logged::start(command, std::process::Stdio::null())
 }
 
-/// So many clients over TCP: half of them silent, the others served.
+/// Clients over TCP: half of them silent, the others served.
 fn occupy(address: SocketAddr, clients: usize) -> Vec<Client> {
     let mut all: Vec<Client> = (0..clients).map(|_| Client::to(address)).collect();
     for client in all.iter_mut().step_by(2) {

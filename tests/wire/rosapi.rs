@@ -1,4 +1,4 @@
-//! rosapi: whoever asks is told what there is, and what is told is so.
+//! rosapi: its answers name everything that there is, and they are true.
 //!
 //! **Invariant:** the expected lists come from the catalog, values from the services that set them.
 

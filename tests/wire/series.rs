@@ -118,7 +118,7 @@ fn a_subscriber_that_pauses_gets_the_rest_of_what_it_had_begun_to_read_whole() {
             assert_eq!(publisher.message("/x")["n"], n);
         }
     }
-    // Some in the middle were dropped; what comes is whole, in order, and ends with the newest.
+    // Some in the middle were dropped; the others are whole, in order, and end with the newest.
     let mut last = None;
     while last != Some(count - 1) {
         let message = slow.message("/x");

@@ -1,4 +1,4 @@
-//! Single steps of a paused arm, and pushes: what they do, what they leave alone, what is refused and in which words.
+//! Single steps of a paused arm, and pushes: their effects, and their refusals in which words.
 //!
 //! **Invariant:** what the arm does is compared bit for bit with the offline stepper; no test looks at the wall clock.
 
@@ -58,7 +58,7 @@ fn a_paused_arm_takes_exactly_the_steps_that_are_asked_for() {
     assert_same(&mut client, &offline);
 }
 
-/// Steps are taken in slices; what the same client sends behind them waits all the same, whoever else steps meanwhile.
+/// Steps are taken in slices; later requests of the same client wait all the same, whoever else steps meanwhile.
 #[test]
 fn what_a_client_sends_behind_its_steps_takes_effect_behind_them() {
     let (runtime, mut client, mut offline) = paused();

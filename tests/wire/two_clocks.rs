@@ -22,7 +22,7 @@ fn paused() -> (Runtime, Client, Simulation<2>) {
     (runtime, client, offline)
 }
 
-/// What a step answers of a simulation.
+/// The answer of a step of a simulation.
 fn stands(steps: u64, simulation: &Simulation<2>) -> Value {
     let State { position, velocity } = simulation.state();
     json!({"steps": steps, "time": simulation.time(), "position": position, "velocity": velocity,

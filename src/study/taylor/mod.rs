@@ -38,8 +38,8 @@ const LAST: usize = 4;
 /// The factor by which a step may be longer than the last.
 const LONGER: f64 = 1.25;
 
-/// Factors by which a step is shortened if its series does not reach so far: the second one if its last terms are [`MUCH`]
-/// too large.
+/// Factors by which a step is shortened if its series does not reach so far: the second one if its last terms are
+/// [`MUCH`] too large.
 const SHORTER: [f64; 2] = [0.95, 0.25];
 const MUCH: f64 = 1e9;
 

@@ -84,7 +84,7 @@ fn the_live_arm_is_the_offline_simulation_bit_for_bit() {
     }
 }
 
-/// Nobody looks in between: what takes a request to its own step is the request itself, not the tick before it.
+/// Nobody looks in between: the request itself takes the arm to its step, not the tick before it.
 #[test]
 fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
     in_virtual_time(async {

@@ -56,7 +56,7 @@ fn a_resume_ends_the_steps_that_are_left_and_says_so() {
     });
 }
 
-/// As if each step had been asked for alone: what comes in between takes effect in between.
+/// As if each step had been asked for alone: requests in between take effect in between.
 #[test]
 fn a_reset_in_between_takes_effect_in_between() {
     in_virtual_time(async {
@@ -74,7 +74,8 @@ fn a_reset_in_between_takes_effect_in_between() {
     });
 }
 
-/// Euler at one-second steps: the free arm overflows within some hundred steps; who waits for a turn then takes none.
+/// Euler at one-second steps: the free arm overflows within some hundred steps. A request that waits for a turn then
+/// takes none.
 #[test]
 fn a_divergence_ends_everybodys_steps() {
     in_virtual_time(async {

@@ -1,4 +1,4 @@
-//! How a connection ends, in virtual time: what is owed to a client that has stopped sending, and the runtime's end.
+//! How a connection ends, in virtual time: the rest for a client that has stopped sending, and the runtime's end.
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 

@@ -1,4 +1,4 @@
-//! Goals that are accepted and goals that are rejected; what a new goal sets in motion.
+//! Goals that are accepted and goals that are rejected, and the effects of a new goal.
 
 use super::*;
 

@@ -1,5 +1,5 @@
-//! Goals from end to end, in virtual time: what is accepted, what is said in which order, and when a goal is reached,
-//! counted in steps.
+//! Goals from end to end, in virtual time: acceptance, the order of messages, and when a goal is reached, counted in
+//! steps.
 //!
 //! Goals are sent as another node sends them. A client's calls are here where the order of responses and messages is
 //! meant, or what is made of their fields.

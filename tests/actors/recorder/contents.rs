@@ -1,4 +1,4 @@
-//! Topics, calls and frames: what a record holds, and what it leaves out.
+//! Topics, calls and frames that a record holds, and those that it leaves out.
 
 use std::collections::HashMap;
 

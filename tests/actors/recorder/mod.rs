@@ -1,4 +1,4 @@
-//! Runs on record: what arm and registry tell, and that it is enough to take every step again.
+//! Runs on record: the reports of arm and registry, which are enough to take every step again.
 
 mod contents;
 mod damage;

@@ -118,7 +118,8 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
     });
 }
 
-/// The search for gains and for a plan are the library's; what is left out is the arm's own.
+/// The search for gains and for a plan are the library's; fields that are left out are the arm's
+/// own.
 #[test]
 fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
     in_real_time(async {

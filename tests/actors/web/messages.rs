@@ -1,4 +1,4 @@
-//! Messages over a WebSocket: what a long one costs, and the forms in which they come.
+//! Messages over a WebSocket: the cost of a long one, and the forms in which they come.
 
 use super::*;
 

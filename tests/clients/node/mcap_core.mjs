@@ -10,7 +10,7 @@ const { parse } = require("@lichtblick/rosmsg");
 const { MessageReader } = require("@lichtblick/rosmsg2-serialization");
 
 const [whole, killed] = process.argv.slice(2);
-/** So many places in which the record is cut; a prime, so that they lie anywhere in a chunk. */
+/** Places in which the record is cut; a prime, so that they lie anywhere in a chunk. */
 const CUTS = 97;
 
 /** Reads messages by the definitions in the file. */

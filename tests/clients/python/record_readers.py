@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 PATIENCE = 60
-# So many places in which a record is cut; a prime, so that they lie anywhere in a chunk.
+# Places in which a record is cut; a prime, so that they lie anywhere in a chunk.
 CUTS = 23
 
 # A record that was ended ends as it begins.
@@ -136,7 +136,7 @@ assert json.loads(asked[0].content) == {"data": True}, asked
 assert answered[0].result and json.loads(answered[0].content) == {"data": True}, answered
 print(f"mcap, mcap-ros2-support: {len(messages)} messages on {len(by_topic)} topics")
 
-# rosbags knows the types of ROS; those of ours it learns from the file.
+# rosbags knows the types of ROS, and learns ours from the file.
 with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
     count = 0
     for connection, _, raw in reader.messages():

@@ -421,6 +421,7 @@ pub const FAULTS: &[Planted] = &[
     planted("enable-6", "keeps the integral while disabled", |_| {
         request(ENABLE, |args| replace(args, "data", &json!(false), &json!(true)))
     }),
+    planted("enable-7", "keeps the effort while paused", |_| request(ENABLE, |args| replace(args, "data", &json!(false), &json!(true)))),
     planted("gains-1", "returns other gains", |_| answer(GAINS, |frame, _| add(&mut frame["values"]["kp"][0], 1.0))),
     planted("gains-2", "a query changes gains", |_| {
         answer(GAINS, |frame, count| add(&mut frame["values"]["kp"][0], f64::from(u32::try_from(count).unwrap())))

@@ -30,7 +30,7 @@ pub(super) const PACKAGES: [Package; 2] = [
     },
 ];
 
-/// Who names whom; the names by which that happens.
+/// Arrows between files, with the names that make them.
 pub(super) type Arrows = BTreeMap<(String, String), BTreeSet<String>>;
 /// A module, and what is named in it.
 type Place = (Module, Option<String>);

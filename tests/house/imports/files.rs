@@ -1,4 +1,4 @@
-//! The files of a package: what each imports, and which paths are in its code.
+//! The files of a package: their imports, and the paths in their code.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,4 @@
-//! The floors of the house: who may name whom.
+//! The floors of the house: which room may name which.
 
 use std::collections::{BTreeMap, BTreeSet};
 

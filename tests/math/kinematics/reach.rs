@@ -46,7 +46,8 @@ fn check_round_trip<const N: usize>(lengths: &[f64; N], present: &[f64; N], targ
     if let (3, Some(phi)) = (N, target.orientation) {
         assert!(turn(forward(lengths, &q).orientation, phi).abs() <= 1e-14);
     }
-    // The joints that a goal commands are the same pose; what a wound angle cannot hold is not asked of it.
+    // The joints that a goal commands are the same pose; digits that a wound angle cannot hold are not
+    // asked of it.
     let commanded = nearest_turn(&q, present);
     let bar = INTERIOR + present.iter().map(|p| f64::EPSILON * p.abs()).sum::<f64>();
     assert!(miss(lengths, &commanded, target) <= bar);

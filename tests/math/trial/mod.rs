@@ -1,5 +1,4 @@
-//! Every transition of a trial: what comes in, what it wants done, and what its status shows; and the sampling of
-//! targets.
+//! Every transition of a trial: its inputs, its requests, and its status; and the sampling of targets.
 
 mod goals;
 mod properties;

@@ -35,7 +35,7 @@ fn a_message_holds_one_object() {
     }
 }
 
-/// A message is read as it comes: what stands behind its object, however late that comes, makes it none.
+/// A message is read as it comes: bytes behind its object, however late they come, make it none.
 #[test]
 fn what_is_behind_the_object_of_a_message_may_come_late() {
     let mut reader = FrameReader::of_messages();

@@ -77,7 +77,7 @@ fn of_two_encodings_the_denser_and_the_smaller_pieces_count() {
             one(Compression::Cbor, None),
             one(Compression::CborRaw, None),
         ),
-        // Binary frames are not cut up: those who ask for them share them, whatever size they give besides.
+        // Binary frames are not cut up: their subscribers share them, whatever size they give besides.
         (
             one(Compression::None, Some(9)),
             one(Compression::Cbor, Some(5)),

@@ -23,7 +23,7 @@ fn responses_count_until_they_have_been_written() {
     assert_eq!(bench.outbox.response_bytes(), 0);
 }
 
-/// Those that take a permit are not among them.
+/// Messages that take a permit are not among them.
 #[test]
 fn short_responses_count_by_themselves() {
     let mut bench = Bench::new();

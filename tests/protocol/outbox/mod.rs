@@ -1,4 +1,4 @@
-//! The outbox of one connection: what waits, what is dropped, what is held back.
+//! The outbox of one connection: messages that wait, are dropped, or are held back.
 //!
 //! **Invariant:** time is told, never waited for.
 

@@ -17,7 +17,7 @@ struct Model {
     /// Queued and held back, in the order of their numbers.
     waiting: Vec<Waiting>,
     throttles: BTreeMap<usize, (Duration, usize, Option<Instant>)>,
-    /// What is left of each, and whether it is a response.
+    /// The rest of each, and whether it is a response.
     in_flight: Vec<(usize, bool)>,
     dropped: u64,
 }

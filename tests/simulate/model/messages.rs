@@ -1,4 +1,4 @@
-//! Messages that a client hears on a topic: those that it is to hear, unchanged, in order and not too often.
+//! Messages that a client hears on a topic: the right ones, unchanged, in order and not too often.
 
 use std::time::Duration;
 

@@ -74,7 +74,7 @@ pub struct Forward {
     pub orphaned: Option<Instant>,
 }
 
-/// Who provides a service of clients, and the turn of the last change.
+/// The provider of a service of clients, and the turn of the last change.
 #[derive(Default, Clone, Copy)]
 pub struct Provided {
     pub provider: Option<u64>,
@@ -103,7 +103,7 @@ pub struct Model {
     pub services: BTreeMap<String, Provided>,
     /// Calls that providers have heard and not decided about.
     pub asked: Vec<Asked>,
-    /// Calls whose caller is gone: whoever answers one is told so.
+    /// Calls whose caller is gone: their provider is told so.
     pub orphans: u64,
     /// Messages that have not come to somebody who did not read.
     pub missed: u64,

@@ -20,7 +20,8 @@ impl Course {
         one.stalled_until = Some(Instant::now() + time);
     }
 
-    /// Another client in the place of one that is done for. Whatever that one sent last may not have arrived.
+    /// Another client in the place of one that is done for. The last messages of that one may not have
+    /// arrived.
     pub(super) fn replace(&mut self, at: usize) -> Honest {
         self.abandon(at);
         self.enter()

@@ -107,7 +107,7 @@ impl Course {
     }
 
     fn intrude(&self) -> Hostile {
-        // Theirs are wide: what they send is to arrive.
+        // Theirs are wide, so that their messages arrive.
         let (client, fate) = self.connect(1 << 16);
         self.court.count("hostile clients");
         Hostile::new(client, fate)
@@ -226,7 +226,7 @@ impl Course {
         self.court.note("burst", format!("{burst:?}").as_bytes());
         let at = self.somebody();
         match burst {
-            // A message in the second half of each interval: what a throttle may let through too early.
+            // A message in the second half of each interval: a throttle might let it through too early.
             Burst::Stream => {
                 let who = self.honest[at].who;
                 let count = 10 + self.court.below(20);

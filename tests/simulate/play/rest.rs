@@ -15,7 +15,7 @@ const LIVENESS: Duration = Duration::from_secs(40);
 const EMPTY: Duration = Duration::from_secs(100);
 
 impl Course {
-    /// Faults and hostile clients are gone: whatever is owed comes.
+    /// Faults and hostile clients are gone: all waiting messages come.
     pub(super) async fn come_to_rest(&mut self) {
         self.hostile.clear();
         self.resume();

@@ -62,7 +62,7 @@ pub struct Workload<'a> {
     pub model: &'a mut Model,
     pub numbers: &'a mut Numbers,
     pub all: &'a mut [Honest],
-    /// Whose turn it is.
+    /// The client whose turn it is.
     pub at: usize,
 }
 

@@ -61,7 +61,7 @@ impl Workload<'_> {
         }
     }
 
-    /// So many messages on a topic that this client advertises.
+    /// This many messages on a topic that this client advertises.
     pub fn publish_on(&mut self, topic: &str, count: usize, payload: impl Fn(&Self) -> String) {
         let (who, link) = (self.me().who, self.me().is_active());
         for _ in 0..count {

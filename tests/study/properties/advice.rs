@@ -1,4 +1,4 @@
-//! The timestep that is advised, tried: what settles in small steps is not lost at it.
+//! The timestep that is advised, tried: an arm that settles in small steps is not lost at it.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! Limits of the timestep: what they divide, and that no pose has a smaller one.
+//! Limits of the timestep divide stable from unstable, and no pose has a smaller one.
 
 use std::f64::consts::PI;
 

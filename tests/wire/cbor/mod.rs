@@ -1,4 +1,4 @@
-//! `compression`: what subscribers over WebSocket get as CBOR and as CDR within CBOR.
+//! `compression`: the messages that subscribers over WebSocket get as CBOR and as CDR within CBOR.
 //!
 //! **Invariant:** binary messages are read here by a decoder of their own, written from the standards.
 

@@ -188,7 +188,7 @@ fn bad_usage_gives_status_2_and_a_line_that_names_it() {
     }
 }
 
-/// Nobody listens on port 1: what is wrong is noticed before anything is sent.
+/// Nobody listens on port 1: the fault is noticed before anything is sent.
 #[test]
 fn a_value_that_cannot_be_read_gives_status_2_before_anything_is_sent() {
     let (list, block) = ("[".repeat(60_000), "- ".repeat(60_000));

@@ -123,7 +123,7 @@ fn hold(stream: &mut TcpStream) {
 /// Publishes this text on the topic, once.
 fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
     move |stream| {
-        // Who has had enough of it does not read the rest.
+        // A client that has had enough does not read the rest.
         let _ = writeln!(
             stream,
             "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"

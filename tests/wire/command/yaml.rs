@@ -1,4 +1,4 @@
-//! YAML: what is written is read as the same value, by `--json` on one line, and what is no value is refused.
+//! YAML: written text is read as the same value, by `--json` on one line, and other text is refused.
 
 use std::io::{self, Write};
 

@@ -1,4 +1,4 @@
-//! The report's folder: what is served from it, and that no path leads out of it.
+//! The report's folder: the files served from it, and that no path leads out of it.
 
 use std::fs;
 #[cfg(unix)]

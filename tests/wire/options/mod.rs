@@ -1,4 +1,4 @@
-//! The command line and the environment: what is taken, what is refused, and in which words.
+//! The command line and the environment: accepted and refused values, with their words.
 //!
 //! **Invariant:** arguments are passed in; with a variable of the environment the program itself is started.
 

@@ -1,4 +1,4 @@
-//! The variables of the environment, tried with the program itself: what its clients see of them is in `launch.rs`.
+//! The variables of the environment, tried with the program itself; `launch.rs` has their effects on clients.
 
 use std::process::Output;
 

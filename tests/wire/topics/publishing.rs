@@ -1,4 +1,5 @@
-//! `advertise`, `unadvertise` and `publish`: whose messages come, to whom, and on which topics.
+//! `advertise`, `unadvertise` and `publish`: the publishers of messages, their receivers, and the
+//! topics.
 
 use super::{delivered, error, pair, publish, received};
 use crate::common::Runtime;

@@ -57,7 +57,8 @@ fn unsubscribe_without_an_id_withdraws_all_and_with_an_id_that_one() {
     );
 }
 
-/// Twenty messages at once, with these `(throttle_rate, queue_length)` subscriptions; what comes and after how long.
+/// Twenty messages at once, with these `(throttle_rate, queue_length)` subscriptions: the messages that come, and
+/// after how long.
 fn throttled(subscriptions: &[(u64, Option<u64>)], expected: usize) -> Vec<(Value, Duration)> {
     let runtime = Runtime::start();
     let (mut publisher, mut subscriber) = (runtime.connect(), runtime.connect());

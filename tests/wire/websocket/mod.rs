@@ -1,4 +1,4 @@
-//! WebSocket on the port: the same rosbridge as over TCP, message by message; who may open one; bytes that mean harm.
+//! WebSocket on the port: the same rosbridge as over TCP, message by message; admission; bytes that mean harm.
 //!
 //! **Invariant:** nothing comes over a WebSocket that was not asked for.
 

@@ -24,6 +24,7 @@ pub const RULES: &[Rule] = &[
     rule("enable-4", "Effort is zero while the controller is disabled", "zeros while the arm swings", no_effort),
     rule("enable-5", "Effort acts once the controller is enabled", "effort that is not zero, and motion", effort_acts),
     rule("enable-6", "Enabling after a disable clears the integral", "an effort near zero again", clears_integral),
+    rule("enable-7", "Disabling ends the effort at once, also while paused", "an effort while enabled, zeros after that", ends_effort),
     rule("gains-1", "Gains are accepted and read back", "kp, ki and kd as they were set", reads_back),
     rule("gains-2", "An empty request changes nothing", "the same gains twice", |bench| is_query(bench, SET_GAINS, &GAINS)),
     rule("gains-3", "kp, ki and kd are optional and apply alone", "the other gains stay", gains_alone),
@@ -122,6 +123,19 @@ fn clears_integral(bench: &mut Bench) -> Got {
     let is_clear = before.iter().zip(&after).all(|(before, after)| after.abs() < 0.4 * before);
     must(is_clear, || format!("effort {} before, {} after", fine(&before), fine(&after)))?;
     Ok(format!("effort {} before, {} after", fine(&before), fine(&after)))
+}
+
+fn ends_effort(bench: &mut Bench) -> Got {
+    let pose = bench.float(0.5, 0.0, 0.0)?;
+    bench.hold(&shifted(&pose, 1.0))?;
+    bench.fresh()?;
+    bench.pause(true)?;
+    let before = bench.fresh()?.effort;
+    must(largest(&before) > 0.1, || format!("effort {} while enabled", list(&before)))?;
+    bench.enable(false)?;
+    let after = bench.fresh()?.effort;
+    near("effort", &after, &bench.each(0.0), 1e-12)?;
+    Ok(format!("{}, then {}", list(&before), list(&after)))
 }
 
 fn reads_back(bench: &mut Bench) -> Got {
