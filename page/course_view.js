@@ -138,6 +138,7 @@ async function begin() {
   setText(byId("course-status"), refusals.join(" "));
   if (mine !== turn) return;
   ready = true;
+  byId("course-dial").inert = false;
   look();
   announce(`Step ${at + 1}: ${STEPS[at].title}. ${STEPS[at].text}`);
   if (paused) slowMotion(mine);
@@ -246,6 +247,8 @@ function makeDial(one) {
   place.replaceChildren();
   const waits = one.guess && guessed < 0;
   place.hidden = !one.dial || waits;
+  // While the scene is being set its values would replace the student's.
+  place.inert = began && !ready;
   if (!one.dial || state.links === 0) return;
   const ms = { unit: "ms", low: 0.1, high: 20, log: true };
   const make = /** @type {Record<string, () => [any, () => number, () => number]>} */ ({

@@ -17,6 +17,7 @@ class CourseTest(PageTest):
         self.page.click(f"#course-steps button:nth-child({number})")
         self.page.until(f"document.querySelector('#course-number').textContent === 'Step {number} of {STEPS}'")
         self.page.until("!document.querySelector('#course-task').hidden")
+        self.page.until("!document.querySelector('#course-dial').inert", why="the scene is set")
 
     def done(self, why):
         self.page.until("document.querySelector('#course-task').className === 'done'", why=why)
