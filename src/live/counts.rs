@@ -94,7 +94,7 @@ impl Telemetry {
     }
 
     /// Notes how many steps a wake-up left owed.
-    pub(crate) fn owes(&mut self, steps: u64, timestep: f64) {
+    pub(crate) fn note_backlog(&mut self, steps: u64, timestep: f64) {
         self.owed = in_f64(steps) * timestep;
     }
 

@@ -164,7 +164,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             self.note_divergence();
             return false;
         }
-        self.telemetry.owes(due - taken, self.simulation.timestep());
+        self.telemetry
+            .note_backlog(due - taken, self.simulation.timestep());
         self.catching_up = taken < due;
         self.catching_up
     }
@@ -201,7 +202,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         if let Some(journal) = &mut self.journal {
             journal.diverge(&self.simulation);
         }
-        self.telemetry.owes(0, 0.0);
+        self.telemetry.note_backlog(0, 0.0);
         if let Some(divergence) = self.simulation.divergence() {
             self.world.note_divergence(divergence);
         }
@@ -210,7 +211,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
 
     /// Time counts from here: the part of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
-        self.telemetry.owes(0, 0.0);
+        self.telemetry.note_backlog(0, 0.0);
         self.pacer
             .restart(self.world.now(), self.simulation.timestep());
     }

@@ -241,7 +241,7 @@ pub struct Course<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
     /// They are on their way.
-    Underway,
+    Moving,
     /// They have arrived.
     Arrived,
     /// They have lost the path.
@@ -258,14 +258,14 @@ impl<const N: usize> Course<N> {
         let duration = self.path.duration();
         if time < duration {
             let excess = self.on_the_way.exceeded(&desired, actual);
-            return excess.map_or(Standing::Underway, Standing::OffPath);
+            return excess.map_or(Standing::Moving, Standing::OffPath);
         }
         let excess = self.at_the_end.exceeded(&desired, actual);
         let stays = self.dwell.stays(time, excess.is_none(), SUCCESS_HOLD);
         match excess {
             None if stays || self.at_the_end.is_any() => Standing::Arrived,
             Some(excess) if time - duration > self.patience => Standing::Late(excess),
-            _ => Standing::Underway,
+            _ => Standing::Moving,
         }
     }
 }

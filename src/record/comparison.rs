@@ -83,7 +83,7 @@ pub enum ReplayError {
     ),
     /// The file ends before a state of the arm.
     #[error("the record was cut before its first state")]
-    Cut,
+    FramePart,
     /// There is no input, or no state behind one.
     #[error("nothing to compare: it has no states of an arm")]
     NoStates,
@@ -137,7 +137,7 @@ impl fmt::Display for ReplayVerdict {
             let gaps = self.losses;
             write!(f, "; {gaps} gaps in the record were left out")?;
         }
-        if self.ending == Some(RecordEnding::Cut) {
+        if self.ending == Some(RecordEnding::FramePart) {
             write!(f, "; the file ends early, and was read up to there")?;
         }
         if let Some(version) = &self.other_version {
@@ -167,7 +167,7 @@ pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
 /// Why there is no state in a record that ends so.
 fn no_states(ending: Option<RecordEnding>) -> ReplayError {
     match ending {
-        Some(RecordEnding::Cut) => ReplayError::Cut,
+        Some(RecordEnding::FramePart) => ReplayError::FramePart,
         _ => ReplayError::NoStates,
     }
 }

@@ -41,7 +41,7 @@ pub enum Content {
         frame: Bytes,
     },
     /// A client's message to the runtime.
-    Heard {
+    NodeMessage {
         /// The topic.
         topic: Topic,
         /// The message, in JSON.
@@ -93,7 +93,7 @@ impl Content {
     pub fn allocated(&self) -> usize {
         let text = match self {
             Self::Published { frame, .. } | Self::Answered { frame, .. } => frame.len(),
-            Self::Heard { msg, .. } => msg.len(),
+            Self::NodeMessage { msg, .. } => msg.len(),
             Self::Called { id, args, .. } => id.len() + args.len(),
             Self::Input { note, .. } => note.len(),
             Self::State { position, .. } => 3 * size_of_val(position.as_slice()),

@@ -44,7 +44,7 @@ pub enum RecordEnding {
     /// It ends as it should.
     Whole,
     /// It was cut, or the program that wrote it was killed.
-    Cut,
+    FramePart,
 }
 
 /// Why a file can't be read on.
@@ -109,7 +109,7 @@ impl<R: Read> Recording<R> {
         let message = match self.reader.next() {
             Some(Ok(message)) => message,
             Some(Err(McapError::UnexpectedEof)) => {
-                self.ending = Some(RecordEnding::Cut);
+                self.ending = Some(RecordEnding::FramePart);
                 return Ok(None);
             }
             Some(Err(error)) => return Err(error.into()),

@@ -145,7 +145,7 @@ impl<W: Write> McapWriter<W> {
                 let frame: PublishFrame = serde_json::from_slice(frame)?;
                 self.message(at, topic, frame.msg.get())
             }
-            Content::Heard { topic, msg } => self.message(at, topic, msg),
+            Content::NodeMessage { topic, msg } => self.message(at, topic, msg),
             Content::Called {
                 client,
                 service,

@@ -148,7 +148,7 @@ class Hostile(PageTest):
     def test_a_window_that_a_foreign_page_opens_is_out_of_its_reach(self):
         page = self.visit("")
         page.run(f"window.opened = window.open('{self.runtime.url}'); 0")
-        # Cut off from its opener, it looks closed to it.
+        # FramePart off from its opener, it looks closed to it.
         page.until("window.opened.closed")
 
     def test_a_page_whose_name_was_pointed_here_can_ask_for_nothing_by_any_method(self):

@@ -146,10 +146,7 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
     };
     let at = |position: [f64; 2], velocity: [f64; 2]| State { position, velocity };
     let rest = [0.0, 0.0];
-    assert_eq!(
-        course.judge(0.5, &at([0.55, 9.0], rest)),
-        Standing::Underway
-    );
+    assert_eq!(course.judge(0.5, &at([0.55, 9.0], rest)), Standing::Moving);
     let Standing::OffPath(excess) = course.judge(0.5, &at([0.25, 0.0], rest)) else {
         panic!("joint 1 is off");
     };
@@ -162,7 +159,7 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
         panic!("joint 2 is too fast");
     };
     assert_eq!((excess.quantity, excess.joint), ("velocity", 1));
-    assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Underway);
+    assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Moving);
     assert!(matches!(
         course.judge(1.6, &at([0.5, 0.6], rest)),
         Standing::Late(_)
@@ -175,7 +172,7 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
     // Arrived is a joint that stays: one that passes through is late.
     let there = [0.5, 0.505];
     for (time, speed, standing) in [
-        (2.0, 0.9, Standing::Underway),
+        (2.0, 0.9, Standing::Moving),
         (2.0 + SUCCESS_HOLD, 0.9, Standing::Arrived),
         (3.0, 0.9, Standing::Arrived),
     ] {
@@ -185,9 +182,9 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
         panic!("joint 1 moves");
     };
     assert_eq!((excess.quantity, excess.joint), ("velocity", 0));
-    assert_eq!(course.judge(3.1, &at(there, rest)), Standing::Underway);
+    assert_eq!(course.judge(3.1, &at(there, rest)), Standing::Moving);
     course.patience = f64::INFINITY;
-    assert_eq!(course.judge(1e300, &at([9.0; 2], rest)), Standing::Underway);
+    assert_eq!(course.judge(1e300, &at([9.0; 2], rest)), Standing::Moving);
     course.at_the_end = Tolerance {
         position: [None; 2],
         velocity: [None; 2],

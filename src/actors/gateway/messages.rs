@@ -179,7 +179,7 @@ pub enum Tapped<'a> {
     /// A message of the runtime, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
     /// A client's message on a topic that the runtime listens to.
-    Heard(Topic, &'a Payload),
+    NodeMessage(Topic, &'a Payload),
     /// A client's call of one of the runtime's services.
     Called {
         /// The client.
@@ -234,11 +234,11 @@ pub struct Deliver {
     /// The message, shared by all subscribers who want it in this form.
     pub frame: Bytes,
     /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
-    pub underway: Option<Underway>,
+    pub underway: Option<DeliveryGuard>,
 }
 
 /// Shared by the deliveries of a message whose publisher waits: it goes on when the last of them is dropped.
-pub type Underway = Arc<oneshot::Sender<()>>;
+pub type DeliveryGuard = Arc<oneshot::Sender<()>>;
 
 /// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
 #[derive(Message, Clone)]

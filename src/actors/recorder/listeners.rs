@@ -39,7 +39,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
     Box::new(move |what| {
         let length = match &what {
             Tapped::Published(_, frame) | Tapped::Answered { frame, .. } => frame.len(),
-            Tapped::Heard(_, msg) => msg.line().len(),
+            Tapped::NodeMessage(_, msg) => msg.line().len(),
             Tapped::Called { id, args, .. } => {
                 args.line().len() + id.map_or(0, |id| id.line().len())
             }
@@ -52,7 +52,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
                 topic,
                 frame: copied(frame),
             },
-            Tapped::Heard(topic, msg) => Content::Heard {
+            Tapped::NodeMessage(topic, msg) => Content::NodeMessage {
                 topic,
                 msg: msg.line().into(),
             },

@@ -273,7 +273,7 @@ mod tests {
     }
 
     fn message(bytes: usize) -> Content {
-        Content::Heard {
+        Content::NodeMessage {
             topic: Topic::JointTrajectory,
             msg: "x".repeat(bytes).into(),
         }

@@ -15,7 +15,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::trajectory::Heard;
+use crate::protocol::messages::trajectory::NodeMessage;
 use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
@@ -34,7 +34,7 @@ pub struct ServiceCall {
 /// A client's message on a topic that the runtime subscribes to, as the registry has it.
 pub struct TopicMessage {
     /// The message, as far as the runtime needs it.
-    pub heard: Heard,
+    pub heard: NodeMessage,
     /// The way back, for an error status.
     pub respond: Recipient<Respond>,
     /// The client.

@@ -11,21 +11,21 @@ use crate::protocol::wire::text;
 
 /// A message as the runtime's own listener hears it, without the points of a long trajectory that do not count.
 #[derive(Debug, Clone)]
-pub struct Heard {
+pub struct NodeMessage {
     /// The message.
     pub msg: Payload,
     /// How many points of it were left out, all of them before its first.
     pub left_out: usize,
 }
 
-impl From<Payload> for Heard {
+impl From<Payload> for NodeMessage {
     /// The whole message.
     fn from(msg: Payload) -> Self {
         Self { msg, left_out: 0 }
     }
 }
 
-impl Heard {
+impl NodeMessage {
     /// Reads the setpoint as [`joint_trajectory`] does, and names its fields as they were in the whole message.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
-use super::messages::trajectory::Heard;
+use super::messages::trajectory::NodeMessage;
 use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
@@ -79,7 +79,7 @@ pub enum Op {
         /// The message, an object.
         msg: Payload,
         /// The part of it that the runtime's own listener needs, where the message is long.
-        heard: Option<Heard>,
+        heard: Option<NodeMessage>,
     },
     /// Delivers messages that go out as they have come in.
     PublishLines(Series),

@@ -4,7 +4,7 @@
 
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::trajectory::{Heard, TrajectoryError};
+use crate::protocol::messages::trajectory::{NodeMessage, TrajectoryError};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -21,7 +21,7 @@ pub fn joint_names<const N: usize>() -> [&'static str; N] {
 ///
 /// # Errors
 /// If the message holds none for this arm.
-pub fn read_setpoint<const N: usize>(heard: &Heard) -> Result<Setpoint<N>, TrajectoryError> {
+pub fn read_setpoint<const N: usize>(heard: &NodeMessage) -> Result<Setpoint<N>, TrajectoryError> {
     let request = heard.setpoint(&joint_names::<N>())?;
     // The reader has checked how many they are.
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
@@ -35,7 +35,7 @@ pub fn read_setpoint<const N: usize>(heard: &Heard) -> Result<Setpoint<N>, Traje
 ///
 /// # Errors
 /// If the message does not hold one for each joint.
-pub fn read_effort<const N: usize>(heard: &Heard) -> Result<[f64; N], Rejections> {
+pub fn read_effort<const N: usize>(heard: &NodeMessage) -> Result<[f64; N], Rejections> {
     let args = Arguments::Object(heard.msg.clone());
     let mut fields = Fields::of_message(&args, Topic::EffortCommands)?;
     let effort = fields.array("data", Bound::Finite);

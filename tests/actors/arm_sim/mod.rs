@@ -40,7 +40,7 @@ use tokio::time::{Instant, sleep};
 
 /// Everything that the arm has said, in order.
 #[derive(Clone, Default)]
-pub struct Heard(Rc<RefCell<Vec<Said>>>);
+pub struct NodeMessage(Rc<RefCell<Vec<Said>>>);
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Said {
@@ -50,7 +50,7 @@ pub enum Said {
     Answered,
 }
 
-impl Heard {
+impl NodeMessage {
     fn take(&self) -> Vec<Said> {
         std::mem::take(&mut self.0.borrow_mut())
     }
@@ -71,7 +71,7 @@ impl Heard {
 }
 
 /// Stands in for the registry.
-struct Ear(Heard);
+struct Ear(NodeMessage);
 
 impl Actor for Ear {
     type Context = Context<Self>;
@@ -126,7 +126,7 @@ pub struct ArmBench<const N: usize> {
     /// The ways by which clients' calls and messages come to it.
     routes: Nodes,
     ear: Addr<Ear>,
-    pub heard: Heard,
+    pub heard: NodeMessage,
     pub gauges: Arc<Gauges>,
 }
 
@@ -135,7 +135,7 @@ where
     Gains<N>: Default,
 {
     pub fn new(arm: Arm<N>) -> Self {
-        let heard = Heard::default();
+        let heard = NodeMessage::default();
         let ear = Ear(heard.clone()).start();
         let publish = ear.clone().recipient();
         let gauges = Arc::new(Gauges::default());

@@ -12,7 +12,12 @@ fn a_record_that_was_cut_anywhere_is_read_up_to_there() {
     let mut longest = 0;
     for length in (0..file.len()).step_by(997) {
         let (part, ending) = passages(&file[..length]);
-        assert_eq!(ending, RecordEnding::Cut, "{length} of {}", file.len());
+        assert_eq!(
+            ending,
+            RecordEnding::FramePart,
+            "{length} of {}",
+            file.len()
+        );
         assert_eq!(part[..], all[..part.len()]);
         assert!(part.len() >= longest);
         longest = part.len();

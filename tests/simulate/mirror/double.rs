@@ -8,7 +8,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Service;
-use pendularm::protocol::messages::trajectory::Heard;
+use pendularm::protocol::messages::trajectory::NodeMessage;
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
@@ -111,7 +111,7 @@ impl<const N: usize> Mirror<N> {
     }
 
     /// A trajectory: its last point is the setpoint.
-    pub(super) fn point(&mut self, heard: &Heard) {
+    pub(super) fn point(&mut self, heard: &NodeMessage) {
         if let Ok(request) = heard.setpoint(&joint_names::<N>())
             && let (Ok(position), Ok(velocity)) =
                 (request.position.try_into(), request.velocity.try_into())

@@ -7,7 +7,7 @@ use serde_json::value::RawValue;
 use tokio::time::Instant;
 
 use super::offline::compute;
-use super::{Asked, Heard, Model, absolute};
+use super::{Asked, Model, NodeMessage, absolute};
 use crate::court::Court;
 use crate::honest::{Expect, Honest};
 use crate::json::Json;
@@ -20,7 +20,7 @@ impl Model {
         &mut self,
         court: &Court,
         honest: &Honest,
-        frame: &Heard<'_>,
+        frame: &NodeMessage<'_>,
         text: &str,
     ) {
         let (Some(id), Some(service), Some(args)) = (frame.id, &frame.service, frame.args) else {
@@ -53,7 +53,7 @@ impl Model {
         &mut self,
         court: &Court,
         honest: &mut Honest,
-        frame: &Heard<'_>,
+        frame: &NodeMessage<'_>,
         text: &str,
     ) {
         let id = frame.id.map_or("", RawValue::get);
@@ -115,7 +115,7 @@ impl Model {
         &self,
         court: &Court,
         honest: &mut Honest,
-        frame: &Heard<'_>,
+        frame: &NodeMessage<'_>,
         text: &str,
     ) {
         let id = frame.id.map_or("", RawValue::get);

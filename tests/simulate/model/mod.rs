@@ -22,7 +22,7 @@ use crate::json::Json;
 /// A frame, as far as all of them are alike.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Heard<'a> {
+pub struct NodeMessage<'a> {
     op: String,
     #[serde(borrow, default, deserialize_with = "there")]
     id: Option<&'a RawValue>,
@@ -143,7 +143,7 @@ impl Model {
     }
 
     fn hear_text(&mut self, court: &Court, honest: &mut Honest, text: &str) {
-        let frame: Heard<'_> = match serde_json::from_str(text) {
+        let frame: NodeMessage<'_> = match serde_json::from_str(text) {
             Ok(frame) => frame,
             Err(why) => {
                 return court.wrong(format!("client {} heard {text:.200}: {why}", honest.who));
@@ -165,7 +165,13 @@ impl Model {
         }
     }
 
-    fn hear_status(&mut self, court: &Court, honest: &mut Honest, frame: &Heard<'_>, text: &str) {
+    fn hear_status(
+        &mut self,
+        court: &Court,
+        honest: &mut Honest,
+        frame: &NodeMessage<'_>,
+        text: &str,
+    ) {
         let msg: Value = serde_json::from_str(text).unwrap_or_default();
         let msg = msg["msg"].as_str().unwrap_or_default();
         match frame.level.as_deref() {
@@ -206,7 +212,7 @@ impl Model {
         }
     }
 
-    fn hear_piece(&mut self, court: &Court, honest: &mut Honest, frame: Heard<'_>) {
+    fn hear_piece(&mut self, court: &Court, honest: &mut Honest, frame: NodeMessage<'_>) {
         let (Some(id), Some(data), Some(num), Some(total)) =
             (frame.id, frame.data, frame.num, frame.total)
         else {

@@ -189,7 +189,7 @@ impl<const N: usize> Kernel<N> {
         &mut self,
         name: &str,
         msg: &Payload,
-        heard: &messages::trajectory::Heard,
+        heard: &messages::trajectory::NodeMessage,
         id: Option<&Payload>,
     ) {
         let topic = Topic::from_name(name);

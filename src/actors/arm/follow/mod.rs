@@ -263,7 +263,7 @@ impl<const N: usize> PathFollower<N> {
             goal.client.feed_back(values);
         }
         let next = match standing {
-            Standing::Underway | Standing::Arrived => desired,
+            Standing::Moving | Standing::Arrived => desired,
             Standing::OffPath(_) | Standing::Late(_) => at_rest(&motion.state),
         };
         let moved = MoveSetpoint {
@@ -283,7 +283,7 @@ impl<const N: usize> PathFollower<N> {
             return self.tell_why(ctx);
         }
         let (status, code, why) = match standing {
-            Standing::Underway => {
+            Standing::Moving => {
                 if let Some(before) = self.timer.take() {
                     ctx.cancel_future(before);
                 }

@@ -163,17 +163,17 @@ impl<const N: usize> ArmSim<N> {
     /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         self.end_orphaned_command();
-        let owes = self.arm.advance_to_now();
-        Self::breathe(owes, ctx);
+        let is_behind = self.arm.advance_to_now();
+        Self::breathe(is_behind, ctx);
     }
 
     /// Takes up what is owed after a breather.
-    fn breathe(owes: bool, ctx: &mut Context<Self>) {
-        if owes {
+    fn breathe(is_behind: bool, ctx: &mut Context<Self>) {
+        if is_behind {
             ctx.run_later(BREATHER, |node, ctx| {
                 node.end_orphaned_command();
-                let owes = node.arm.catch_up();
-                Self::breathe(owes, ctx);
+                let is_behind = node.arm.catch_up();
+                Self::breathe(is_behind, ctx);
             });
         }
     }

@@ -8,7 +8,7 @@ use serde_json::value::{RawValue, to_raw_value};
 
 use super::OpReader;
 use crate::protocol::catalog::{Field, Topic};
-use crate::protocol::messages::trajectory::{self, Heard};
+use crate::protocol::messages::trajectory::{self, NodeMessage};
 use crate::protocol::op::{Arguments, MAX_ARGS, Problem};
 use crate::protocol::wire::json;
 use crate::protocol::wire::payload::Payload;
@@ -39,7 +39,7 @@ impl OpReader<'_> {
     }
 
     /// Returns the part of a long message that the runtime itself needs, where it listens to the topic.
-    pub(super) fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<Heard>, Problem> {
+    pub(super) fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<NodeMessage>, Problem> {
         let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
         if !is_ours || msg.get().len() <= USUAL {
             return Ok(None);
@@ -50,7 +50,7 @@ impl OpReader<'_> {
         };
         self.within(MAX_ARGS, "msg", &text)?;
         let msg = RawValue::from_string(text).ok().map(Payload::from);
-        Ok(msg.map(|msg| Heard { msg, left_out }))
+        Ok(msg.map(|msg| NodeMessage { msg, left_out }))
     }
 }
 

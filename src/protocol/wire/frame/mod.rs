@@ -13,7 +13,7 @@ mod raw;
 use bytes::Bytes;
 
 pub(super) use self::raw::start_of;
-pub use self::raw::{Cut, Frame, FrameError, KEPT_START, RawFrame};
+pub use self::raw::{Frame, FrameError, FramePart, KEPT_START, RawFrame};
 use super::nesting::{Event, Nesting};
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
@@ -142,13 +142,13 @@ impl FrameReader {
     }
 
     /// Cuts off the next part of the stream. `None` means that more bytes are needed, not that the stream has ended.
-    pub fn cut(&mut self) -> Option<Cut> {
+    pub fn cut(&mut self) -> Option<FramePart> {
         if let Some(lines) = self.series() {
-            return Some(Cut::Lines(lines));
+            return Some(FramePart::Lines(lines));
         }
         Some(match self.next_raw()? {
-            Ok(frame) => Cut::Frame(frame),
-            Err(error) => Cut::Error(error, std::mem::take(&mut self.refused)),
+            Ok(frame) => FramePart::Frame(frame),
+            Err(error) => FramePart::Error(error, std::mem::take(&mut self.refused)),
         })
     }
 

@@ -59,7 +59,7 @@ pub enum FrameError {
 
 /// The next part of a stream.
 #[derive(Debug)]
-pub enum Cut {
+pub enum FramePart {
     /// Messages of a client on a topic of clients that can go out as they are.
     Lines(Series),
     /// Any other frame.

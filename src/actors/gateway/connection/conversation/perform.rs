@@ -17,7 +17,9 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{
     self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
 };
-use crate::protocol::wire::frame::{Cut, Foreign, FrameError, FrameReader, RawFrame, is_host_line};
+use crate::protocol::wire::frame::{
+    Foreign, FrameError, FramePart, FrameReader, RawFrame, is_host_line,
+};
 use crate::protocol::wire::payload::Payload;
 
 /// The error for a client that asks for binary frames over raw TCP.
@@ -28,20 +30,20 @@ const UNREADABLE: &str = "a frame could not be read";
 
 impl Reader {
     /// Performs what has been cut off the stream, to its end.
-    pub(super) async fn take<I: Inbound>(&mut self, cut: Cut, input: &mut I) {
+    pub(super) async fn take<I: Inbound>(&mut self, cut: FramePart, input: &mut I) {
         let frame = match cut {
-            Cut::Frame(frame) => frame,
-            Cut::Lines(lines) => {
+            FramePart::Frame(frame) => frame,
+            FramePart::Lines(lines) => {
                 self.speaks_json = true;
                 self.shared.outgoing.set_singly(false);
                 return self.perform(None, Op::PublishLines(lines), 0).await;
             }
-            Cut::Error(FrameError::NotAnObject(start), _)
+            FramePart::Error(FrameError::NotAnObject(start), _)
                 if !self.speaks_json && !self.takes_binary() && is_host_line(&start) =>
             {
                 return self.refuse(Foreign::Http.explanation());
             }
-            Cut::Error(error, start) => {
+            FramePart::Error(error, start) => {
                 return self.act_on(op::read_start(&start, &error), 0).await;
             }
         };

@@ -19,7 +19,7 @@ use crate::actors::gateway::messages::{Disconnect, Finish, Retire};
 use crate::actors::resources::memory::Permit;
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
-use crate::protocol::wire::frame::{Cut, FrameReader};
+use crate::protocol::wire::frame::{FramePart, FrameReader};
 
 /// The error for a frame that takes longer than [`FRAME_TIME`](crate::actors::gateway::limits::FRAME_TIME).
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
@@ -215,7 +215,7 @@ impl Reader {
         &mut self,
         input: &mut I,
         chunk: &mut BytesMut,
-    ) -> std::io::Result<Option<Cut>> {
+    ) -> std::io::Result<Option<FramePart>> {
         while !self.shared.may_read() && !self.shared.is_finishing() {
             self.wait_for_room(input, chunk).await?;
         }

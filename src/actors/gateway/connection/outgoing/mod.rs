@@ -25,7 +25,7 @@ use self::news::News;
 use self::patience::Patience;
 use crate::actors::gateway::connection::unread::UnreadSource;
 use crate::actors::gateway::limits::{STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES};
-use crate::actors::gateway::messages::{Deliver, Throttle, Underway};
+use crate::actors::gateway::messages::{Deliver, DeliveryGuard, Throttle};
 use crate::actors::panics::contained;
 use crate::actors::resources::gauges::Gauges;
 use crate::protocol::outbox::{MAX_AGE, Outbox};
@@ -46,7 +46,7 @@ pub(super) struct Outgoing {
     patience: Patience,
     news: News,
     /// Messages whose publishers wait until they have been offered to the socket.
-    underway: RefCell<Vec<Underway>>,
+    underway: RefCell<Vec<DeliveryGuard>>,
     writer: RefCell<Option<WriterPart>>,
 }
 

@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
 use crate::actors::gateway::encoded::{Made, ToEncode};
-use crate::actors::gateway::messages::{Deliver, Handled, Publish, Tapped, Underway};
+use crate::actors::gateway::messages::{Deliver, DeliveryGuard, Handled, Publish, Tapped};
 use crate::actors::gateway::registry::state::Registry;
 use crate::actors::gateway::registry::tables::topics::Subscriber;
 use crate::actors::resources::aside::{WorkKind, aside};
@@ -25,12 +25,12 @@ use crate::protocol::op::{Compression, Encoding};
 /// Holds a publisher back until its message has been offered to the socket of every subscriber.
 #[derive(Default)]
 pub(crate) struct Backpressure {
-    underway: Option<(Underway, oneshot::Receiver<()>)>,
+    underway: Option<(DeliveryGuard, oneshot::Receiver<()>)>,
 }
 
 impl Backpressure {
     /// Makes the guard that goes with the message to a subscriber.
-    fn underway(&mut self) -> Underway {
+    fn underway(&mut self) -> DeliveryGuard {
         let (underway, _) = self.underway.get_or_insert_with(|| {
             let (underway, end) = oneshot::channel();
             (Arc::new(underway), end)
@@ -100,7 +100,7 @@ impl Registry {
     fn deliver_encoded(
         &self,
         message: ToEncode,
-        underway: Option<Underway>,
+        underway: Option<DeliveryGuard>,
         ctx: &mut Context<Self>,
     ) {
         let spelling = Arc::clone(&message.spelling);
@@ -116,7 +116,12 @@ impl Registry {
         }));
     }
 
-    fn deliver_made(&self, spelling: &str, made: &[(Encoding, Made)], underway: Option<&Underway>) {
+    fn deliver_made(
+        &self,
+        spelling: &str,
+        made: &[(Encoding, Made)],
+        underway: Option<&DeliveryGuard>,
+    ) {
         let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
             return;
         };
@@ -134,7 +139,7 @@ impl Registry {
         subscriber: &Subscriber,
         name: &Arc<str>,
         made: &Made,
-        underway: Option<&Underway>,
+        underway: Option<&DeliveryGuard>,
     ) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
@@ -190,7 +195,12 @@ fn is_sent_plain(encoding: Encoding, plain: &Bytes) -> bool {
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
-fn deliver(subscriber: &Subscriber, topic: &Arc<str>, frame: Bytes, underway: Option<Underway>) {
+fn deliver(
+    subscriber: &Subscriber,
+    topic: &Arc<str>,
+    frame: Bytes,
+    underway: Option<DeliveryGuard>,
+) {
     subscriber.outlet.do_send(Deliver {
         topic: Some(Arc::clone(topic)),
         frame,

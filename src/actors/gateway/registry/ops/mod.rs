@@ -24,7 +24,7 @@ use crate::actors::gateway::registry::tables::census::Use;
 use crate::actors::gateway::registry::tables::services::Provider;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic};
-use crate::protocol::messages::trajectory::Heard;
+use crate::protocol::messages::trajectory::NodeMessage;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::Op;
@@ -158,7 +158,7 @@ impl Registry {
         origin: FrameOrigin,
         topic: &str,
         msg: &Payload,
-        heard: Option<Heard>,
+        heard: Option<NodeMessage>,
         ctx: &mut Context<Self>,
     ) -> Handled {
         if let Err(why) = refuse_runtime_topic(topic) {
@@ -187,7 +187,7 @@ impl Registry {
             return pace.and(Handled::at_once());
         };
         if let Some(topic) = Topic::from_name(topic) {
-            self.tap.pass(Tapped::Heard(topic, msg));
+            self.tap.pass(Tapped::NodeMessage(topic, msg));
         }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
