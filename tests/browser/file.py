@@ -21,6 +21,7 @@ def main(file):
     with Browser() as browser:
         page = browser.page(f"{page_file.as_uri()}#step=4")
         page.until("document.body.innerText.includes('A better method?')", why="the step that the link names")
+        page.until("!document.querySelector('#course-start').disabled", why="an arm in the page")
         page.click("#course-start")
         page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'", why="the limit, by the kernel")
         assert not page.complaints, page.complaints

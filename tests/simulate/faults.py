@@ -150,7 +150,7 @@ def main():
     if sys.argv[1:] == ["check"]:
         sys.exit(1 if misplaced(ROOT, FAULTS) else 0)
     chosen = [int(word) for word in sys.argv[1:]] or list(range(1, len(FAULTS) + 1))
-    parts = ("src", "build.rs", "page", "tests", "client", "fuzz/src", "benches/src", "benches/Cargo.toml", "Cargo.toml", "Cargo.lock",
+    parts = ("src", "build.rs", "page", "tests", "client", "wasm", "fuzz/src", "benches/src", "benches/Cargo.toml", "Cargo.toml", "Cargo.lock",
              "README.md")
     missing = plant(ROOT, COPY, parts, FAULTS)
     lost = [number for number in missing if number in chosen]
