@@ -47,7 +47,7 @@ export async function takeBack() {
   announce("Undone.");
 }
 
-/** Applies what is given, and gives the refusals. The servo comes last, so that it never acts on half of the settings. */
+/** Applies what is given, and gives the refusals. The controller comes last, so that it never acts on half of the settings. */
 export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, servo, setpoint, start }) {
   applying = true;
   const answers = [];

@@ -1,5 +1,5 @@
 // @ts-check
-// The settings: integrator and timestep, servo and gains, gravity, masses, lengths, setpoint and pushes.
+// The settings: integrator and timestep, controller and gains, gravity, masses, lengths, setpoint and pushes.
 // Invariant: a control changes only to values that the runtime accepted. A refusal is shown beside it.
 
 import { warn } from "./announce.js";

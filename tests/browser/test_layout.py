@@ -142,7 +142,7 @@ class Phone(Free, Steady, Access, PageTest):
 
     def test_a_lesson_brings_its_text_and_the_arm_into_sight(self):
         self.page.click("#lesson-limit")
-        self.page.until("document.querySelector('#lesson-text').textContent.startsWith('The servo steps')")
+        self.page.until("document.querySelector('#lesson-text').textContent.startsWith('The timestep is a good fifth')")
         top, bottom = self.page.run("[document.querySelector('#lesson-text').getBoundingClientRect().top, document.querySelector('#arm').getBoundingClientRect().bottom]")
         self.assertTrue(0 <= top < bottom <= 844, (top, bottom))
 

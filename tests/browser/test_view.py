@@ -82,7 +82,7 @@ class TwoLinks(View, Sums, PageTest):
         self.runtime.call("/ik_action/send_goal", x=0.4, y=1.1)
         self.page.until("document.querySelector('#goal-text').textContent.startsWith('On the way')")
         self.assertGreater(self.image("#arm").count(self.color("target")), 20)
-        self.assertIn("servo is off", self.page.text("#notice"))
+        self.assertIn("controller is off", self.page.text("#notice"))
         self.page.click("#notice button")
         self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
         self.page.until("document.querySelector('#announce-polite').textContent === 'Target reached.'")
