@@ -212,7 +212,7 @@ export function limitText(limit) {
 
 /** The word for the energy since the last reset: drift only if nothing puts any in or takes any out. */
 export function energyName(/** @type {{enabled: boolean | null, pushed: boolean}} */ { enabled, pushed }) {
-  if (enabled) return "work done";
+  if (enabled) return "work";
   return pushed ? "pushed in" : "drift";
 }
 

@@ -112,7 +112,7 @@ class Laptop(Free, Steady, PageTest):
         clipped = """[...document.querySelectorAll('#panel figcaption')].filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth)
             .map((one) => one.textContent)"""
         self.page.click("#lesson-limit")
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work done'")
+        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")
         for _ in range(40):
             self.assertEqual(self.page.run(clipped), [])
             time.sleep(0.1)

@@ -135,7 +135,7 @@ class Right(Lesson):
     def test_energy_that_the_servo_puts_in_is_no_drift(self):
         self.page.until("document.querySelector('#legend-drift-name').textContent === 'drift'")
         self.page.click("#servo")
-        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work done'")
+        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")
         self.page.click("#servo")
         self.page.until("document.querySelector('#legend-drift-name').textContent === 'drift'")
 

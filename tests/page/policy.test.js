@@ -148,7 +148,7 @@ test("how often the control law runs is said in steps and in time", () => {
 
 test("energy drifts only if nothing puts any in", () => {
   assert.equal(energyName({ enabled: false, pushed: false }), "drift");
-  assert.equal(energyName({ enabled: true, pushed: false }), "work done");
+  assert.equal(energyName({ enabled: true, pushed: false }), "work");
   assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
 });
 
