@@ -10,9 +10,9 @@ say() { echo "test-dist: $*"; }
 fail() { echo "test-dist: $*" >&2; exit 1; }
 
 work=$(mktemp -d)
-server=
+. scripts/try-program.sh
 finish() {
-    [ -z "$server" ] || kill -KILL "$server" 2>/dev/null || true
+    stop_program
     rm -rf "$work"
 }
 trap finish EXIT
@@ -27,21 +27,8 @@ cp "$work"/pendularm-*/bin/pendularm "$work/empty"
 grep -q '^glam ' "$work"/pendularm-*/NOTICE-THIRD-PARTY.txt || fail "no notices"
 alone=(chroot "$work/empty")
 "${alone[@]}" /pendularm --version 2>/dev/null || alone=(unshare -r chroot "$work/empty")
-"${alone[@]}" /pendularm --bind 127.0.0.1:0 --log off >"$work/out" &
-server=$!
-for _ in $(seq 300); do
-    grep -q '^listening on ' "$work/out" && break
-    sleep 0.1
-done
-port=$(sed -n 's/^listening on .*://p' "$work/out")
-[ -n "$port" ] || fail "no listening line within 30 s"
-exec 3<>"/dev/tcp/127.0.0.1/$port"
-echo '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' >&3
-IFS= read -r -t 30 reply <&3 || fail "no answer within 30 s"
-[[ $reply == *'"result":true'* ]] || fail "$reply"
-kill -TERM "$server"
-wait "$server" || fail "exit status $?"
-server=
+try_program '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' '*"result":true*' \
+    "${alone[@]}" /pendularm --bind 127.0.0.1:0 --log off
 
 say "the wheel, in a fresh environment"
 python3 -m venv "$work/environment"
@@ -66,5 +53,5 @@ environment/bin/pendularm --version
 
 say "the page, from disk"
 cd "$root"
-python3 tests/browser/file.py dist/pendularm.html
+FORM=file PAGE=dist/pendularm.html PYTHONDONTWRITEBYTECODE=1 python3 tests/browser/run.py -k sandboxed_frame -k mark_comes_after_the_guess
 say "ok"

@@ -10,9 +10,9 @@ say() { echo "test-submission: $*"; }
 fail() { echo "test-submission: $*" >&2; exit 1; }
 
 work=$(mktemp -d)
-server=
+. scripts/try-program.sh
 finish() {
-    [ -z "$server" ] || kill -KILL "$server" 2>/dev/null || true
+    stop_program
     rm -rf "$work"
 }
 trap finish EXIT
@@ -42,23 +42,6 @@ CARGO_NET_OFFLINE=true "${cut[@]}" make build
 [ ! -e "$CARGO_HOME/registry" ] || fail "Cargo fetched something: $(ls "$CARGO_HOME/registry")"
 
 say "starting the program on a free port"
-ARM_SIM_BIND=127.0.0.1:0 ARM_SIM_LINKS=3 ./target/release/pendularm >"$work/out" 2>"$work/err" &
-server=$!
-for _ in $(seq 600); do
-    grep -q '^listening on 127\.0\.0\.1:[1-9]' "$work/out" && break
-    kill -0 "$server" 2>/dev/null || break
-    sleep 0.1
-done
-grep '^listening on 127\.0\.0\.1:[1-9]' "$work/out" || fail "no listening line within 60 s: $(cat "$work/out" "$work/err")"
-port=$(sed -n 's/^listening on .*://p' "$work/out")
-exec 3<>"/dev/tcp/127.0.0.1/$port"
-echo '{"op":"call_service","service":"/arm_sim/set_params","id":1}' >&3
-IFS= read -r -t 60 reply <&3 || fail "no response within 60 s: $(cat "$work/err")"
-echo "$reply"
-[[ $reply == *'"lengths":['*,*,*']'*'"result":true'* ]] || fail "not the parameters of a 3-link arm"
-kill -TERM "$server"
-status=0
-wait "$server" || status=$?
-server=
-[ "$status" -eq 0 ] || fail "exit status $status after SIGTERM: $(cat "$work/err")"
+try_program '{"op":"call_service","service":"/arm_sim/set_params","id":1}' '*"lengths":\[*,*,*\]*"result":true*' \
+    env ARM_SIM_BIND=127.0.0.1:0 ARM_SIM_LINKS=3 ./target/release/pendularm
 say "ok: $archive builds offline, starts, answers, and ends with status 0"
