@@ -165,8 +165,8 @@ attack: ## Attack the program in a hundred ways and measure what a healthy clien
 	@echo "make attack: some ten minutes; installs redis-server and mosquitto as bench-load does, and attacks them too"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
 
-soak: ## Let badly behaved clients come and go for MINUTES (1), and check what must hold; SEED=n repeats one
-	@echo "make soak: builds, then $(or $(MINUTES),1) minutes of clients, and half as long again without"
+soak: ## Play attacks at random for MINUTES (1) and check that nothing is left over; SEED=n repeats one
+	@echo "make soak: builds, then $(or $(MINUTES),1) minutes of attacks, and up to a minute after each tide"
 	@MINUTES="$(MINUTES)" SEED="$(SEED)" ONLY="$(ONLY)" bash scripts/soak.sh
 
 clean: ## Remove what was built, measured and packed; vendored sources stay

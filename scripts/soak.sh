@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# `make soak`: mixed clients, most of them badly behaved, against the release program on a free port, for MINUTES (1, fractions too).
-# SEED=n makes the same choices again; ONLY="visitors,attacks" has only these kinds of clients come, or only these attacks.
-# The program is a child of the soak and ends with it. Exit status 1 if anything failed.
+# `make soak`: attacks picked at random against the release program on a free port, for MINUTES (1, fractions too).
+# SEED=n makes the same choices again; ONLY="pings,calls" plays only these attacks.
+# The program is a child of the soak and ends with it. Exit status 1 if a bar is missed.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"

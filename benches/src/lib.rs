@@ -1,7 +1,7 @@
 //! The part that several of these programs share: clients, the program as a process, and the attacks.
 
 pub mod attack;
-pub mod process;
+pub mod healthy;
 pub mod program;
 pub mod protocol;
 pub mod random;

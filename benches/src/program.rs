@@ -1,10 +1,10 @@
-//! The program as the system sees it: memory, descriptors, threads, time; and what it says on standard error.
+//! The program as the system sees it: memory, descriptors, threads, processor time, and its lines on standard error.
 //!
-//! **Invariant:** it is stopped by its own process id, whatever becomes of the soak.
+//! **Invariant:** it is stopped by its own process id, however the run ends.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::net::{SocketAddr, TcpStream};
+use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -36,14 +36,12 @@ pub struct Log {
 /// A process as the system sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Vitals {
-    /// Resident memory \[kB\].
+    /// Resident memory \[MB\].
     pub resident: f64,
     /// Open descriptors.
     pub descriptors: usize,
-    /// Threads.
+    /// Threads, without the allocator's.
     pub threads: usize,
-    /// Processor time used so far \[s\].
-    pub cpu: f64,
 }
 
 impl Program {
@@ -91,25 +89,6 @@ impl Program {
         })
     }
 
-    /// Starts another server, which listens at `address` within a minute.
-    pub fn at(mut command: Command, address: SocketAddr) -> Result<Self, String> {
-        let child = command
-            .spawn()
-            .map_err(|error| format!("{command:?}: {error}"))?;
-        let program = Self {
-            child,
-            address,
-            log: Arc::default(),
-        };
-        for _ in 0..6_000 {
-            if TcpStream::connect(address).is_ok() {
-                return Ok(program);
-            }
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        Err(format!("{command:?} does not listen at {address}"))
-    }
-
     /// Its process id.
     pub fn pid(&self) -> u32 {
         self.child.id()
@@ -152,92 +131,47 @@ impl Log {
     }
 }
 
-/// For how long threads of a process were able to run and had no processor \[s\]: the first one, which serves clients,
-/// and the arm's. 0 where the system does not say.
-pub fn queued(pid: u32) -> Queues {
-    let mut tasks = Vec::new();
-    for entry in fs::read_dir(format!("/proc/{pid}/task"))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let name = fs::read_to_string(entry.path().join("comm")).unwrap_or_default();
-        if entry.file_name().to_string_lossy() == pid.to_string() || name.starts_with("actix-rt") {
-            tasks.push(entry.path().join("schedstat"));
-        }
-    }
-    tasks.push("/proc/thread-self/schedstat".into());
-    Queues { tasks }
-}
-
-/// The time that virtual processors were held up for others \[s\]; to a thread on one it counts as its own.
-fn stolen() -> f64 {
-    let text = fs::read_to_string("/proc/stat").unwrap_or_default();
-    let ticks = text
-        .lines()
-        .next()
-        .and_then(|all| all.split_whitespace().nth(8));
-    // A tick is a hundredth of a second here, whatever the kernel's own is.
-    ticks
-        .and_then(|ticks| ticks.parse::<f64>().ok())
-        .unwrap_or_default()
-        / 100.0
-}
-
-/// Threads whose waiting is looked at: two of the program, and the one that looks.
-pub struct Queues {
-    tasks: Vec<std::path::PathBuf>,
-}
-
-impl Queues {
-    /// The time that all of them together have waited for a processor so far, or had one that another machine used
-    /// instead. Then the time that the program's two have had one \[s\].
-    pub fn look(&self) -> (f64, f64) {
-        let (mut waited, mut ran) = (stolen(), 0.0);
-        for (index, task) in self.tasks.iter().enumerate() {
-            let text = fs::read_to_string(task).unwrap_or_default();
-            let mut numbers = text
-                .split_whitespace()
-                .filter_map(|text| text.parse::<f64>().ok());
-            let (running, waiting) = (numbers.next(), numbers.next());
-            waited += waiting.unwrap_or_default() / 1e9;
-            if index + 1 < self.tasks.len() {
-                ran += running.unwrap_or_default() / 1e9;
-            }
-        }
-        (waited, ran)
-    }
-}
-
 /// The process with this id as the system sees it; none once it is gone.
 pub fn vitals(pid: u32) -> Option<Vitals> {
-    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-    let field = |name: &str| -> Option<f64> {
-        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
-        line.split_whitespace().next()?.parse().ok()
-    };
     let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count();
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // Behind the name, which is in parentheses: user and system time are the twelfth and thirteenth, in hundredths.
-    let after = stat.rsplit_once(')')?.1;
-    let ticks: f64 = after
-        .split_whitespace()
-        .skip(11)
-        .take(2)
-        .filter_map(|text| text.parse::<f64>().ok())
-        .sum();
-    let resident = field("VmRSS:")?;
-    // The allocator has as many of its own as it likes.
     let tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
-    let name = |task: fs::DirEntry| fs::read_to_string(task.path().join("comm")).ok();
-    let threads = tasks
-        .filter_map(name)
-        .filter(|name| !name.starts_with("jemalloc"))
-        .count();
+    let names = tasks.filter_map(|task| fs::read_to_string(task.path().join("comm")).ok());
     Some(Vitals {
-        resident,
+        resident: status_field(pid, "VmRSS:")?,
         descriptors,
-        threads,
-        cpu: ticks / 100.0,
+        // The allocator's threads are its own affair.
+        threads: names.filter(|name| !name.starts_with("jemalloc")).count(),
     })
+}
+
+/// The most memory that a process has had resident \[MB\]; none once it is gone.
+pub fn peak(pid: u32) -> Option<f64> {
+    status_field(pid, "VmHWM:")
+}
+
+/// A field of `/proc/<pid>/status`, there in kB \[MB\].
+fn status_field(pid: u32, name: &str) -> Option<f64> {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+    Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
+}
+
+/// Processor time of all threads of a process so far, as the scheduler counts it \[ns\].
+///
+/// # Panics
+/// If the process is gone.
+pub fn processor(pid: u32) -> u64 {
+    let threads = fs::read_dir(format!("/proc/{pid}/task")).expect("the server runs");
+    threads
+        .filter_map(|thread| fs::read_to_string(thread.ok()?.path().join("schedstat")).ok())
+        .filter_map(|stat| stat.split_whitespace().next()?.parse::<u64>().ok())
+        .sum()
+}
+
+/// Resident memory of a process \[MB\].
+///
+/// # Panics
+/// If the process is gone.
+pub fn resident(pid: u32) -> f64 {
+    status_field(pid, "VmRSS:").expect("the server runs")
 }

@@ -18,7 +18,13 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "almost-silent",
         "1,100 clients say a space now and then instead of the token",
-        almost_silent,
+        || {
+            Client::tcp()
+                .repeats_bytes(b" \n")
+                .drips(1, Duration::from_secs(1))
+                .returns()
+                .times(1_100)
+        },
     )
     .locked(),
     Attack::new(
@@ -30,7 +36,16 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "guesses-web",
         "50 clients guess in addresses and cookies, and return",
-        guesses_web,
+        || {
+            let address = Client::http("GET /?token=a-token-that-somebody-guesses")
+                .says_bytes(END)
+                .returns();
+            let cookie = Client::http("GET /")
+                .says_bytes(b"Cookie: token=guess; pendularm=guess\r\n")
+                .says_bytes(END)
+                .returns();
+            [address.times(25), cookie.times(25)].concat()
+        },
     )
     .locked(),
     Attack::new(
@@ -42,12 +57,29 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "slow-heads",
         "200 clients send the head of a request at a line a second",
-        slow_heads,
+        || {
+            Client::http("GET /")
+                .repeats_bytes(b"X-Slow: 1\r\n")
+                .drips(11, Duration::from_secs(1))
+                .returns()
+                .times(200)
+        },
     ),
     Attack::new(
         "long-heads",
         "20 clients send heads of 16 KiB and more, of 100 lines, and return",
-        long_heads,
+        || {
+            let long = format!("X-Long: {}\r\n", filler(16 * 1024));
+            let many = "X-Many: 1\r\n".repeat(100);
+            let client = |head: &str| {
+                Client::http("GET /")
+                    .says_bytes(head.as_bytes())
+                    .says_bytes(END)
+                    .returns()
+                    .times(10)
+            };
+            [client(&long), client(&many)].concat()
+        },
     ),
     Attack::new(
         "pages",
@@ -62,7 +94,13 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "report-readers",
         "64 clients read 100 bytes of a report's file of 8 MB ten times a second",
-        report_readers,
+        || {
+            Client::http("GET /report/large.csv")
+                .says_bytes(END)
+                .sips(100)
+                .returns()
+                .times(64)
+        },
     )
     .with(&["--report", REPORT]),
     Attack::new(
@@ -80,29 +118,10 @@ fn silent() -> Vec<Client> {
     Client::tcp().returns().times(1_100)
 }
 
-fn almost_silent() -> Vec<Client> {
-    Client::tcp()
-        .repeats_bytes(b" \n")
-        .drips(1, Duration::from_secs(1))
-        .returns()
-        .times(1_100)
-}
-
 fn guesses() -> Vec<Client> {
     let guess =
         |k: usize| format!(r#"{{"op":"auth","token":"a-token-that-somebody-guesses-{k:08}"}}"#);
     super::script::each(0..100, |k| Client::tcp().says(&guess(k)).returns())
-}
-
-fn guesses_web() -> Vec<Client> {
-    let address = Client::http("GET /?token=a-token-that-somebody-guesses")
-        .says_bytes(END)
-        .returns();
-    let cookie = Client::http("GET /")
-        .says_bytes(b"Cookie: token=guess; pendularm=guess\r\n")
-        .says_bytes(END)
-        .returns();
-    [address.times(25), cookie.times(25)].concat()
 }
 
 fn holders() -> Vec<Client> {
@@ -111,27 +130,6 @@ fn holders() -> Vec<Client> {
         .says(&auth)
         .floods(&light("/arm_sim/pause"))
         .times(100)
-}
-
-fn slow_heads() -> Vec<Client> {
-    Client::http("GET /")
-        .repeats_bytes(b"X-Slow: 1\r\n")
-        .drips(11, Duration::from_secs(1))
-        .returns()
-        .times(200)
-}
-
-fn long_heads() -> Vec<Client> {
-    let long = format!("X-Long: {}\r\n", filler(16 * 1024));
-    let many = "X-Many: 1\r\n".repeat(100);
-    let client = |head: &str| {
-        Client::http("GET /")
-            .says_bytes(head.as_bytes())
-            .says_bytes(END)
-            .returns()
-            .times(10)
-    };
-    [client(&long), client(&many)].concat()
 }
 
 fn pages() -> Vec<Client> {
@@ -156,14 +154,6 @@ fn foreign() -> Vec<Client> {
             .times(10)
     };
     [client(host), client(origin)].concat()
-}
-
-fn report_readers() -> Vec<Client> {
-    Client::http("GET /report/large.csv")
-        .says_bytes(END)
-        .sips(100)
-        .returns()
-        .times(64)
 }
 
 fn paths() -> Vec<Client> {

@@ -7,15 +7,24 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "step",
         "4 clients call /arm_sim/step with 10,000 steps of three links",
-        step_4,
+        || steps().times(4),
     )
     .with(&["--links", "3"])
     .moves(),
-    Attack::new("step-16", "16 clients do so with two links", step_16).moves(),
+    Attack::new("step-16", "16 clients do so with two links", || steps().times(16)).moves(),
     Attack::new(
         "long-steps",
         "150 clients take steps of a second by hand, while a goal is pursued whose feedback 20 hear",
-        long_steps,
+        || {
+    let weightless = call("/arm_sim/set_params", "1", r#"{"gravity":0}"#);
+    let long = call("/arm_sim/set_integrator", "2", r#"{"timestep":1}"#);
+    let goal = r#"{"x":0.5,"y":0.5,"epsilon":1e-6}"#;
+    let goal = call("/ik_action/send_goal", "3", goal);
+    let hear = Client::tcp().says(&subscribe("/ik_action/feedback", ""));
+    let begin = Client::tcp().says(&weightless).says(&long).says(&goal);
+    let step = steps().after(300).times(150);
+    [begin.times(1), hear.times(20), step].concat()
+},
     )
     .moves(),
     Attack::new(
@@ -28,7 +37,13 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "error-estimate",
         "the same while 10 clients watch the error estimate",
-        error_estimate,
+        || [
+        timestep(),
+        Client::tcp()
+            .says(&subscribe("/arm_sim/error_estimate", ""))
+            .times(10),
+    ]
+    .concat(),
     )
     .moves(),
     Attack::new(
@@ -46,7 +61,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "action-goals",
         "10 clients send goals with ids of 64 KiB and want feedback",
-        action_goals,
+        || {
+    let goal = |k: usize| {
+        let (id, args) = (numbers(64 * 1024), place(k));
+        format!(
+            r#"{{"op":"send_action_goal","action":"/ik_action","id":{id},"feedback":true,"args":{args}}}"#
+        )
+    };
+    Client::tcp().repeats_each(0..16, goal).times(10)
+},
     )
     .moves(),
     Attack::new(
@@ -88,7 +111,16 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "wrong-settings",
         "10 clients send settings of 64 KiB that are refused one by one",
-        wrong_settings,
+        || {
+    let field = numbers(20 * 1024);
+    let args = format!(
+        r#"{{"gravity":{field},"masses":{field},"lengths":"{}"}}"#,
+        "9".repeat(20 * 1024)
+    );
+    Client::tcp()
+        .repeats(&call("/arm_sim/set_params", "1", &args))
+        .times(10)
+},
     ),
     Attack::new(
         "kinematics",
@@ -104,25 +136,6 @@ fn steps() -> Client {
         .floods(&call("/arm_sim/step", "1", r#"{"steps":10000}"#))
 }
 
-fn step_4() -> Vec<Client> {
-    steps().times(4)
-}
-
-fn step_16() -> Vec<Client> {
-    steps().times(16)
-}
-
-fn long_steps() -> Vec<Client> {
-    let weightless = call("/arm_sim/set_params", "1", r#"{"gravity":0}"#);
-    let long = call("/arm_sim/set_integrator", "2", r#"{"timestep":1}"#);
-    let goal = r#"{"x":0.5,"y":0.5,"epsilon":1e-6}"#;
-    let goal = call("/ik_action/send_goal", "3", goal);
-    let hear = Client::tcp().says(&subscribe("/ik_action/feedback", ""));
-    let begin = Client::tcp().says(&weightless).says(&long).says(&goal);
-    let step = steps().after(300).times(150);
-    [begin.times(1), hear.times(20), step].concat()
-}
-
 fn timestep() -> Vec<Client> {
     let set = call(
         "/arm_sim/set_integrator",
@@ -133,16 +146,6 @@ fn timestep() -> Vec<Client> {
         .says(&set)
         .says(&call("/pid_controller/enable", "2", r#"{"data":true}"#))
         .times(1)
-}
-
-fn error_estimate() -> Vec<Client> {
-    [
-        timestep(),
-        Client::tcp()
-            .says(&subscribe("/arm_sim/error_estimate", ""))
-            .times(10),
-    ]
-    .concat()
 }
 
 fn disturb() -> Vec<Client> {
@@ -179,16 +182,6 @@ fn goals() -> Vec<Client> {
         Client::tcp().repeats_each(0..300, action).times(5),
     ]
     .concat()
-}
-
-fn action_goals() -> Vec<Client> {
-    let goal = |k: usize| {
-        let (id, args) = (numbers(64 * 1024), place(k));
-        format!(
-            r#"{{"op":"send_action_goal","action":"/ik_action","id":{id},"feedback":true,"args":{args}}}"#
-        )
-    };
-    Client::tcp().repeats_each(0..16, goal).times(10)
 }
 
 fn cancels() -> Vec<Client> {
@@ -271,17 +264,6 @@ fn setpoints() -> Vec<Client> {
     Client::tcp()
         .says(&call("/pid_controller/enable", "1", r#"{"data":true}"#))
         .repeats_each(0..500, point)
-        .times(10)
-}
-
-fn wrong_settings() -> Vec<Client> {
-    let field = numbers(20 * 1024);
-    let args = format!(
-        r#"{{"gravity":{field},"masses":{field},"lengths":"{}"}}"#,
-        "9".repeat(20 * 1024)
-    );
-    Client::tcp()
-        .repeats(&call("/arm_sim/set_params", "1", &args))
         .times(10)
 }
 

@@ -27,7 +27,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "overflowing-plans",
         "100 clients ask for plans of loops whose numbers overflow",
-        overflowing_plans,
+        || {
+            let further = r#""gains":{"kp":[1e300,1e300],"kd":[1e300,1e300]},"setpoint":[1,1]"#;
+            let ask = call(
+                "/study/plan",
+                "1",
+                &format!(r#"{{"error":1e-6,"duration":10,{further}}}"#),
+            );
+            Client::tcp().repeats(&ask).times(100)
+        },
     ),
     Attack::new(
         "expressions",
@@ -42,7 +50,13 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "left-behind",
         "20 clients ask for much, leave at once and return",
-        left_behind,
+        || {
+            Client::tcp()
+                .says_each(0..16, |_| steps("exp(sin(t))", 1_000_000))
+                .leaves_after(5)
+                .returns()
+                .times(20)
+        },
     ),
     Attack::new(
         "busy",
@@ -99,16 +113,6 @@ fn stability() -> Vec<Client> {
     Client::tcp().repeats_each(1..200, ask).times(20)
 }
 
-fn overflowing_plans() -> Vec<Client> {
-    let further = r#""gains":{"kp":[1e300,1e300],"kd":[1e300,1e300]},"setpoint":[1,1]"#;
-    let ask = call(
-        "/study/plan",
-        "1",
-        &format!(r#"{{"error":1e-6,"duration":10,{further}}}"#),
-    );
-    Client::tcp().repeats(&ask).times(100)
-}
-
 fn expressions() -> Vec<Client> {
     const MOST: usize = 4 * 1024 * 1024 - 1024;
     let functions = [
@@ -126,14 +130,6 @@ fn heavy() -> Vec<Client> {
     let function = "sin(t)+".repeat(120) + "1";
     Client::tcp()
         .says_each(0..16, |_| steps(&function, 1_000_000))
-        .times(20)
-}
-
-fn left_behind() -> Vec<Client> {
-    Client::tcp()
-        .says_each(0..16, |_| steps("exp(sin(t))", 1_000_000))
-        .leaves_after(5)
-        .returns()
         .times(20)
 }
 

@@ -19,27 +19,34 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "late-together",
         "180 clients have 256 calls wait each, whose time is over at one instant",
-        late_together,
+        || waiting(Client::tcp(), |n| 2.5 - n as f64 / 1000.0),
     ),
     Attack::new(
         "left-together",
         "a provider goes that 180 clients have 256 calls wait for, and another returns",
-        left_together,
+        || waiting(Client::tcp().leaves_after(1500).returns(), |_| 86_400.0),
     ),
     Attack::new(
         "publishers-to-deaf",
         "40 clients publish a message each every millisecond to 180 that read nothing",
-        publishers_to_deaf,
+        || publishers(""),
     ),
     Attack::new(
         "publishers-to-throttled",
         "the same to 180 that have all but one message a minute held back",
-        publishers_to_throttled,
+        || publishers(r#","throttle_rate":60000,"queue_length":1"#),
     ),
     Attack::new(
         "floods-to-webs",
         "20 clients flood a topic with short messages to 20 WebSockets that read",
-        floods_to_webs,
+        || {
+            let reader = Client::web().says(&subscribe("/crowd", ""));
+            let flood = Client::tcp()
+                .after(100)
+                .advertises("/crowd")
+                .floods(&publish("/crowd", "{}"));
+            [reader.times(20), flood.times(20)].concat()
+        },
     ),
     Attack::new(
         "census",
@@ -65,14 +72,6 @@ fn storm() -> Vec<Client> {
     [waiting(Client::tcp(), |_| 86_400.0), goer.times(50)].concat()
 }
 
-fn late_together() -> Vec<Client> {
-    waiting(Client::tcp(), |n| 2.5 - n as f64 / 1000.0)
-}
-
-fn left_together() -> Vec<Client> {
-    waiting(Client::tcp().leaves_after(1500).returns(), |_| 86_400.0)
-}
-
 fn publishers(further: &str) -> Vec<Client> {
     let subscriber = Client::tcp().says(&subscribe("/crowd", further)).deaf();
     let message = format!("{}\n", publish("/crowd", "{}"));
@@ -82,23 +81,6 @@ fn publishers(further: &str) -> Vec<Client> {
         .repeats_bytes(message.as_bytes())
         .drips(message.len(), std::time::Duration::from_millis(1));
     [subscriber.times(CROWD), publisher.times(40)].concat()
-}
-
-fn publishers_to_deaf() -> Vec<Client> {
-    publishers("")
-}
-
-fn publishers_to_throttled() -> Vec<Client> {
-    publishers(r#","throttle_rate":60000,"queue_length":1"#)
-}
-
-fn floods_to_webs() -> Vec<Client> {
-    let reader = Client::web().says(&subscribe("/crowd", ""));
-    let flood = Client::tcp()
-        .after(100)
-        .advertises("/crowd")
-        .floods(&publish("/crowd", "{}"));
-    [reader.times(20), flood.times(20)].concat()
 }
 
 /// As many topics, services and actions as are listed.

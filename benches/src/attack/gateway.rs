@@ -13,33 +13,66 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "goal-ids",
         "a goal whose id is 3 MB of slow decimals, with feedback; its client goes",
-        goal_ids,
+        || {
+    let args = r#"{"x":1,"y":1,"epsilon":1e-9,"success_hold":1000}"#;
+    let goal = |bytes| {
+        let id = slow_numbers(bytes);
+        format!(
+            r#"{{"op":"send_action_goal","action":"/ik_action","id":{id},"feedback":true,"args":{args}}}"#
+        )
+    };
+    Client::tcp()
+        .says(&goal(3 * MIB))
+        .leaves_after(300)
+        .times(1)
+},
     )
     .moves(),
     Attack::new(
         "slow-numbers",
         "1 client publishes 4 MiB of slow decimals, over and over",
-        slow_numbers_long,
+        || {
+    let msg = format!(r#"{{"n":{}}}"#, slow_numbers(LONG));
+    Client::tcp()
+        .advertises("/attack/slow")
+        .repeats(&publish("/attack/slow", &msg))
+        .times(1)
+},
     ),
     Attack::new(
         "slow-numbers-20",
         "20 clients publish 64 KiB of slow decimals, over and over",
-        slow_numbers_many,
+        || {
+    let msg = format!(r#"{{"n":{}}}"#, slow_numbers(64 * 1024));
+    Client::tcp()
+        .advertises("/attack/slow")
+        .repeats(&publish("/attack/slow", &msg))
+        .times(20)
+},
     ),
     Attack::new(
         "slow-numbers-arm",
         "4 clients call the arm with 4 MiB of slow decimals",
-        slow_numbers_to_arm,
+        || {
+    let args = format!(r#"{{"masses":{}}}"#, slow_numbers(LONG));
+    Client::tcp()
+        .repeats(&call("/arm_sim/set_params", "1", &args))
+        .times(4)
+},
     ),
     Attack::new(
         "long-ids",
         "20 clients make calls with ids of 4 MiB and read the answers",
-        long_ids,
+        || Client::tcp()
+        .repeats(&call(PAUSE, &format!("\"{}\"", filler(LONG)), "{}"))
+        .times(20),
     ),
     Attack::new(
         "long-args",
         "20 clients call with arrays of a million arguments",
-        long_args,
+        || Client::tcp()
+        .repeats(&call("/pid_controller/set_gains", "1", &numbers(LONG)))
+        .times(20),
     ),
     Attack::new(
         "trajectories",
@@ -50,7 +83,12 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "many-keys",
         "10 clients send frames of 300,000 fields, the same over and over",
-        many_keys,
+        || {
+    let keys = r#""msg":{},"topic":"/a","#.repeat(LONG / 22 - 10);
+    Client::tcp()
+        .repeats(&format!(r#"{{{keys}"op":"publish"}}"#))
+        .times(10)
+},
     ),
     Attack::new(
         "escapes",
@@ -65,7 +103,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "empty-lines",
         "10 clients send line ends and spaces",
-        empty_lines,
+        || {
+    let mut bytes = b"\n".repeat(32 * 1024);
+    bytes.extend(b" \t\r".repeat(32 * 1024));
+    // The first bytes decide what is spoken, so the first frame is one.
+    Client::tcp()
+        .says(&light(PAUSE))
+        .repeats_bytes(&bytes)
+        .times(10)
+},
     ),
     Attack::new(
         "garbage",
@@ -81,7 +127,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "nested-pieces",
         "10 clients send fragments of fragments of fragments",
-        nested_pieces,
+        || {
+    let mut piece = light(PAUSE);
+    // Each layer doubles the escapes; six come to some 20 KB.
+    for _ in 0..6 {
+        let data = piece.replace('\\', r"\\").replace('"', "\\\"");
+        piece = format!(r#"{{"op":"fragment","id":"n","num":0,"total":1,"data":"{data}"}}"#);
+    }
+    Client::tcp().floods(&piece).times(10)
+},
     ),
     Attack::new(
         "calls",
@@ -111,70 +165,38 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "half-open",
         "200 clients ask, stop sending and stay; 20 more come and go",
-        half_open,
+        || {
+    let asks = Client::tcp()
+        .says(&subscribe("/joint_states", ""))
+        .says_each(0..10, |_| light(PAUSE))
+        .half_closes();
+    let returns = asks.clone().returns().times(20);
+    [asks.deaf().times(200), returns].concat()
+},
     ),
     Attack::new("idle", "300 clients connect and are silent", idle).fills(),
     Attack::new(
         "byte-per-second",
         "200 clients send a frame at a byte a second",
-        byte_per_second,
+        || {
+    let drip = std::time::Duration::from_secs(1);
+    Client::tcp().says(&light(PAUSE)).drips(1, drip).times(200)
+},
     ),
     Attack::new(
         "few-files",
         "200 clients come and go while the program may have 64 files open",
-        few_files,
+        || {
+    let asks = Client::tcp().says(&light(PAUSE));
+    [
+        asks.clone().times(100),
+        asks.leaves_after(5).returns().times(100),
+    ]
+    .concat()
+},
     )
     .with_files(64),
 ];
-
-fn goal_ids() -> Vec<Client> {
-    let args = r#"{"x":1,"y":1,"epsilon":1e-9,"success_hold":1000}"#;
-    let goal = |bytes| {
-        let id = slow_numbers(bytes);
-        format!(
-            r#"{{"op":"send_action_goal","action":"/ik_action","id":{id},"feedback":true,"args":{args}}}"#
-        )
-    };
-    Client::tcp()
-        .says(&goal(3 * MIB))
-        .leaves_after(300)
-        .times(1)
-}
-
-fn slow_numbers_long() -> Vec<Client> {
-    let msg = format!(r#"{{"n":{}}}"#, slow_numbers(LONG));
-    Client::tcp()
-        .advertises("/attack/slow")
-        .repeats(&publish("/attack/slow", &msg))
-        .times(1)
-}
-
-fn slow_numbers_many() -> Vec<Client> {
-    let msg = format!(r#"{{"n":{}}}"#, slow_numbers(64 * 1024));
-    Client::tcp()
-        .advertises("/attack/slow")
-        .repeats(&publish("/attack/slow", &msg))
-        .times(20)
-}
-
-fn slow_numbers_to_arm() -> Vec<Client> {
-    let args = format!(r#"{{"masses":{}}}"#, slow_numbers(LONG));
-    Client::tcp()
-        .repeats(&call("/arm_sim/set_params", "1", &args))
-        .times(4)
-}
-
-fn long_ids() -> Vec<Client> {
-    Client::tcp()
-        .repeats(&call(PAUSE, &format!("\"{}\"", filler(LONG)), "{}"))
-        .times(20)
-}
-
-fn long_args() -> Vec<Client> {
-    Client::tcp()
-        .repeats(&call("/pid_controller/set_gains", "1", &numbers(LONG)))
-        .times(20)
-}
 
 fn trajectories() -> Vec<Client> {
     let entries = r#"{"positions":[0.1,0.2]},"#.repeat(LONG / 24 - 1);
@@ -182,13 +204,6 @@ fn trajectories() -> Vec<Client> {
     Client::tcp()
         .repeats(&publish("/joint_trajectory", &msg))
         .times(20)
-}
-
-fn many_keys() -> Vec<Client> {
-    let keys = r#""msg":{},"topic":"/a","#.repeat(LONG / 22 - 10);
-    Client::tcp()
-        .repeats(&format!(r#"{{{keys}"op":"publish"}}"#))
-        .times(10)
 }
 
 fn escapes() -> Vec<Client> {
@@ -215,16 +230,6 @@ fn deep() -> Vec<Client> {
         .times(10)
 }
 
-fn empty_lines() -> Vec<Client> {
-    let mut bytes = b"\n".repeat(32 * 1024);
-    bytes.extend(b" \t\r".repeat(32 * 1024));
-    // The first bytes decide what is spoken, so the first frame is one.
-    Client::tcp()
-        .says(&light(PAUSE))
-        .repeats_bytes(&bytes)
-        .times(10)
-}
-
 fn garbage() -> Vec<Client> {
     Client::tcp()
         .says(&light(PAUSE))
@@ -232,16 +237,6 @@ fn garbage() -> Vec<Client> {
         .floods("x")
         .floods("[1,{}]")
         .times(10)
-}
-
-fn nested_pieces() -> Vec<Client> {
-    let mut piece = light(PAUSE);
-    // Each layer doubles the escapes; six come to some 20 KB.
-    for _ in 0..6 {
-        let data = piece.replace('\\', r"\\").replace('"', "\\\"");
-        piece = format!(r#"{{"op":"fragment","id":"n","num":0,"total":1,"data":"{data}"}}"#);
-    }
-    Client::tcp().floods(&piece).times(10)
 }
 
 fn calls() -> Vec<Client> {
@@ -284,29 +279,6 @@ fn resets() -> Vec<Client> {
     client.deaf().leaves_after(20).returns().times(20)
 }
 
-fn half_open() -> Vec<Client> {
-    let asks = Client::tcp()
-        .says(&subscribe("/joint_states", ""))
-        .says_each(0..10, |_| light(PAUSE))
-        .half_closes();
-    let returns = asks.clone().returns().times(20);
-    [asks.deaf().times(200), returns].concat()
-}
-
 fn idle() -> Vec<Client> {
     Client::tcp().times(300)
-}
-
-fn byte_per_second() -> Vec<Client> {
-    let drip = std::time::Duration::from_secs(1);
-    Client::tcp().says(&light(PAUSE)).drips(1, drip).times(200)
-}
-
-fn few_files() -> Vec<Client> {
-    let asks = Client::tcp().says(&light(PAUSE));
-    [
-        asks.clone().times(100),
-        asks.leaves_after(5).returns().times(100),
-    ]
-    .concat()
 }

@@ -13,16 +13,37 @@ pub const ATTACKS: &[Attack] = &[
         "1 client sends lines of two bytes and reads no complaint",
         deaf_statuses,
     ),
-    Attack::new("deaf-statuses-10", "10 clients do so", deaf_statuses_many),
+    Attack::new("deaf-statuses-10", "10 clients do so", || {
+        vec![deaf_statuses(); 10].concat()
+    }),
     Attack::new(
         "deaf-calls",
         "20 clients make calls of unknown services and read nothing",
-        deaf_calls,
+        || {
+            Client::tcp()
+                .floods(&call("/x", "1", "{}"))
+                .deaf()
+                .times(20)
+        },
     ),
     Attack::new(
         "deaf-tiny",
         "200 clients read no message of a flood of 40 bytes each",
-        deaf_tiny,
+        || {
+            let flood = Client::tcp()
+                .advertises("/attack/tiny")
+                .floods(&publish("/attack/tiny", r#"{"data":1}"#))
+                .after(300)
+                .times(1);
+            [
+                Client::tcp()
+                    .says(&subscribe("/attack/tiny", ""))
+                    .deaf()
+                    .times(200),
+                flood,
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "deaf-topics",
@@ -32,17 +53,44 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "deaf-halfway",
         "200 clients stop reading in the middle of one message of 4 MiB, each of its own",
-        deaf_halfway,
+        || deaf_publishers(LONG, Client::says),
     ),
     Attack::new(
         "deaf-watchers",
         "200 clients subscribe to all that the arm publishes and read nothing",
-        deaf_watchers,
+        || {
+            const TOPICS: [&str; 8] = [
+                "/joint_states",
+                "/clock",
+                "/diagnostics",
+                "/tf",
+                "/tf_static",
+                "/robot_description",
+                "/rosout",
+                "/arm_sim/error_estimate",
+            ];
+            Client::tcp()
+                .says_each(0..TOPICS.len(), |k| subscribe(TOPICS[k], ""))
+                .deaf()
+                .times(200)
+        },
     ),
     Attack::new(
         "deaf-log",
         "20 clients watch /rosout and diagnostics unread, others give reason for warnings",
-        deaf_log,
+        || {
+            let watch = Client::tcp()
+                .says(&subscribe("/rosout", ""))
+                .says(&subscribe("/diagnostics", ""))
+                .deaf();
+            let warn = call("/arm_sim/set_integrator", "1", r#"{"timestep":-1}"#);
+            let forge = publish("/rosout", r#"{"level":30,"msg":"forged"}"#);
+            [
+                watch.times(20),
+                Client::tcp().floods(&warn).floods(&forge).times(10),
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "deaf-lists",
@@ -57,17 +105,57 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "throttled-series",
         "200 subscribers are throttled beside a flood of short messages",
-        throttled_series,
+        || {
+            let further = |k| {
+                format!(
+                    r#","throttle_rate":{},"queue_length":{}"#,
+                    1 + k % 50,
+                    1 + k % 100
+                )
+            };
+            let flood = Client::tcp()
+                .advertises("/attack/series")
+                .floods(&publish("/attack/series", r#"{"data":1}"#))
+                .after(400)
+                .times(1);
+            [
+                each(0..200, |k| {
+                    Client::tcp().says(&subscribe("/attack/series", &further(k)))
+                }),
+                flood,
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "throttle-hoards",
         "50 subscribers have 100,000 messages held back for a year",
-        throttle_hoards,
+        || {
+            each(0..50, |k| {
+                let topic = format!("/attack/hoard/{k}");
+                Client::tcp()
+                    .says(&subscribe(&topic, HELD_BACK))
+                    .advertises(&topic)
+                    .floods(&publish(&topic, r#"{"data":"held back"}"#))
+            })
+        },
     ),
     Attack::new(
         "throttle-topics",
         "16 clients have 100,000 messages held back of one topic after the other",
-        throttle_topics,
+        || {
+            const EACH: usize = 100_000;
+            let topics = 0..12;
+            let name = |n: usize| format!("/{n:x}");
+            let subscriber =
+                Client::tcp().says_each(topics.clone(), |n| subscribe(&name(n), HELD_BACK));
+            let publisher = topics
+                .clone()
+                .fold(Client::tcp(), |client, n| client.advertises(&name(n)));
+            let messages = topics.start * EACH..topics.end * EACH;
+            let publisher = publisher.says_each(messages, |n| publish(&name(n / EACH), "{}"));
+            [subscriber.times(16), vec![publisher.after(400)]].concat()
+        },
     ),
     Attack::new(
         "unfinished-frames",
@@ -82,12 +170,40 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "many-fragments",
         "50 clients send pieces of a byte, out of order, of messages that never end",
-        many_fragments,
+        || {
+            let piece = |k: usize| {
+                let num = (k / 8 * 2503) % 4096;
+                format!(
+                    r#"{{"op":"fragment","id":"m{}","num":{num},"total":4096,"data":"x"}}"#,
+                    k % 8
+                )
+            };
+            Client::tcp()
+                .advertises("/attack/pieces")
+                .repeats_each(0..8 * 4000, piece)
+                .times(50)
+        },
     ),
+    // The allocator keeps the memory of clients that have left for a while.
     Attack::new(
         "one-after-another",
         "clients that fill memory in one way leave, and others come who fill it in another",
-        one_after_another,
+        || {
+            let ways = [
+                deaf_topics(),
+                unfinished_frames(),
+                deaf_lists(),
+                fragment_bombs(),
+            ];
+            let turns = ways.into_iter().zip((0..).step_by(1000));
+            turns
+                .flat_map(|(clients, begin)| {
+                    clients
+                        .into_iter()
+                        .map(move |client| client.after(begin).leaves_after(800))
+                })
+                .collect()
+        },
     ),
 ];
 
@@ -99,39 +215,8 @@ fn deaf_statuses() -> Vec<Client> {
         .times(1)
 }
 
-fn deaf_statuses_many() -> Vec<Client> {
-    vec![deaf_statuses(); 10].concat()
-}
-
-fn deaf_calls() -> Vec<Client> {
-    Client::tcp()
-        .floods(&call("/x", "1", "{}"))
-        .deaf()
-        .times(20)
-}
-
-fn deaf_tiny() -> Vec<Client> {
-    let flood = Client::tcp()
-        .advertises("/attack/tiny")
-        .floods(&publish("/attack/tiny", r#"{"data":1}"#))
-        .after(300)
-        .times(1);
-    [
-        Client::tcp()
-            .says(&subscribe("/attack/tiny", ""))
-            .deaf()
-            .times(200),
-        flood,
-    ]
-    .concat()
-}
-
 fn deaf_topics() -> Vec<Client> {
     deaf_publishers(MIB, Client::repeats)
-}
-
-fn deaf_halfway() -> Vec<Client> {
-    deaf_publishers(LONG, Client::says)
 }
 
 /// Clients who read nothing of what they publish to themselves in this way.
@@ -144,37 +229,6 @@ fn deaf_publishers(bytes: usize, publishes: fn(Client, &str) -> Client) -> Vec<C
             .advertises(&topic);
         publishes(client, &publish(&topic, &msg)).deaf()
     })
-}
-
-fn deaf_watchers() -> Vec<Client> {
-    const TOPICS: [&str; 8] = [
-        "/joint_states",
-        "/clock",
-        "/diagnostics",
-        "/tf",
-        "/tf_static",
-        "/robot_description",
-        "/rosout",
-        "/arm_sim/error_estimate",
-    ];
-    Client::tcp()
-        .says_each(0..TOPICS.len(), |k| subscribe(TOPICS[k], ""))
-        .deaf()
-        .times(200)
-}
-
-fn deaf_log() -> Vec<Client> {
-    let watch = Client::tcp()
-        .says(&subscribe("/rosout", ""))
-        .says(&subscribe("/diagnostics", ""))
-        .deaf();
-    let warn = call("/arm_sim/set_integrator", "1", r#"{"timestep":-1}"#);
-    let forge = publish("/rosout", r#"{"level":30,"msg":"forged"}"#);
-    [
-        watch.times(20),
-        Client::tcp().floods(&warn).floods(&forge).times(10),
-    ]
-    .concat()
 }
 
 fn deaf_lists() -> Vec<Client> {
@@ -200,53 +254,8 @@ fn sips() -> Vec<Client> {
         .times(50)
 }
 
-fn throttled_series() -> Vec<Client> {
-    let further = |k| {
-        format!(
-            r#","throttle_rate":{},"queue_length":{}"#,
-            1 + k % 50,
-            1 + k % 100
-        )
-    };
-    let flood = Client::tcp()
-        .advertises("/attack/series")
-        .floods(&publish("/attack/series", r#"{"data":1}"#))
-        .after(400)
-        .times(1);
-    [
-        each(0..200, |k| {
-            Client::tcp().says(&subscribe("/attack/series", &further(k)))
-        }),
-        flood,
-    ]
-    .concat()
-}
-
 /// As much is held back as a queue may have, for a year.
 const HELD_BACK: &str = r#","throttle_rate":31536000000,"queue_length":100000"#;
-
-fn throttle_hoards() -> Vec<Client> {
-    each(0..50, |k| {
-        let topic = format!("/attack/hoard/{k}");
-        Client::tcp()
-            .says(&subscribe(&topic, HELD_BACK))
-            .advertises(&topic)
-            .floods(&publish(&topic, r#"{"data":"held back"}"#))
-    })
-}
-
-fn throttle_topics() -> Vec<Client> {
-    const EACH: usize = 100_000;
-    let topics = 0..12;
-    let name = |n: usize| format!("/{n:x}");
-    let subscriber = Client::tcp().says_each(topics.clone(), |n| subscribe(&name(n), HELD_BACK));
-    let publisher = topics
-        .clone()
-        .fold(Client::tcp(), |client, n| client.advertises(&name(n)));
-    let messages = topics.start * EACH..topics.end * EACH;
-    let publisher = publisher.says_each(messages, |n| publish(&name(n / EACH), "{}"));
-    [subscriber.times(16), vec![publisher.after(400)]].concat()
-}
 
 fn unfinished_frames() -> Vec<Client> {
     let begun = format!(
@@ -266,36 +275,4 @@ fn fragment_bombs() -> Vec<Client> {
         )
     };
     Client::tcp().says_each(0..64, piece).times(200)
-}
-
-fn many_fragments() -> Vec<Client> {
-    let piece = |k: usize| {
-        let num = (k / 8 * 2503) % 4096;
-        format!(
-            r#"{{"op":"fragment","id":"m{}","num":{num},"total":4096,"data":"x"}}"#,
-            k % 8
-        )
-    };
-    Client::tcp()
-        .advertises("/attack/pieces")
-        .repeats_each(0..8 * 4000, piece)
-        .times(50)
-}
-
-/// Memory of those who have left is the allocator's, until it has given it back.
-fn one_after_another() -> Vec<Client> {
-    let ways = [
-        deaf_topics(),
-        unfinished_frames(),
-        deaf_lists(),
-        fragment_bombs(),
-    ];
-    let turns = ways.into_iter().zip((0..).step_by(1000));
-    turns
-        .flat_map(|(clients, begin)| {
-            clients
-                .into_iter()
-                .map(move |client| client.after(begin).leaves_after(800))
-        })
-        .collect()
 }

@@ -13,7 +13,6 @@ pub mod forms;
 pub mod gateway;
 pub mod memory;
 pub mod names;
-pub mod peers;
 pub mod reading;
 pub mod script;
 pub mod stage;

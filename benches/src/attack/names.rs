@@ -11,31 +11,96 @@ pub const ATTACKS: &[Attack] = &[
         "8 clients register as many names of 1,000 bytes as they may",
         registrations,
     ),
-    Attack::new("registrations-200", "200 clients do so", registrations_many),
+    Attack::new("registrations-200", "200 clients do so", || {
+        each(0..200, |k| {
+            Client::tcp().says_each(0..300, |n| {
+                subscribe(&format!("/{k}/{n}/{}", filler(1_000)), "")
+            })
+        })
+    }),
     Attack::new(
         "leaving-together",
         "200 clients with all the subscriptions that they may have leave at one instant",
-        leaving_together,
+        || {
+            Client::tcp()
+                .says(r#"{"op":"set_level","level":"none"}"#)
+                .says_each(0..350, |n| subscribe(&format!("/{n}"), ""))
+                .leaves_after(5_000)
+                .times(200)
+        },
     ),
     Attack::new(
         "day-long-calls",
         "21 clients provide a service, call it with 4 MiB for a day and read nothing",
-        day_long_calls,
+        || {
+            let args = format!(r#"{{"data":"{}"}}"#, filler(4 * MIB - 1024));
+            each(0..21, |k| {
+                let service = format!("/attack/day/{k}");
+                Client::tcp()
+                    .says(&on_service("advertise_service", &service))
+                    .repeats(&day_long(&service, &args))
+                    .deaf()
+            })
+        },
     ),
     Attack::new(
         "waiting-calls",
         "100 clients have 256 calls wait for a provider that never answers",
-        waiting_calls,
+        || {
+            let args = format!(r#"{{"data":"{}"}}"#, filler(4096));
+            let call = day_long("/attack/never", &args);
+            let caller = Client::tcp()
+                .says_each(0..256, |_| call.clone())
+                .after(200)
+                .times(100);
+            [
+                Client::tcp()
+                    .says(&on_service("advertise_service", "/attack/never"))
+                    .times(1),
+                caller,
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "vanishing-providers",
         "20 providers vanish as soon as they are called, and return",
-        vanishing_providers,
+        || {
+            let provide = Client::tcp()
+                .says(&on_service("advertise_service", "/attack/vanishing"))
+                .deaf()
+                .leaves_after(10)
+                .returns();
+            [
+                provide.times(20),
+                Client::tcp().floods(&light("/attack/vanishing")).times(10),
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "huge-answers",
         "a provider answers each call of 10 clients with 3 MiB",
-        huge_answers,
+        || {
+            fn reply(line: &str) -> Option<Vec<u8>> {
+                Some(answer(
+                    "/attack/huge",
+                    id_of(line)?,
+                    &format!(r#"{{"data":"{}"}}"#, filler(3 * MIB)),
+                ))
+            }
+            let provider = Client::tcp()
+                .says(&on_service("advertise_service", "/attack/huge"))
+                .replies(reply)
+                .times(1);
+            let pause = std::time::Duration::from_millis(50);
+            let caller = Client::tcp()
+                .repeats(&light("/attack/huge"))
+                .drips(200, pause)
+                .after(200)
+                .times(10);
+            [provider, caller].concat()
+        },
     ),
     Attack::new(
         "mirrors",
@@ -45,7 +110,16 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "wrong-answers",
         "10 clients answer calls that nobody made, with ids of 64 KiB",
-        wrong_answers,
+        || {
+            let id = format!("\"{}\"", filler(64 * 1024));
+            let frame = answer("/attack/nobody", &id, "{}");
+            let short = answer("/attack/nobody", "1", "{}").repeat(500);
+            Client::tcp()
+                .says(&light("/arm_sim/pause"))
+                .repeats_bytes(&frame)
+                .repeats_bytes(&short)
+                .times(10)
+        },
     ),
     Attack::new(
         "takeovers",
@@ -76,7 +150,17 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "subscription-storm",
         "20 clients subscribe and unsubscribe, over and over",
-        subscription_storm,
+        || {
+            let storm = |k: usize| {
+                let topic = ["/joint_states", "/clock", "/attack/storm", "/tf"][k / 2 % 4];
+                if k.is_multiple_of(2) {
+                    subscribe(topic, "")
+                } else {
+                    on_topic("unsubscribe", topic)
+                }
+            };
+            Client::tcp().repeats_each(0..200, storm).times(20)
+        },
     ),
     Attack::new(
         "latched",
@@ -86,17 +170,53 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "topic-churn",
         "20 clients advertise and unadvertise a topic that 200 subscribe to",
-        topic_churn,
+        || {
+            let churn = |k: usize| match k % 3 {
+                0 => on_topic("advertise", "/attack/churn"),
+                1 => publish("/attack/churn", "{}"),
+                _ => on_topic("unadvertise", "/attack/churn"),
+            };
+            [
+                Client::tcp()
+                    .says(&subscribe("/attack/churn", ""))
+                    .times(200),
+                Client::tcp().repeats_each(0..300, churn).times(20),
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "service-churn",
         "20 clients provide and withdraw services, over and over",
-        service_churn,
+        || {
+            each(0..20, |k| {
+                let churn = |n: usize| {
+                    on_service(
+                        ["advertise_service", "unadvertise_service"][n % 2],
+                        &format!("/attack/{k}/{}", n / 2),
+                    )
+                };
+                Client::tcp().repeats_each(0..500, churn)
+            })
+        },
     ),
     Attack::new(
         "subscription-ids",
         "10 clients subscribe 1,000 times to one topic that 2 clients flood",
-        subscription_ids,
+        || {
+            let one = |k: usize| {
+                subscribe(
+                    "/attack/ids",
+                    &format!(r#","id":"{k}","throttle_rate":{k},"queue_length":{k}"#),
+                )
+            };
+            let flood = Client::tcp()
+                .advertises("/attack/ids")
+                .floods(&publish("/attack/ids", r#"{"data":1}"#))
+                .after(300)
+                .times(2);
+            [Client::tcp().says_each(1..1_000, one).times(10), flood].concat()
+        },
     ),
 ];
 
@@ -113,64 +233,8 @@ fn registrations() -> Vec<Client> {
 }
 
 /// Fewer names each: all of them together are much more than there is room for.
-fn registrations_many() -> Vec<Client> {
-    each(0..200, |k| {
-        Client::tcp().says_each(0..300, |n| {
-            subscribe(&format!("/{k}/{n}/{}", filler(1_000)), "")
-        })
-    })
-}
-
-fn leaving_together() -> Vec<Client> {
-    Client::tcp()
-        .says(r#"{"op":"set_level","level":"none"}"#)
-        .says_each(0..350, |n| subscribe(&format!("/{n}"), ""))
-        .leaves_after(5_000)
-        .times(200)
-}
-
 fn day_long(service: &str, args: &str) -> String {
     format!(r#"{{"op":"call_service","service":"{service}","id":1,"timeout":86400,"args":{args}}}"#)
-}
-
-fn day_long_calls() -> Vec<Client> {
-    let args = format!(r#"{{"data":"{}"}}"#, filler(4 * MIB - 1024));
-    each(0..21, |k| {
-        let service = format!("/attack/day/{k}");
-        Client::tcp()
-            .says(&on_service("advertise_service", &service))
-            .repeats(&day_long(&service, &args))
-            .deaf()
-    })
-}
-
-fn waiting_calls() -> Vec<Client> {
-    let args = format!(r#"{{"data":"{}"}}"#, filler(4096));
-    let call = day_long("/attack/never", &args);
-    let caller = Client::tcp()
-        .says_each(0..256, |_| call.clone())
-        .after(200)
-        .times(100);
-    [
-        Client::tcp()
-            .says(&on_service("advertise_service", "/attack/never"))
-            .times(1),
-        caller,
-    ]
-    .concat()
-}
-
-fn vanishing_providers() -> Vec<Client> {
-    let provide = Client::tcp()
-        .says(&on_service("advertise_service", "/attack/vanishing"))
-        .deaf()
-        .leaves_after(10)
-        .returns();
-    [
-        provide.times(20),
-        Client::tcp().floods(&light("/attack/vanishing")).times(10),
-    ]
-    .concat()
 }
 
 /// The id of a forwarded call, as it stands.
@@ -184,27 +248,6 @@ fn id_of(line: &str) -> Option<&str> {
 fn answer(service: &str, id: &str, values: &str) -> Vec<u8> {
     let head = format!(r#""op":"service_response","service":"{service}","id":{id}"#);
     format!("{{{head},\"result\":true,\"values\":{values}}}\n").into_bytes()
-}
-
-fn huge_answers() -> Vec<Client> {
-    fn reply(line: &str) -> Option<Vec<u8>> {
-        Some(answer(
-            "/attack/huge",
-            id_of(line)?,
-            &format!(r#"{{"data":"{}"}}"#, filler(3 * MIB)),
-        ))
-    }
-    let provider = Client::tcp()
-        .says(&on_service("advertise_service", "/attack/huge"))
-        .replies(reply)
-        .times(1);
-    let pause = std::time::Duration::from_millis(50);
-    let caller = Client::tcp()
-        .repeats(&light("/attack/huge"))
-        .drips(200, pause)
-        .after(200)
-        .times(10);
-    [provider, caller].concat()
 }
 
 fn mirrors() -> Vec<Client> {
@@ -228,17 +271,6 @@ fn mirrors() -> Vec<Client> {
             .says(&light(&service))
             .replies(reply)
     })
-}
-
-fn wrong_answers() -> Vec<Client> {
-    let id = format!("\"{}\"", filler(64 * 1024));
-    let frame = answer("/attack/nobody", &id, "{}");
-    let short = answer("/attack/nobody", "1", "{}").repeat(500);
-    Client::tcp()
-        .says(&light("/arm_sim/pause"))
-        .repeats_bytes(&frame)
-        .repeats_bytes(&short)
-        .times(10)
 }
 
 fn takeovers() -> Vec<Client> {
@@ -322,18 +354,6 @@ fn spellings() -> Vec<Client> {
     Client::tcp().repeats_each(0..500, spelling).times(10)
 }
 
-fn subscription_storm() -> Vec<Client> {
-    let storm = |k: usize| {
-        let topic = ["/joint_states", "/clock", "/attack/storm", "/tf"][k / 2 % 4];
-        if k.is_multiple_of(2) {
-            subscribe(topic, "")
-        } else {
-            on_topic("unsubscribe", topic)
-        }
-    };
-    Client::tcp().repeats_each(0..200, storm).times(20)
-}
-
 fn latched() -> Vec<Client> {
     let again = |k: usize| {
         let topic = ["/robot_description", "/tf_static"][k % 2];
@@ -345,46 +365,4 @@ fn latched() -> Vec<Client> {
         )
     };
     Client::tcp().repeats_each(0..256, again).times(20)
-}
-
-fn topic_churn() -> Vec<Client> {
-    let churn = |k: usize| match k % 3 {
-        0 => on_topic("advertise", "/attack/churn"),
-        1 => publish("/attack/churn", "{}"),
-        _ => on_topic("unadvertise", "/attack/churn"),
-    };
-    [
-        Client::tcp()
-            .says(&subscribe("/attack/churn", ""))
-            .times(200),
-        Client::tcp().repeats_each(0..300, churn).times(20),
-    ]
-    .concat()
-}
-
-fn service_churn() -> Vec<Client> {
-    each(0..20, |k| {
-        let churn = |n: usize| {
-            on_service(
-                ["advertise_service", "unadvertise_service"][n % 2],
-                &format!("/attack/{k}/{}", n / 2),
-            )
-        };
-        Client::tcp().repeats_each(0..500, churn)
-    })
-}
-
-fn subscription_ids() -> Vec<Client> {
-    let one = |k: usize| {
-        subscribe(
-            "/attack/ids",
-            &format!(r#","id":"{k}","throttle_rate":{k},"queue_length":{k}"#),
-        )
-    };
-    let flood = Client::tcp()
-        .advertises("/attack/ids")
-        .floods(&publish("/attack/ids", r#"{"data":1}"#))
-        .after(300)
-        .times(2);
-    [Client::tcp().says_each(1..1_000, one).times(10), flood].concat()
 }

@@ -14,13 +14,15 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "unread-pings",
         "1 client pings without end and reads no pong",
-        unread_pings,
+        || Client::web().repeats_bytes(&pings(PING)).deaf().times(1),
     ),
-    Attack::new("unread-pings-20", "20 clients do so", unread_pings_many),
+    Attack::new("unread-pings-20", "20 clients do so", || {
+        Client::web().repeats_bytes(&pings(PING)).deaf().times(20)
+    }),
     Attack::new(
         "read-pings",
         "10 clients ping without end and read the pongs",
-        read_pings,
+        || Client::web().repeats_bytes(&pings(PING)).times(10),
     ),
     Attack::new(
         "pongs",
@@ -30,14 +32,20 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "tiny-pieces",
         "10 clients send messages in frames of one byte",
-        tiny_pieces,
+        || {
+            Client::web()
+                .repeats_bytes(&in_pieces(&light("/arm_sim/pause"), &[]).repeat(64))
+                .times(10)
+        },
     ),
     Attack::new(
         "empty-pieces",
         "1 client sends a message that goes on in empty frames without end",
         empty_pieces,
     ),
-    Attack::new("empty-pieces-20", "20 clients do so", empty_pieces_many),
+    Attack::new("empty-pieces-20", "20 clients do so", || {
+        vec![empty_pieces(); 20].concat()
+    }),
     Attack::new(
         "unfinished-messages",
         "100 clients begin a message of 4 MiB and do not end it",
@@ -46,12 +54,26 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "long-messages",
         "20 clients send messages of 4 MiB, each over a million lines",
-        long_messages,
+        || {
+            let numbers = "1,\n".repeat((4 * MIB - 1024) / 3);
+            Client::web()
+                .advertises("/attack/long")
+                .repeats(&publish(
+                    "/attack/long",
+                    &format!(r#"{{"data":[{numbers}1]}}"#),
+                ))
+                .times(20)
+        },
     ),
     Attack::new(
         "pings-in-pieces",
         "10 clients put pings between the frames of a message",
-        pings_between,
+        || {
+            let ping = web_frame(PING, true, &[b'p'; 125]);
+            Client::web()
+                .repeats_bytes(&in_pieces(&light("/arm_sim/pause"), &ping).repeat(8))
+                .times(10)
+        },
     ),
     Attack::new(
         "masks",
@@ -76,29 +98,42 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "bad-handshakes",
         "20 clients ask for a WebSocket with wrong keys and versions, and return",
-        bad_handshakes,
+        || {
+            let wrong = |from: &str, to: &str| {
+                String::from_utf8_lossy(UPGRADE)
+                    .replace(from, to)
+                    .into_bytes()
+            };
+            let heads = [
+                wrong("13", "8"),
+                wrong("dGhl", "d"),
+                wrong("websocket", "h2c"),
+                wrong("Key", "Keys"),
+            ];
+            let client = |head: &Vec<u8>| {
+                Client::http("GET /")
+                    .says_bytes(head)
+                    .leaves_after(20)
+                    .returns()
+                    .times(5)
+            };
+            heads.iter().flat_map(client).collect()
+        },
     ),
     Attack::new(
         "unread-answers",
         "20 clients call without end and read no answer",
-        unread_answers,
+        || {
+            Client::web()
+                .floods(&light("/arm_sim/set_params"))
+                .deaf()
+                .times(20)
+        },
     ),
 ];
 
 fn pings(kind: u8) -> Vec<u8> {
     web_frame(kind, true, &[b'p'; 125]).repeat(512)
-}
-
-fn unread_pings() -> Vec<Client> {
-    Client::web().repeats_bytes(&pings(PING)).deaf().times(1)
-}
-
-fn unread_pings_many() -> Vec<Client> {
-    Client::web().repeats_bytes(&pings(PING)).deaf().times(20)
-}
-
-fn read_pings() -> Vec<Client> {
-    Client::web().repeats_bytes(&pings(PING)).times(10)
 }
 
 fn pongs() -> Vec<Client> {
@@ -119,19 +154,6 @@ fn in_pieces(frame: &str, between: &[u8]) -> Vec<u8> {
     frame.bytes().enumerate().flat_map(piece).collect()
 }
 
-fn tiny_pieces() -> Vec<Client> {
-    Client::web()
-        .repeats_bytes(&in_pieces(&light("/arm_sim/pause"), &[]).repeat(64))
-        .times(10)
-}
-
-fn pings_between() -> Vec<Client> {
-    let ping = web_frame(PING, true, &[b'p'; 125]);
-    Client::web()
-        .repeats_bytes(&in_pieces(&light("/arm_sim/pause"), &ping).repeat(8))
-        .times(10)
-}
-
 fn empty_pieces() -> Vec<Client> {
     let begin = web_frame(TEXT, false, b"{");
     Client::web()
@@ -141,25 +163,10 @@ fn empty_pieces() -> Vec<Client> {
         .times(1)
 }
 
-fn empty_pieces_many() -> Vec<Client> {
-    vec![empty_pieces(); 20].concat()
-}
-
 fn unfinished() -> Vec<Client> {
     Client::web()
         .says_bytes(&web_frame(TEXT, false, &vec![b' '; 4 * MIB - 1024]))
         .times(100)
-}
-
-fn long_messages() -> Vec<Client> {
-    let numbers = "1,\n".repeat((4 * MIB - 1024) / 3);
-    Client::web()
-        .advertises("/attack/long")
-        .repeats(&publish(
-            "/attack/long",
-            &format!(r#"{{"data":[{numbers}1]}}"#),
-        ))
-        .times(20)
 }
 
 fn masks() -> Vec<Client> {
@@ -207,34 +214,5 @@ fn handshakes() -> Vec<Client> {
         .says(&light("/arm_sim/pause"))
         .leaves_after(0)
         .returns()
-        .times(20)
-}
-
-fn bad_handshakes() -> Vec<Client> {
-    let wrong = |from: &str, to: &str| {
-        String::from_utf8_lossy(UPGRADE)
-            .replace(from, to)
-            .into_bytes()
-    };
-    let heads = [
-        wrong("13", "8"),
-        wrong("dGhl", "d"),
-        wrong("websocket", "h2c"),
-        wrong("Key", "Keys"),
-    ];
-    let client = |head: &Vec<u8>| {
-        Client::http("GET /")
-            .says_bytes(head)
-            .leaves_after(20)
-            .returns()
-            .times(5)
-    };
-    heads.iter().flat_map(client).collect()
-}
-
-fn unread_answers() -> Vec<Client> {
-    Client::web()
-        .floods(&light("/arm_sim/set_params"))
-        .deaf()
         .times(20)
 }

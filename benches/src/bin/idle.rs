@@ -8,8 +8,8 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-use pendularm_benches::process::{processor, resident};
 use pendularm_benches::program::Program;
+use pendularm_benches::program::{processor, resident};
 
 /// Simulation time as `/clock` has it now \[s\], and when it came.
 fn simulation_time(address: SocketAddr) -> (f64, Instant) {

@@ -1,34 +1,33 @@
-//! Attacks on the release program, one after the other, and what a healthy client has of each.
+//! Attacks on the release program, one after the other, and the service of a healthy client during each.
 //!
-//! `attack PATH/TO/pendularm [--quick] [--peers] [--list] [--only=WORD,WORD]`. For every attack the program is started
-//! anew on a free port. A healthy client makes a light call every 10 ms and watches `/joint_states`; four times a second
-//! a newcomer connects, does a little of everything, and goes. SIGTERM comes in the middle of the attack. With `--peers`
-//! redis and mosquitto come under the attacks that apply to them, beside ours. Exit status 1 if a bar is missed. Linux
-//! only: memory is read from `/proc`.
+//! `attack PATH/TO/pendularm [--quick] [--list] [--only=WORD,WORD]`. For every attack the program is started anew on a
+//! free port. A healthy client makes a light call every 10 ms and watches `/joint_states`. Four times a second a newcomer
+//! connects, does a little of everything, and leaves. SIGTERM comes in the middle of the attack. Exit status 1 if a bar is
+//! missed. Linux only: memory is read from `/proc`.
 
-mod healthy;
-mod newcomer;
-mod server;
 mod table;
-mod target;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use pendularm_benches::attack::script::Client;
+use pendularm_benches::attack::admission::REPORT;
 use pendularm_benches::attack::stage::{Deeds, play};
-use pendularm_benches::attack::{Attack, groups, peers};
-use pendularm_benches::protocol::Protocol;
+use pendularm_benches::attack::{Attack, TOKEN, groups};
+use pendularm_benches::healthy::{Healthy, Target};
+use pendularm_benches::program::{Program, peak};
 
-use server::{Server, Servers};
 use table::{Bars, Row, Verdict};
 
 /// From the healthy client's first call to the attack.
 const CALM: Duration = Duration::from_millis(100);
+/// Bytes of the report's file that slow readers ask for.
+const LARGE: usize = 8 * 1024 * 1024;
 
 /// How long, how strict, which.
 struct Plan {
+    program: String,
     attacked: Duration,
     /// Until a call or a newcomer counts as not answered.
     patience: Duration,
@@ -39,33 +38,31 @@ struct Plan {
 }
 
 impl Plan {
-    fn of(arguments: &[String]) -> Self {
-        let quick = arguments.iter().any(|argument| argument == "--quick");
+    fn of(program: String, arguments: &[String]) -> Self {
         let only = arguments
             .iter()
             .find_map(|argument| argument.strip_prefix("--only="));
-        let only = only
-            .map(|words| words.split(',').map(str::to_owned).collect())
-            .unwrap_or_default();
-        if quick {
-            // A machine that stands still for seconds answers late; a client that is not answered at all waits
-            // for ever.
-            let patience = Duration::from_secs(20);
-            return Self {
-                attacked: Duration::from_millis(900),
-                patience,
-                bars: Bars::QUICK,
-                // A second's play is late as a whole where the machine stands still for one of its moments.
-                tries: 3,
-                only,
-            };
-        }
-        Self {
+        let full = Self {
+            program,
             attacked: Duration::from_secs(4),
             patience: Duration::from_secs(2),
             bars: Bars::FULL,
             tries: 1,
-            only,
+            only: only
+                .map(|words| words.split(',').map(str::to_owned).collect())
+                .unwrap_or_default(),
+        };
+        if !arguments.iter().any(|argument| argument == "--quick") {
+            return full;
+        }
+        // A machine that pauses for seconds answers late; a client that is not answered at all waits for ever. A play of a second is
+        // late as a whole if the machine pauses once in it.
+        Self {
+            attacked: Duration::from_millis(900),
+            patience: Duration::from_secs(20),
+            bars: Bars::QUICK,
+            tries: 3,
+            ..full
         }
     }
 
@@ -76,16 +73,22 @@ impl Plan {
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let has = |flag: &str| arguments.iter().any(|argument| argument == flag);
-    if has("--list") {
-        return list();
+    if arguments.iter().any(|argument| argument == "--list") {
+        for (group, attacks) in groups() {
+            println!("{group}");
+            for attack in attacks {
+                println!("  {:<24} {}", attack.name, attack.what);
+            }
+        }
+        return ExitCode::SUCCESS;
     }
-    let plan = Plan::of(&arguments);
     let Some(program) = arguments.first().filter(|first| !first.starts_with("--")) else {
         eprintln!("attack: which program? attack PATH/TO/pendularm");
         return ExitCode::from(2);
     };
-    match run(program, &plan, has("--peers")) {
+    let missed =
+        Folder::enter(program).and_then(|(_folder, program)| run(&Plan::of(program, &arguments)));
+    match missed {
         Ok(missed) if missed.is_empty() => ExitCode::SUCCESS,
         Ok(missed) => {
             println!(
@@ -102,62 +105,39 @@ fn main() -> ExitCode {
     }
 }
 
-fn list() -> ExitCode {
-    for (group, attacks) in groups() {
-        println!("{group}");
-        for attack in attacks {
-            println!("  {:<24} {}", attack.name, attack.what);
-        }
-    }
-    println!("beside redis and mosquitto");
-    for attack in peers::ATTACKS {
-        println!("  {:<24} {}", attack.name, attack.what);
-    }
-    ExitCode::SUCCESS
-}
-
 /// Plays everything that was picked; the names of what missed a bar.
-fn run(program: &str, plan: &Plan, with_peers: bool) -> Result<Vec<String>, String> {
-    let servers = Servers::new(program)?;
+fn run(plan: &Plan) -> Result<Vec<&'static str>, String> {
     let mut missed = Vec::new();
     println!("{}", plan.bars);
     table::print_head();
-    let baseline = Attack::new("baseline", "nobody attacks", Vec::new);
-    attacked(&servers, &baseline, plan, &mut missed)?;
+    attacked(
+        &Attack::new("baseline", "nobody attacks", Vec::new),
+        plan,
+        &mut missed,
+    )?;
     for (group, attacks) in groups() {
-        let picked: Vec<&Attack> = attacks
+        let mut picked = attacks
             .iter()
             .filter(|attack| plan.picks(attack.name))
-            .collect();
-        if !picked.is_empty() {
+            .peekable();
+        if picked.peek().is_some() {
             println!("-- {group}");
         }
         for attack in picked {
-            attacked(&servers, attack, plan, &mut missed)?;
+            attacked(attack, plan, &mut missed)?;
         }
-    }
-    if with_peers {
-        beside_peers(&servers, plan, &mut missed)?;
     }
     Ok(missed)
 }
 
-fn attacked(
-    servers: &Servers,
-    attack: &Attack,
-    plan: &Plan,
-    missed: &mut Vec<String>,
-) -> Result<(), String> {
+fn attacked(attack: &Attack, plan: &Plan, missed: &mut Vec<&'static str>) -> Result<(), String> {
     for left in (0..plan.tries).rev() {
-        let server = servers.ours(attack)?;
-        let mut row = endure(server, attack.name, &(attack.cast)(), attack.locked, plan)?;
-        row.newcomers_welcome = !attack.fills;
-        match row.print(&plan.bars) {
+        match endure(attack, plan)?.print(&plan.bars) {
             Verdict::Held => break,
             Verdict::Late if left > 0 => println!("     late: once more"),
             Verdict::Late | Verdict::Missed => {
                 println!("     {}: {}", attack.name, attack.what);
-                missed.push(attack.name.to_owned());
+                missed.push(attack.name);
                 break;
             }
         }
@@ -165,78 +145,50 @@ fn attacked(
     Ok(())
 }
 
-/// The same attack on each server. Only ours is judged; misses of the others are marked as well.
-fn beside_peers(servers: &Servers, plan: &Plan, missed: &mut Vec<String>) -> Result<(), String> {
-    println!("-- beside redis and mosquitto, all as they come, nothing written to a disk");
-    let calm = peers::Common {
-        name: "baseline",
-        what: "nobody attacks",
-        cast: |_| Vec::new(),
-    };
-    for attack in std::iter::once(&calm).chain(
-        peers::ATTACKS
-            .iter()
-            .filter(|attack| plan.picks(attack.name)),
-    ) {
-        println!("     {}: {}", attack.name, attack.what);
-        for protocol in Protocol::ALL {
-            let server = match protocol {
-                Protocol::Pendularm => servers.ours(&Attack::new("", "", Vec::new))?,
-                Protocol::Redis | Protocol::Mosquitto => servers.peer(protocol)?,
-            };
-            let row = endure(
-                server,
-                protocol.name(),
-                &(attack.cast)(protocol),
-                false,
-                plan,
-            )?;
-            if row.print(&plan.bars) != Verdict::Held && protocol == Protocol::Pendularm {
-                missed.push(attack.name.to_owned());
-            }
-        }
+/// The program as the attack wants it, on a free port.
+fn start(attack: &Attack, program: &str) -> Result<Program, String> {
+    let mut arguments = vec!["--bind", "127.0.0.1:0", "--seed", "1"];
+    if !attack.options.contains(&"--log") {
+        arguments.extend(["--log", "warn"]);
     }
-    Ok(())
+    if attack.locked {
+        arguments.extend(["--token", TOKEN]);
+    }
+    arguments.extend(attack.options);
+    let Some(files) = attack.files else {
+        return Program::start(program, &arguments);
+    };
+    let script = format!("ulimit -n {files}; exec \"$0\" \"$@\"");
+    arguments.splice(0..0, ["-c", &script, program]);
+    Program::start("sh", &arguments)
 }
 
-/// Puts a server under an attack; SIGTERM comes before the attack ends.
-fn endure(
-    server: Server,
-    name: &str,
-    cast: &[Client],
-    locked: bool,
-    plan: &Plan,
-) -> Result<Row, String> {
-    let Server {
-        protocol,
-        address,
-        program,
-    } = server;
-    let pid = program.pid();
+/// Attacks the program; SIGTERM comes before the attack ends.
+fn endure(attack: &Attack, plan: &Plan) -> Result<Row, String> {
+    let program = start(attack, &plan.program)?;
+    let (address, pid, cast) = (program.address, program.pid(), (attack.cast)());
     let (over, deeds) = (AtomicBool::new(false), Deeds::default());
-    let watched = target::Target {
-        protocol,
+    let healthy = Healthy::start(Target {
         address,
-        locked,
+        locked: attack.locked,
         patience: plan.patience,
-    };
-    let healthy = healthy::Healthy::start(watched)?;
+    })?;
     let (health, peak, ended) = std::thread::scope(|scope| {
         std::thread::sleep(CALM);
         let attackers =
-            scope.spawn(|| play(cast, address, &deeds, || over.load(Ordering::Relaxed)));
+            scope.spawn(|| play(&cast, address, &deeds, || over.load(Ordering::Relaxed)));
         std::thread::sleep(plan.attacked);
         let health = healthy.finish();
-        let peak = table::peak(pid);
+        let peak = peak(pid);
         let ended = program.end();
         over.store(true, Ordering::Relaxed);
         let _ = attackers.join();
         (health, peak, ended)
     });
     Ok(Row {
-        name: name.to_owned(),
+        name: attack.name,
         health,
-        newcomers_welcome: true,
+        newcomers_welcome: !attack.fills,
         peak: peak.unwrap_or(f64::NAN),
         ended: if peak.is_some() {
             ended
@@ -246,4 +198,34 @@ fn endure(
         deeds,
         attacked: !cast.is_empty(),
     })
+}
+
+/// The folder in which the program runs, with a report in it; removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    /// Makes it, and goes there; the program's path from the root.
+    fn enter(program: &str) -> Result<(Self, String), String> {
+        let program =
+            std::fs::canonicalize(program).map_err(|error| format!("{program}: {error}"))?;
+        let folder = std::env::temp_dir().join(format!("pendularm-attack-{}", std::process::id()));
+        let report = folder.join(REPORT);
+        let make = || {
+            std::fs::create_dir_all(&report)?;
+            std::fs::write(
+                report.join("index.html"),
+                "<!doctype html><title>report</title>",
+            )?;
+            std::fs::write(report.join("large.csv"), "0.125,".repeat(LARGE / 6))?;
+            std::env::set_current_dir(&folder)
+        };
+        make().map_err(|error| format!("{}: {error}", folder.display()))?;
+        Ok((Self(folder), program.to_string_lossy().into_owned()))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
 }

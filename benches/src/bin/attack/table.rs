@@ -5,8 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use pendularm_benches::attack::stage::Deeds;
-
-use crate::healthy::Health;
+use pendularm_benches::healthy::Health;
 
 /// Bounds that must hold.
 pub struct Bars {
@@ -67,7 +66,7 @@ pub enum Verdict {
 
 /// The outcome of an attack.
 pub struct Row {
-    pub name: String,
+    pub name: &'static str,
     pub health: Health,
     /// Newcomers have a place, and must be served.
     pub newcomers_welcome: bool,
@@ -78,15 +77,6 @@ pub struct Row {
     pub deeds: Deeds,
     /// There were attackers.
     pub attacked: bool,
-}
-
-/// The most memory that a process has had resident \[MB\]; none once it is gone.
-pub fn peak(pid: u32) -> Option<f64> {
-    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))?;
-    Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
 }
 
 pub fn print_head() {
@@ -111,7 +101,7 @@ impl Row {
     /// Prints it, and judges it.
     pub fn print(&self, bars: &Bars) -> Verdict {
         let health = &self.health;
-        let (delays, visits) = (&health.delays, &health.visits);
+        let delays = &health.delays;
         let at = |part: f64| {
             delays.get(((delays.len() as f64 * part) as usize).min(delays.len().wrapping_sub(1)))
         };
@@ -135,8 +125,8 @@ impl Row {
             format!("{:.0}", health.longest_gap),
             health.longest_gap <= bars.gap,
         );
-        let welcome = visits.served == visits.made || !self.newcomers_welcome;
-        let served = mark(format!("{}/{}", visits.served, visits.made), welcome);
+        let welcome = health.served == health.visits || !self.newcomers_welcome;
+        let served = mark(format!("{}/{}", health.served, health.visits), welcome);
         let peak = mark(format!("{:.0}", self.peak), self.peak <= bars.peak);
         let ended = match &self.ended {
             Ok((time, Some(0))) => mark_time(time.as_millis().to_string(), *time <= bars.end),
@@ -153,13 +143,17 @@ impl Row {
             "{:<21} {answered:>11} {p50:>8.1} {p99:>9} {most:>9.0} {gap:>10} {served:>8} {:>9.0} {peak:>8} \
              {ended:>8} {connections:>7} {:>8.1}",
             self.name,
-            visits.longest,
+            health.longest_visit,
             sent as f64 / 1e6,
         );
         for fault in &health.faults {
             println!("     {}", shortened(fault));
         }
-        if let Some(fault) = visits.fault.as_ref().filter(|_| self.newcomers_welcome) {
+        if let Some(fault) = health
+            .visit_fault
+            .as_ref()
+            .filter(|_| self.newcomers_welcome)
+        {
             println!("     a newcomer: {}", shortened(fault));
         }
         if let Err(why) = &self.ended {

@@ -15,7 +15,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
 use fleet::{Fleet, Outcome, Pace, Scene};
-use pendularm_benches::process;
+use pendularm_benches::program::processor;
 use pendularm_benches::protocol::Protocol;
 
 /// How often the arm publishes, and so everybody here that does not flood.
@@ -188,9 +188,9 @@ fn server(text: &str) -> Server {
 
 /// Processor time that a server takes in a second without clients \[ns\].
 fn rest(server: &Server, seconds: f64) -> f64 {
-    let (before, began) = (process::processor(server.pid), Instant::now());
+    let (before, began) = (processor(server.pid), Instant::now());
     std::thread::sleep(Duration::from_secs_f64(seconds));
-    (process::processor(server.pid) - before) as f64 / began.elapsed().as_secs_f64()
+    (processor(server.pid) - before) as f64 / began.elapsed().as_secs_f64()
 }
 
 /// Plays a scene to each server in turn, as many rounds as planned; then once more with probes beside it.

@@ -12,7 +12,7 @@ use mio::net::TcpStream;
 use mio::{Events, Interest, Poll, Token};
 
 use crate::message::Template;
-use pendularm_benches::process;
+use pendularm_benches::program::{processor, resident};
 use pendularm_benches::protocol::Protocol;
 
 /// How long a server may take for what is asked of it before the run fails.
@@ -189,18 +189,18 @@ impl Fleet {
     /// Runs the scene for `seconds` after a warm-up, then waits for all that is on its way.
     pub fn run(mut self, pid: u32, seconds: f64) -> Outcome {
         let began = Instant::now();
-        let (mut measured_from, mut processor, mut before) = (None, 0, 0);
+        let (mut measured_from, mut at_start, mut before) = (None, 0, 0);
         let mut next = began;
         let (wall, deliveries, used) = loop {
             let now = Instant::now();
             match measured_from {
                 None if now >= began + WARM_UP => {
                     (measured_from, before) = (Some(now), self.deliveries);
-                    processor = process::processor(pid);
+                    at_start = processor(pid);
                     self.measuring = true;
                 }
                 Some(from) if now >= from + Duration::from_secs_f64(seconds) => {
-                    let used = process::processor(pid) - processor;
+                    let used = processor(pid) - at_start;
                     break (now - from, self.deliveries - before, used);
                 }
                 _ => {}
@@ -215,7 +215,7 @@ impl Fleet {
             deliveries,
             processor: used,
             latencies: std::mem::take(&mut self.latencies),
-            resident: process::resident(pid),
+            resident: resident(pid),
         }
     }
 

@@ -1,0 +1,313 @@
+//! The healthy clients: a caller, a watcher, newcomers. An attack is judged by the service that they get.
+//!
+//! **Invariant:** calls are made when they are due, whether or not earlier ones have been answered. A standstill delays all of
+//! them.
+
+use std::collections::VecDeque;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use pendularm_client::Error;
+use pendularm_client::blocking::Client;
+use pendularm_client::codec::Framing;
+use serde_json::{Value, json};
+
+use crate::attack::TOKEN;
+
+/// Between two calls.
+const CALLS: Duration = Duration::from_millis(10);
+/// Between two newcomers.
+const VISITS: Duration = Duration::from_millis(250);
+/// Bytes of the message that a newcomer sends to itself.
+const MESSAGE: usize = 256 * 1024;
+
+/// The server that is attacked, as the healthy clients know it.
+#[derive(Clone, Copy)]
+pub struct Target {
+    /// Address that it listens on.
+    pub address: SocketAddr,
+    /// Whether it asks for the token.
+    pub locked: bool,
+    /// Until a call or a newcomer counts as not answered.
+    pub patience: Duration,
+}
+
+/// The calls, messages and visits of the healthy clients, with their delays.
+#[derive(Default)]
+pub struct Health {
+    /// Calls made.
+    pub asked: usize,
+    /// Delays of the calls that were answered \[ms\], in rising order.
+    pub delays: Vec<f64>,
+    /// Longest time between two messages of `/joint_states`, and from the last to the end \[ms\].
+    pub longest_gap: f64,
+    /// Newcomers that came.
+    pub visits: usize,
+    /// Newcomers that were served.
+    pub served: usize,
+    /// The longest visit of those that were served \[ms\].
+    pub longest_visit: f64,
+    /// The fault of the first newcomer that was not served.
+    pub visit_fault: Option<String>,
+    /// Faults of the caller and of the watcher.
+    pub faults: Vec<String>,
+}
+
+/// The threads, running.
+pub struct Healthy {
+    stop: Arc<AtomicBool>,
+    threads: [JoinHandle<Health>; 3],
+}
+
+impl Healthy {
+    /// Connections that stay open; newcomers have one more for a moment.
+    pub const CONNECTIONS: usize = 2;
+
+    /// Connects, and starts to call and to watch.
+    pub fn start(target: Target) -> Result<Self, String> {
+        let (caller, watcher) = (target.connect()?, target.connect()?);
+        let stop: Arc<AtomicBool> = Arc::default();
+        let [one, two, three] = [(); 3].map(|()| Arc::clone(&stop));
+        let threads = [
+            std::thread::spawn(move || call(caller, target, &one)),
+            std::thread::spawn(move || watch(watcher, &two)),
+            std::thread::spawn(move || come_and_go(target, &three)),
+        ];
+        Ok(Self { stop, threads })
+    }
+
+    /// Stops, once the outstanding answers have come or the patience ends.
+    pub fn finish(self) -> Health {
+        self.stop.store(true, Ordering::Relaxed);
+        let lost = |_| Health {
+            faults: vec!["a healthy client broke".to_owned()],
+            ..Health::default()
+        };
+        let [mut health, watched, visited] = self
+            .threads
+            .map(|thread| thread.join().unwrap_or_else(lost));
+        health.delays.sort_unstable_by(f64::total_cmp);
+        health.faults.extend(watched.faults);
+        health.faults.extend(visited.faults);
+        Health {
+            longest_gap: watched.longest_gap,
+            ..Health {
+                visits: visited.visits,
+                served: visited.served,
+                longest_visit: visited.longest_visit,
+                visit_fault: visited.visit_fault,
+                ..health
+            }
+        }
+    }
+}
+
+impl Target {
+    /// A client that has shown the token where one is asked for.
+    fn connect(self) -> Result<Client, String> {
+        let open = || {
+            let mut client = Client::connect(Framing::Lines, self.address, self.patience)?;
+            if self.locked {
+                send(&mut client, &json!({"op": "auth", "token": TOKEN}))?;
+            }
+            Ok(client)
+        };
+        open().map_err(|error: Error| format!("connecting: {error}"))
+    }
+}
+
+fn send(client: &mut Client, frame: &Value) -> Result<(), Error> {
+    client.write(format!("{frame}\n").as_bytes())
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+fn call(mut client: Client, target: Target, stop: &AtomicBool) -> Health {
+    let request = json!({"op": "call_service", "service": "/arm_sim/pause", "args": {}});
+    let (mut health, mut waiting) = (Health::default(), VecDeque::new());
+    let (mut due, mut until) = (Instant::now(), None);
+    let mut fault = None;
+    while fault.is_none() {
+        let now = Instant::now();
+        if until.is_none() && stop.load(Ordering::Relaxed) {
+            until = Some(now + target.patience);
+        }
+        match until {
+            Some(until) if waiting.is_empty() || now >= until => break,
+            None if now >= due => {
+                due = (due + CALLS).max(now);
+                waiting.push_back(now);
+                health.asked += 1;
+                fault = send(&mut client, &request).err();
+            }
+            _ => {}
+        }
+        let wait = Instant::now() + Duration::from_micros(100);
+        match client.next_frame(due.max(wait)) {
+            Ok(frame) if frame["op"] == "service_response" => {
+                if let Some(sent) = waiting.pop_front() {
+                    health.delays.push(milliseconds(sent.elapsed()));
+                }
+            }
+            Ok(frame) => health.faults.push(format!("the caller: {frame}")),
+            Err(Error::Late) => {}
+            Err(error) => fault = Some(error),
+        }
+    }
+    health
+        .faults
+        .extend(fault.map(|why| format!("the caller: {why}")));
+    health
+}
+
+fn watch(mut client: Client, stop: &AtomicBool) -> Health {
+    let mut health = Health::default();
+    let subscribe = json!({"op": "subscribe", "topic": "/joint_states"});
+    let mut fault = send(&mut client, &subscribe).err();
+    let mut last = Instant::now();
+    while fault.is_none() && !stop.load(Ordering::Relaxed) {
+        match client.next_frame(Instant::now() + CALLS) {
+            Ok(frame) if frame["op"] == "publish" => {
+                health.longest_gap = health.longest_gap.max(milliseconds(last.elapsed()));
+                last = Instant::now();
+            }
+            Ok(_) | Err(Error::Late) => {}
+            Err(error) => fault = Some(error),
+        }
+    }
+    health.longest_gap = health.longest_gap.max(milliseconds(last.elapsed()));
+    health
+        .faults
+        .extend(fault.map(|why| format!("the watcher: {why}")));
+    health
+}
+
+/// Newcomers, until it is told to stop.
+fn come_and_go(target: Target, stop: &AtomicBool) -> Health {
+    let mut health = Health::default();
+    while !stop.load(Ordering::Relaxed) {
+        let began = Instant::now();
+        health.visits += 1;
+        match visit(target, health.visits) {
+            Ok(()) => {
+                health.served += 1;
+                health.longest_visit = health.longest_visit.max(milliseconds(began.elapsed()));
+            }
+            Err(why) => drop(health.visit_fault.get_or_insert(why)),
+        }
+        let pause = VISITS.saturating_sub(began.elapsed());
+        std::thread::sleep(pause.max(Duration::from_millis(20)));
+    }
+    health
+}
+
+/// A call of a service of its own, a message to itself, a small computation, the page.
+fn visit(target: Target, number: usize) -> Result<(), String> {
+    let mut client = target.connect()?;
+    let client = &mut client;
+    let service = format!("/newcomer/{number}/service");
+    let topic = format!("/newcomer/{number}/topic");
+    let part = |name: &'static str| move |why: String| format!("{name}: {why}");
+    let ask =
+        |client: &mut Client, frame: Value| send(client, &frame).map_err(|error| error.to_string());
+
+    let mut calling = || {
+        ask(
+            client,
+            json!({"op": "advertise_service", "service": service}),
+        )?;
+        ask(
+            client,
+            json!({"op": "call_service", "service": service, "id": "call"}),
+        )?;
+        let forwarded = next(client, "call_service", target.patience)?;
+        ask(
+            client,
+            json!({"op": "service_response", "service": service, "id": forwarded["id"], "result": true, "values": {}}),
+        )?;
+        succeeded(&next(client, "service_response", target.patience)?)
+    };
+    calling().map_err(part("a forwarded call"))?;
+
+    let mut publishing = || {
+        let content = "x".repeat(MESSAGE);
+        ask(client, json!({"op": "subscribe", "topic": topic}))?;
+        ask(client, json!({"op": "advertise", "topic": topic}))?;
+        ask(
+            client,
+            json!({"op": "publish", "topic": topic, "msg": {"data": content}}),
+        )?;
+        let came = next(client, "publish", target.patience)?;
+        let whole = came["msg"]["data"].as_str() == Some(content.as_str());
+        whole
+            .then_some(())
+            .ok_or_else(|| "its message came back different".to_owned())
+    };
+    publishing().map_err(part("a message to itself"))?;
+
+    let mut computing = || {
+        let args = json!({"function": "t", "x0": 0, "dt": 0.01, "steps": 100, "integrator": "rk4"});
+        let service = "/arm_sim/integration_step";
+        ask(
+            client,
+            json!({"op": "call_service", "service": service, "id": "compute", "args": args}),
+        )?;
+        succeeded(&next(client, "service_response", target.patience)?)
+    };
+    computing().map_err(part("a computation"))?;
+    see_the_page(target).map_err(part("the page"))
+}
+
+/// The next frame of that operation; an error status ends the wait.
+fn next(client: &mut Client, op: &str, patience: Duration) -> Result<Value, String> {
+    let deadline = Instant::now() + patience;
+    loop {
+        let frame = client
+            .next_frame(deadline)
+            .map_err(|error| error.to_string())?;
+        if frame["op"] == op {
+            return Ok(frame);
+        }
+        if frame["op"] == "status" && frame["level"] == "error" {
+            return Err(frame["msg"].to_string());
+        }
+    }
+}
+
+fn succeeded(response: &Value) -> Result<(), String> {
+    if response["result"] == true {
+        Ok(())
+    } else {
+        Err(response["values"].to_string() + &response["status"].to_string())
+    }
+}
+
+fn see_the_page(target: Target) -> Result<(), String> {
+    let query = if target.locked {
+        format!("?token={TOKEN}")
+    } else {
+        String::new()
+    };
+    let fetch = || {
+        let mut stream = TcpStream::connect_timeout(&target.address, target.patience)?;
+        stream.set_read_timeout(Some(target.patience))?;
+        stream.set_write_timeout(Some(target.patience))?;
+        let request = format!("GET /{query} HTTP/1.1\r\nHost: {}\r\n\r\n", target.address);
+        stream.write_all(request.as_bytes())?;
+        let mut head = [0; 12];
+        stream.read_exact(&mut head)?;
+        Ok(head)
+    };
+    let head = fetch().map_err(|error: std::io::Error| error.to_string())?;
+    // A redirection takes the token out of the address.
+    if head.starts_with(b"HTTP/1.1 2") || head.starts_with(b"HTTP/1.1 3") {
+        return Ok(());
+    }
+    Err(String::from_utf8_lossy(&head).into_owned())
+}
