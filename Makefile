@@ -144,8 +144,8 @@ bench-ros2: build ## Measure that bridge between two hosts with up to 50 watcher
 	@echo "make bench-ros2: a build of some minutes the first time, then three; the fewer other programs run, the better"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash ros2/tests/bench.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
-mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors", --check
-	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"
+mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs", "actors --shard 0/20" or --check
+	@echo "make mutants: needs cargo-mutants; outcomes are in target/mutants"
 	@bash scripts/mutants.sh $(ARGS)
 
 bench: ## Measure our own speed and size; ARGS=--quick for a look, KEEP=1 keeps the figures in benches/results/
