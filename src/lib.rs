@@ -22,14 +22,16 @@
 //! x86-64 takes a tenth (2 links) to a fifth (3) fewer instructions.
 //!
 //! ```
-//! use pendularm::math::{arm::Arm, pid::Gains, simulation::Simulation};
+//! use pendularm::math::{arm::Arm, integrator::Method, pid::{Gains, Setpoint}, simulation::Simulation};
 //!
-//! let arm = Arm::new([1.0, 1.0], [1.0, 1.0], 9.81)?;
+//! let arm = Arm::new([1.0, 1.0], [1.0, 1.0], 9.81)?; // masses, lengths, gravity
 //! let mut simulation = Simulation::new(arm, Gains { kp: [1000.0, 250.0], ki: [3000.0, 750.0], kd: [110.0, 22.0] });
-//! for _ in 0..1000 {
-//!     simulation.step();
-//! }
-//! assert!(simulation.state().position[0] < 0.0, "it has begun to fall");
+//! simulation.set_method(Method::Rk4);
+//! simulation.set_timestep(0.001);
+//! simulation.set_setpoint(Setpoint { position: [0.3, -0.5], velocity: [0.0; 2] });
+//! simulation.enable(true);
+//! assert_eq!(simulation.advance(4000), 4000, "it has not diverged");
+//! assert!((simulation.state().position[0] - 0.3).abs() < 0.01);
 //! # Ok::<(), pendularm::math::arm::ArmError>(())
 //! ```
 
