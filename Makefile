@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run page test conformance test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
+.PHONY: help build install run page test conformance test-slow check-study test-page test-browser test-clients simulate fuzz attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission dist test-dist
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -75,17 +75,9 @@ simulate: ## Run the whole runtime in virtual time under SEEDS=1000 seeds that t
 	@CARGO="$(CARGO)" SEED="$(SEED)" SEEDS="$(SEEDS)" MINUTES="$(MINUTES)" FROM="$(FROM)" WITHOUT="$(WITHOUT)" GO_ON="$(GO_ON)" \
 		bash scripts/simulate.sh
 
-simulate-faults: ## Put faults into a copy of the sources and see at which seed the simulation finds each; ARGS="3 7" picks some
-	@echo "make simulate-faults: up to $(or $(SEEDS),1000) seeds each, after a build of some minutes"
-	@SEEDS="$(SEEDS)" FROM="$(FROM)" python3 tests/simulate/faults.py $(ARGS)
-
 fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), or repeat RUNS=1000 times its share; ARGS="frame op" picks some
 	@echo "make fuzz: $(if $(RUNS),the same executions everywhere,$(or $(TIME),60) s each), after a build of some minutes"
 	@CARGO="$(CARGO)" TIME="$(TIME)" RUNS="$(RUNS)" bash scripts/fuzz.sh $(ARGS)
-
-fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz, or RUNS=n
-	@echo "make fuzz-faults: up to $(or $(TIME),60) s each, after a build of some minutes"
-	@TIME="$(or $(TIME),60)" RUNS="$(RUNS)" python3 fuzz/faults/run.py $(ARGS)
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
@@ -97,9 +89,6 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features services -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
-	@echo "planted faults: has each its place in the sources still?"
-	python3 tests/simulate/faults.py check
-	python3 fuzz/faults/run.py check
 
 audit: ## Check the dependencies: licences, duplicates, sources, advisories where there is a copy of the database
 	@echo "make audit: cargo-deny against deny.toml"

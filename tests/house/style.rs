@@ -1,4 +1,4 @@
-//! How the source is cut and worded: short files, short lines, one style of modules, plain words.
+//! How the source is cut: short files, short lines, one style of modules, one name for one type.
 //!
 //! **Invariant:** no rule has an exception but those that stand here with their reason.
 
@@ -20,13 +20,6 @@ const LANGUAGES: [&str; 5] = ["rs", "py", "js", "mjs", "sh"];
 /// Longest line, in characters.
 const MAX_WIDTH: usize = 120;
 
-/// In this file each link has a tip, of which one at most is the end effector.
-const LINKS_HAVE_TIPS: &str = "math/dynamics/articulated_body.rs";
-/// Names for which the field or the house has a better one.
-const NAMES: [&str; 10] = [
-    "told", "Owed", "owe", "Settle", "Desk", "by_hand", "ByHand", "hand", "tip", "Tip",
-];
-
 fn source() -> impl Iterator<Item = (String, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     rust_files("src").into_iter().map(move |path: PathBuf| {
@@ -38,15 +31,6 @@ fn source() -> impl Iterator<Item = (String, String)> {
 
 fn assert_none(what: &str, found: &[String]) {
     assert!(found.is_empty(), "{what}:\n{}", found.join("\n"));
-}
-
-/// Code and comment of a line.
-fn halves(line: &str) -> (&str, &str) {
-    line.split_once("//").unwrap_or((line, ""))
-}
-
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|one: char| !(one.is_alphanumeric() || one == '_'))
 }
 
 #[test]
@@ -96,17 +80,6 @@ fn nobody_reaches_three_floors_up() {
     }
 }
 
-/// Every name in the code, of macros' arguments too; text and comments are none.
-fn names(tokens: TokenStream, found: &mut Vec<String>) {
-    for token in tokens {
-        match token {
-            TokenTree::Ident(name) => found.push(name.to_string()),
-            TokenTree::Group(group) => names(group.stream(), found),
-            TokenTree::Punct(_) | TokenTree::Literal(_) => {}
-        }
-    }
-}
-
 /// The types that a file defines, in the body of a macro too. A `type` within a trait or its implementation defines none.
 fn types(tokens: TokenStream, found: &mut Vec<String>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
@@ -147,63 +120,4 @@ fn no_two_types_have_one_name() {
     }
     files.retain(|_, places| places.len() > 1);
     assert!(files.is_empty(), "two things of one name: {files:#?}");
-}
-
-#[test]
-fn names_are_the_fields_and_say_one_thing() {
-    for banned in NAMES {
-        let mut found = Vec::new();
-        for (path, text) in source() {
-            let mut here = Vec::new();
-            names(text.parse().unwrap(), &mut here);
-            if path == LINKS_HAVE_TIPS && banned.eq_ignore_ascii_case("tip") {
-                continue;
-            }
-            let is_banned = |name: &String| {
-                let rest = name.replace("at_hand", "");
-                let rest = if banned == "hand" {
-                    rest.replace("by_hand", "")
-                } else {
-                    rest
-                };
-                format!("_{rest}_").contains(&format!("_{banned}_"))
-            };
-            here.retain(is_banned);
-            found.extend(here.iter().map(|name| format!("{path}: {name}")));
-        }
-        assert_none(banned, &found);
-    }
-}
-
-#[test]
-fn comments_say_end_effector() {
-    let mut found = Vec::new();
-    for (path, text) in source() {
-        if path == LINKS_HAVE_TIPS {
-            continue;
-        }
-        for (number, line) in (1..).zip(text.lines()) {
-            let comment = halves(line).1.replace("by hand", "").replace("at hand", "");
-            let here = words(&comment).any(|word| ["hand", "hand's", "tip"].contains(&word));
-            if here {
-                found.push(format!("{path}:{number}: {line}"));
-            }
-        }
-    }
-    assert_none("comments that say hand or tip", &found);
-}
-
-/// Whole lines are looked at: people read its texts, and the browser's tests its names.
-#[test]
-fn the_page_says_end_effector() {
-    let mut found = Vec::new();
-    for path in files_in("page", &["js", "html", "css"]) {
-        let text = fs::read_to_string(&path).unwrap();
-        for (number, line) in (1..).zip(text.lines()) {
-            if words(line).any(|word| ["tip", "tips", "Tip", "Tips"].contains(&word)) {
-                found.push(format!("{}:{number}: {line}", path.display()));
-            }
-        }
-    }
-    assert_none("lines of the page that say tip", &found);
 }

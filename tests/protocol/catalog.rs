@@ -5,7 +5,7 @@
 
 use std::collections::HashSet;
 
-use pendularm::protocol::catalog::{Node, Service, Topic, types};
+use pendularm::protocol::catalog::{Service, Topic, types};
 
 #[test]
 fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
@@ -166,26 +166,4 @@ fn no_type_has_itself_inside() {
     for one in types::all() {
         walk(one, &mut Vec::new());
     }
-}
-
-#[test]
-fn every_node_has_a_name_of_its_own() {
-    let names: HashSet<&str> = Node::ALL.iter().map(|node| node.name()).collect();
-    assert_eq!(
-        names,
-        HashSet::from([
-            "arm_sim",
-            "ik",
-            "ik_action",
-            "ik_trial",
-            "joint_trajectory_controller",
-            "study",
-            "tf2_web_republisher",
-            "recorder",
-            "gateway",
-            "rosapi"
-        ])
-    );
-    assert_eq!(Topic::JointStates.owner(), Node::ArmSim);
-    assert_eq!(Service::TrialStop.owner(), Node::IkTrial);
 }

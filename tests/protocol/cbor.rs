@@ -252,18 +252,6 @@ fn cbor_raw_finds_the_time_wherever_a_message_of_ours_has_it() {
     }
 }
 
-#[test]
-fn cbor_raw_of_a_type_that_is_not_known_there_is_none() {
-    assert_eq!(publish_raw("/t", "demo/X", &json!({})), None);
-}
-
-/// A client tells the two kinds of frames apart by the first byte.
-#[test]
-fn no_binary_frame_begins_as_json_does() {
-    let frame = publish("/t", None, &json!({}));
-    assert!(frame.starts_with(&[0xa3]));
-}
-
 /// A frame may wait for long, and only its bytes are counted.
 #[test]
 fn a_frame_has_no_spare_room() {

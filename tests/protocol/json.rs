@@ -289,6 +289,13 @@ fn number_near_the_largest() -> impl Strategy<Value = String> {
 }
 
 proptest! {
+    /// The text that a double prints as is read as that double.
+    #[test]
+    fn every_finite_number_is_read_exactly(value in any::<f64>().prop_filter("finite", |value| value.is_finite())) {
+        let read = number(&raw(&serde_json::to_string(&value).unwrap()));
+        prop_assert_eq!(read.map(f64::to_bits), Some(value.to_bits()));
+    }
+
     /// The standard library's conversion, which is exact, is the other route.
     #[test]
     fn a_number_becomes_null_exactly_if_its_conversion_is_infinite(text in number_near_the_largest()) {

@@ -4,11 +4,10 @@
 
 use bytes::Bytes;
 use pendularm::protocol::messages::{
-    Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState,
-    JointTrajectory, JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, message_text,
-    publish, publish_raw, respelled, response, response_raw, status,
+    Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState, KeyValue,
+    Level, Stamp, call, failure, message_text, publish, publish_raw, respelled, response,
+    response_raw, status,
 };
-use pendularm::protocol::wire::fragments;
 use pendularm::protocol::wire::payload::Payload;
 use proptest::prelude::*;
 use serde::Serialize;
@@ -43,30 +42,6 @@ fn a_joint_state_has_the_shape_that_ros_gives_it() {
             r#"{"op":"publish","topic":"/joint_states","msg":"#,
             r#"{"header":{"stamp":{"sec":1,"nanosec":250000000},"frame_id":"world"},"#,
             r#""name":["joint1","joint2"],"position":[0.5,-1.0],"velocity":[0.0,1e-9],"effort":[12.0,1e+21]}}"#
-        )
-    );
-}
-
-#[test]
-fn a_joint_trajectory_has_the_shape_that_ros_gives_it() {
-    let trajectory = JointTrajectory {
-        header: Header {
-            stamp: Stamp::default(),
-            frame_id: "",
-        },
-        joint_names: &["joint1"],
-        points: &[JointTrajectoryPoint {
-            positions: &[0.5],
-            velocities: &[0.0],
-            accelerations: &[],
-            time_from_start: Stamp::default(),
-        }],
-    };
-    assert_eq!(
-        serde_json::to_string(&trajectory).unwrap(),
-        concat!(
-            r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"joint_names":["joint1"],"points":["#,
-            r#"{"positions":[0.5],"velocities":[0.0],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}]}"#
         )
     );
 }
@@ -281,21 +256,6 @@ proptest! {
             call(&topic, &text, &raw("{}")),
         ] {
             prop_assert!(serde_json::from_str::<serde_json::Value>(line(&frame)).is_ok());
-        }
-    }
-}
-
-/// It may wait for long, and only its bytes are counted.
-#[test]
-fn what_is_made_of_a_message_has_no_spare_room() {
-    for length in [300, 1000, 100_000] {
-        let frame = publish("/t", &json!({"data": "x".repeat(length)}));
-        let again = respelled("/t", "t", &frame);
-        let pieces = fragments::split(&again, 200, "a", usize::MAX).unwrap();
-        for bytes in [frame, again, pieces] {
-            let length = bytes.len();
-            let room = bytes.try_into_mut().map(|bytes| bytes.capacity());
-            assert_eq!(room, Ok(length));
         }
     }
 }

@@ -51,10 +51,6 @@ fn the_documented_message_is_read() {
 fn only_the_last_point_counts() {
     let setpoint = read(r#"{"points":[5,{"positions":"bad"},{"positions":[1,2,3]}]}"#).unwrap();
     assert_eq!(setpoint.position, [1.0, 2.0, 3.0]);
-    assert_eq!(
-        rejection(r#"{"points":[{"positions":[1,2,3]},{}]}"#),
-        "points[1].positions is required"
-    );
 }
 
 #[test]
@@ -89,14 +85,6 @@ fn velocities_that_are_no_good_are_zeros() {
 }
 
 #[test]
-fn a_permutation_of_the_joint_names_is_taken_by_name() {
-    let names = r#"["joint3","joint1","joint2"]"#;
-    let setpoint = setpoint(names, "[30,10,20]", "[3,1,2]");
-    assert_eq!(setpoint.position, [10.0, 20.0, 30.0]);
-    assert_eq!(setpoint.velocity, [1.0, 2.0, 3.0]);
-}
-
-#[test]
 fn other_joint_names_are_taken_by_position() {
     for names in [
         "null",
@@ -117,68 +105,46 @@ fn other_joint_names_are_taken_by_position() {
 }
 
 #[test]
-fn a_message_without_points_is_rejected() {
-    assert_eq!(rejection("{}"), "points is required");
-    assert_eq!(
-        rejection(r#"{"points":[]}"#),
-        "points must have at least one entry"
-    );
-    assert_eq!(
-        rejection(r#"{"points":5}"#),
-        "points must be an array, got 5"
-    );
-    assert_eq!(
-        rejection(r#"{"points":[{"positions":[1,2,3]},7]}"#),
-        "points[1] must be an object, got 7"
-    );
-    assert_eq!(rejection("[1]"), "msg must be an object, got an array");
-}
-
-#[test]
-fn positions_of_the_wrong_length_are_rejected() {
-    for (positions, got) in [("[]", 0), ("[1,2]", 2), ("[1,2,3,4]", 4)] {
-        assert_eq!(
-            rejection(&format!(r#"{{"points":[{{"positions":{positions}}}]}}"#)),
-            format!("points[0].positions must have 3 entries, got {got}")
-        );
-    }
-    assert_eq!(
-        rejection(r#"{"points":[{"positions":null}]}"#),
-        "points[0].positions must be an array of numbers, got null"
-    );
-}
-
-#[test]
-fn the_joints_that_a_subset_leaves_out_are_named() {
-    assert_eq!(
-        rejection(r#"{"joint_names":["joint2"],"points":[{"positions":[1]}]}"#),
-        "points[0].positions must have 3 entries, got 1: joint_names lacks joint1, joint3"
-    );
-    for names in [
-        r#"["joint9"]"#,
-        "[]",
-        r#"["joint1","joint2","joint3","joint1"]"#,
+fn a_message_without_a_setpoint_is_rejected_with_the_reason_of_its_row() {
+    for (msg, message) in [
+        ("{}", "points is required"),
+        (r#"{"points":[]}"#, "points must have at least one entry"),
+        (r#"{"points":5}"#, "points must be an array, got 5"),
+        ("[1]", "msg must be an object, got an array"),
+        (
+            r#"{"points":[{"positions":[1,2,3]},7]}"#,
+            "points[1] must be an object, got 7",
+        ),
+        (
+            r#"{"points":[{"positions":[1,2,3]},{}]}"#,
+            "points[1].positions is required",
+        ),
+        (
+            r#"{"joint_names":["joint2"],"points":[{"positions":[1]}]}"#,
+            "points[0].positions must have 3 entries, got 1: joint_names lacks joint1, joint3",
+        ),
+        (
+            r#"{"joint_names":["joint9"],"points":[{"positions":[1]}]}"#,
+            "points[0].positions must have 3 entries, got 1",
+        ),
     ] {
-        assert_eq!(
-            rejection(&format!(
-                r#"{{"joint_names":{names},"points":[{{"positions":[1]}}]}}"#
-            )),
-            "points[0].positions must have 3 entries, got 1"
-        );
+        assert_eq!(rejection(msg), message, "{msg}");
     }
-}
-
-#[test]
-fn positions_that_are_no_finite_numbers_are_rejected_by_entry() {
-    assert_eq!(
-        rejection(r#"{"points":[{"positions":[1,1e999,3]}]}"#),
-        "points[0].positions[1] must be a finite number"
-    );
-    for bad in ["null", "true", "\"1\""] {
-        assert_eq!(
-            rejection(&format!(r#"{{"points":[{{"positions":[1,2,{bad}]}}]}}"#)),
-            format!("points[0].positions[2] must be a number, got {bad}")
-        );
+    for (positions, message) in [
+        ("null", "must be an array of numbers, got null"),
+        ("[]", "must have 3 entries, got 0"),
+        ("[1,2,3,4]", "must have 3 entries, got 4"),
+    ] {
+        let msg = format!(r#"{{"points":[{{"positions":{positions}}}]}}"#);
+        assert_eq!(rejection(&msg), format!("points[0].positions {message}"));
+    }
+    for (entry, message) in [
+        ("1e999", "must be a finite number"),
+        ("null", "must be a number, got null"),
+        ("\"1\"", "must be a number, got \"1\""),
+    ] {
+        let msg = format!(r#"{{"points":[{{"positions":[1,{entry},3]}}]}}"#);
+        assert_eq!(rejection(&msg), format!("points[0].positions[1] {message}"));
     }
 }
 

@@ -5,10 +5,12 @@ use std::f64::consts::FRAC_PI_2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
+use pendularm::report::experiments::chaos::separation;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, are_carried, arrive, move_of, spun,
 };
+use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::report::experiments::stiff::{By, Solver, StiffScene};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::Linear;
@@ -106,4 +108,45 @@ fn folded_arms_with_a_heavy_tip_lose_what_the_angles_have_lost() {
     println!("{lost:?}");
     assert!(lost.inherent.1 > 6.0, "{lost:?}");
     assert!(lost.recursion.1 < lost.inherent.1 + 2.5, "{lost:?}");
+}
+
+/// After 26 s of chaos 61 µs are off by 2.6e-3 rad and 10 µs by some 6e-6: truncation, not the digits of a double, makes the error.
+#[test]
+fn at_26_seconds_a_sixth_of_the_timestep_is_hundreds_of_times_nearer() {
+    let arm = Arm::<2>::default();
+    let truth = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 26.0, 1);
+    let off = |timestep: f64, every: u64| {
+        let errors = separation(&arm, &State::rest(), Method::Rk4, timestep, every, &truth);
+        errors[0]
+    };
+    let coarse = off(0.5_f64.powi(14), 26 << 14);
+    let fine = off(1e-5, 2_600_000);
+    assert!((coarse / 2.6e-3 - 1.0).abs() < 0.05, "{coarse:e}");
+    // Rounding has a part in this one, and chaos magnifies it.
+    assert!((1e-6..2e-5).contains(&fine), "{fine:e}");
+}
+
+/// The swing that begins at small amplitude is stable up to 1.89 rad. A secant search would jump to another orbit at 1.5 rad.
+#[test]
+fn a_periodic_swing_is_continued_in_amplitude() {
+    let swing = PeriodicSwing::of(1.5).unwrap();
+    assert!(
+        (swing.start.position[1] + 0.48957).abs() < 1e-5,
+        "{swing:?}"
+    );
+    assert!((swing.period - 2.57052).abs() < 1e-5, "{swing:?}");
+    for (amplitude, modulus) in [
+        (1.5, 1.0),
+        (1.8, 1.0),
+        (1.89, 1.0),
+        (1.9, 1.68),
+        (2.0, 10.35),
+    ] {
+        let swing = PeriodicSwing::of(amplitude).unwrap();
+        let seen = swing.transverse(Method::Rk4, 4096);
+        assert!(
+            (seen / modulus - 1.0).abs() < 5e-3,
+            "{amplitude}: {seen} {swing:?}"
+        );
+    }
 }

@@ -11,7 +11,7 @@ use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::planner::{Candidate, MAX_DURATION, PlanError, Planned, Planning, Task};
 
-fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
+pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     let mut planning = Planning::new(task)?;
     loop {
         if let Some(planned) = planning.advance() {
@@ -163,4 +163,53 @@ fn what_nobody_can_know_is_not_planned() {
     let duration = MAX_DURATION.next_up();
     let long = plan(swing(duration, 1e-3));
     assert_eq!(long, Err(PlanError::TooLong { duration }));
+}
+
+pub(crate) fn falling(arm: Arm<2>, duration: f64, error: f64) -> Task<2> {
+    Task {
+        control: ControlLoop::free(arm),
+        start: State::rest(),
+        duration,
+        error,
+    }
+}
+
+/// The error is not monotone in the number of steps, so that a bisection would miss the fewest.
+#[test]
+fn a_plan_has_the_fewest_evaluations_of_all_whole_numbers_of_steps() {
+    let even = Arm::<2>::default();
+    let long = Arm::new([100.0; 2], [1.0; 2], 9.81).unwrap();
+    for (task, evaluations) in [
+        (falling(even, 2.0, 1e-4), 276),
+        (falling(even, 2.0, 1e-3), 208),
+        (falling(long, 10.0, 0.1), 80),
+    ] {
+        let planned = plan(task).unwrap();
+        let best = planned.best().unwrap();
+        assert!(
+            best.evaluations <= evaluations,
+            "{evaluations}: {planned:?}"
+        );
+    }
+}
+
+/// Nothing is run where nothing is advised, and the error says so.
+#[test]
+fn a_plan_that_ran_nothing_says_why() {
+    let gains = Gains {
+        kp: [20.0, 5.0],
+        ki: [10.0, 2.0],
+        kd: [8.0, 2.0],
+    };
+    let task = Task {
+        control: ControlLoop::new(Arm::<2>::default(), gains, Setpoint::at([0.5, 0.5])),
+        start: State::rest(),
+        duration: 4.0,
+        error: 5e-2,
+    };
+    let why = plan(task).unwrap_err().to_string();
+    assert!(
+        why.contains("unstable") && !why.contains("4000000"),
+        "{why}"
+    );
 }

@@ -93,3 +93,21 @@ fn limits_of_a_billionth_of_a_second_are_told() {
         assert!(found.certified, "{kd:e}: {found:?}");
     }
 }
+
+/// The loop runs away where an integral acts and springs are too soft, so there is no minimum, whichever setpoint is asked about.
+#[test]
+fn a_minimum_over_all_poses_does_not_depend_on_the_setpoint() {
+    let gains = Gains {
+        kp: [15.0, 23.0],
+        ki: [0.49, 7.5],
+        kd: [1.6, 3.5],
+    };
+    let at = |setpoint| ControlLoop::new(Arm::<2>::default(), gains, Setpoint::at(setpoint));
+    for setpoint in [[0.0, 0.0], [0.537, 0.9821], [-1.5, 0.2]] {
+        let found = limits(&at(setpoint));
+        assert_eq!(found.minimum_held, Some(0.0), "{setpoint:?}: {found:?}");
+        assert!(!found.certified && found.bound.is_none(), "{found:?}");
+    }
+    let near = at([0.537, 0.9821]);
+    assert!(limits(&near).advised.unwrap() < 2.76e-3);
+}

@@ -2,16 +2,17 @@
 
 use std::fs;
 
-use pendularm::math::arm::Arm;
+use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
 use pendularm::report::experiments::error::{OUTPUTS, Scene, scenes};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::fewest::StepSearch;
+use pendularm::study::planner::Task;
 use pendularm::study::stability::limits;
 
-use crate::recomputed::printed;
+use crate::planner::{falling, plan};
 
 fn readme() -> String {
     fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap()
@@ -85,4 +86,64 @@ fn the_limits_of_the_third_finding_are_those_of_the_study() {
     agrees("with RK4 and at ", verlet.held.unwrap(), 3);
     agrees("RK4 would be stable up to ", rk4.continuous.unwrap(), 3);
     agrees("limit of all poses is ", rk4.minimum_held.unwrap(), 3);
+}
+
+/// The number that follows `before` in the README, in the unit that follows it.
+fn printed(text: &str, before: &str) -> f64 {
+    let after = text
+        .split_once(before)
+        .unwrap_or_else(|| panic!("{before}"))
+        .1;
+    let mut words = after.split(|c: char| c.is_whitespace() || "*,;".contains(c));
+    let mut number = words.next().unwrap().to_owned();
+    if let Some((mantissa, power)) = number.clone().split_once("·10") {
+        let digits = power.chars().map(|digit| match digit {
+            '⁻' => '-',
+            _ => char::from_digit(
+                "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|one| one == digit).unwrap() as u32,
+                10,
+            )
+            .unwrap(),
+        });
+        number = format!("{mantissa}e{}", digits.collect::<String>());
+    }
+    let unit = match words.next().map(|unit| unit.trim_end_matches('.')) {
+        Some("ms") => 1e-3,
+        Some("µs") => 1e-6,
+        _ => 1.0,
+    };
+    let number = number.trim_end_matches('.').parse::<f64>();
+    unit * number.unwrap_or_else(|why| panic!("{before}: {why}"))
+}
+
+/// The plans of docs/study.md are run again.
+#[test]
+fn the_plans_of_the_study_are_runs() {
+    let study = include_str!("../../docs/study.md");
+    let servo = Task {
+        control: ControlLoop::new(
+            Arm::<2>::default(),
+            Gains::default(),
+            Setpoint::at([0.8, -0.6]),
+        ),
+        start: State::rest(),
+        duration: 4.0,
+        error: 0.01,
+    };
+    for (task, before, method) in [
+        (servo, "take Euler ", Method::Euler),
+        (
+            falling(Arm::default(), 10.0, 1e-6),
+            "takes RK4 ",
+            Method::Rk4,
+        ),
+    ] {
+        let planned = plan(task).unwrap();
+        let best = planned.best().unwrap();
+        assert_eq!(best.method, method, "{planned:?}");
+        assert!(
+            (printed(study, before) / best.timestep - 1.0).abs() < 5e-3,
+            "{planned:?}"
+        );
+    }
 }

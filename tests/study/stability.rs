@@ -1,13 +1,20 @@
 //! The largest stable timestep, predicted by linearisation: against 50-digit values, against closed forms, and against what
 //! the arm itself does.
 
+use std::f64::consts::FRAC_PI_2;
+
 use pendularm::math::arm::Arm;
+use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::report::experiments::growth::growth_per_period;
 use pendularm::report::experiments::measure::{growth, growths, measured_limit};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
-use pendularm::study::stability::{Sampling, largest_timestep, limit_held, limits, step_matrix};
+use pendularm::study::stability::{
+    Rest, Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix,
+    step_matrix,
+};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -380,6 +387,75 @@ fn a_map_measures_what_each_of_its_cells_measures_alone() {
             assert_eq!(growths(&cells, sampling), alone, "{method}");
             let escaped = alone.iter().filter(|growth| growth.is_none()).count();
             assert!((1..40).contains(&escaped), "{method}: {escaped} escaped");
+        }
+    }
+}
+
+/// A joint whose integral is too strong for its damping runs away at some 1.3/s. The damping of the other joint makes a rate of
+/// 1e12/s, and rounding at that rate must not hide the slow growth.
+#[test]
+fn slow_growth_beside_a_joint_of_enormous_damping_is_seen() {
+    let arm = Arm::<2>::default();
+    for (kd, bend) in [(1e9, 0.0), (1e11, 0.0), (1e11, 0.9), (1e13, 1.7)] {
+        for (part, runs_away) in [(0.8, false), (0.99, false), (1.01, true), (1.6, true)] {
+            for method in Method::ALL {
+                check_braked(&arm, [20.0, kd], bend, part, method, runs_away);
+            }
+        }
+    }
+    let mut rng = fastrand::Rng::with_seed(72);
+    let mut size = |decades: f64| 10_f64.powf(decades * (2.0 * rng.f64() - 1.0));
+    for case in 0..100 {
+        let arm = Arm::new([size(0.5), size(0.5)], [size(0.5), size(0.5)], 9.81).unwrap();
+        let (damping, brake) = (20.0 * size(0.5), 1e11 * size(2.0));
+        let (bend, runs_away) = (size(1.0), case % 2 == 0);
+        let part = if runs_away { 1.1 } else { 0.9 };
+        let method = Method::ALL[case % Method::ALL.len()];
+        check_braked(&arm, [damping, brake], bend, part, method, runs_away);
+    }
+}
+
+/// A hanging arm with its elbow bent and braked, and `part` of the integral that the shoulder bears. As the elbow does not
+/// move, `J s³ + kd s² + (kp + G') s + ki` is stable as far as `kd (kp + G') > J ki`.
+fn check_braked(arm: &Arm<2>, kd: [f64; 2], bend: f64, part: f64, method: Method, runs_away: bool) {
+    let pose = [-FRAC_PI_2, bend];
+    let inertia = mass_matrix(arm, &pose)[0][0];
+    let ([l1, l2], [m1, m2]) = (*arm.lengths(), *arm.masses());
+    let weight = arm.gravity() * ((0.5 * m1 + m2) * l1 + 0.5 * m2 * l2 * f64::cos(bend));
+    let gains = Gains {
+        kp: [100.0; 2],
+        ki: [part * kd[0] * (100.0 + weight) / inertia, 1.0],
+        kd,
+    };
+    let control = ControlLoop::new(*arm, gains, Setpoint::at(pose)).with_method(method);
+    let found = limits(&control);
+    let told = format!("{part}: {found:?} {bend} {gains:?} {arm:?}");
+    assert_eq!(found.held == Some(0.0), runs_away, "{told}");
+    assert_eq!(found.rest == Rest::Unstable, runs_away, "{told}");
+    assert_eq!(limit_held(&control) == Some(0.0), runs_away, "{told}");
+}
+
+/// Far from the limit the integral decides, past it the damping that answers too late; both are seen.
+#[test]
+fn a_deviation_grows_per_control_period_as_the_spectral_radius_says() {
+    for method in Method::ALL {
+        let setpoint = Setpoint::at([0.4, 0.8]);
+        let control =
+            ControlLoop::new(Arm::default(), Gains::<2>::default(), setpoint).with_method(method);
+        let linear = Linear::at_setpoint(&control);
+        for substeps in [1, 10] {
+            let limit = largest_period(&linear, method, substeps).unwrap();
+            for part in [0.3, 0.9, 1.01, 1.05] {
+                let period = part * limit;
+                let predicted = period_matrix(&linear, method, substeps, period).spectral_radius();
+                let measured = growth_per_period(&control.with_timestep(period), substeps).unwrap();
+                // The ratio shows in the swing that is left over 4000 periods.
+                assert!(
+                    (measured / predicted - 1.0).abs() < 1e-3,
+                    "{method}, {substeps} steps in {period} s: {measured}, {predicted}"
+                );
+                assert_eq!(measured < 1.0, part < 1.0, "{method}, {substeps}, {part}");
+            }
         }
     }
 }

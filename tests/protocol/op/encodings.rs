@@ -2,7 +2,7 @@
 
 use pendularm::protocol::op::{Compression, Encoding, Op};
 
-use super::{op, problem};
+use super::op;
 
 #[track_caller]
 fn encoding(more: &str) -> Encoding {
@@ -30,27 +30,6 @@ fn a_subscription_comes_as_json_in_one_piece_unless_it_says_otherwise() {
     for binary in ["cbor", "cbor-raw"] {
         let found = encoding(&format!(r#","compression":"{binary}","fragment_size":100"#));
         assert_eq!(found.fragment_size, None, "{binary} is not cut up");
-    }
-}
-
-#[test]
-fn another_compression_and_pieces_of_no_bytes_are_refused() {
-    for (more, message) in [
-        (
-            r#""compression":"zip""#,
-            r#"subscribe: compression must be none, png, cbor or cbor-raw, got "zip""#,
-        ),
-        (
-            r#""fragment_size":0"#,
-            "subscribe: fragment_size must be an integer, at least 1, got 0",
-        ),
-        (
-            r#""fragment_size":"5""#,
-            r#"subscribe: fragment_size must be an integer, at least 1, got "5""#,
-        ),
-    ] {
-        let frame = format!(r#"{{"op":"subscribe","topic":"/x",{more}}}"#);
-        assert_eq!(problem(&frame), message);
     }
 }
 

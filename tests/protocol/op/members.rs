@@ -1,79 +1,96 @@
-//! Members that an operation must have, and their types.
+//! Members that an operation must have, and their types: one table of all operations.
 
 use pendularm::protocol::limits::MAX_NAME;
-use pendularm::protocol::op::Op;
+use pendularm::protocol::op::{Op, OpError, read};
 
-use super::{op, status};
+use super::op;
+
+/// The words about a bad member, however the sender hears of them.
+fn refusal(op: &str, members: &str) -> String {
+    let frame = format!(r#"{{"op":"{op}"{members}}}"#);
+    match read(&frame).op {
+        Err(
+            OpError::Status(problem)
+            | OpError::Goal { problem, .. }
+            | OpError::Call { problem, .. },
+        )
+        | Ok(Op::BadAnswer { problem, .. }) => problem.to_string(),
+        other => panic!("{frame}: {other:?}"),
+    }
+}
+
+/// Operation, the members that it must have, and good values for them.
+const REQUIRED: [(&str, &[(&str, &str)]); 12] = [
+    ("advertise", &[("topic", r#""/x""#)]),
+    ("unadvertise", &[("topic", r#""/x""#)]),
+    ("publish", &[("topic", r#""/x""#), ("msg", "{}")]),
+    ("subscribe", &[("topic", r#""/x""#)]),
+    ("unsubscribe", &[("topic", r#""/x""#)]),
+    ("advertise_service", &[("service", r#""/s""#)]),
+    ("unadvertise_service", &[("service", r#""/s""#)]),
+    ("call_service", &[("service", r#""/s""#)]),
+    (
+        "service_response",
+        &[
+            ("service", r#""/s""#),
+            ("id", "1"),
+            ("values", "{}"),
+            ("result", "true"),
+        ],
+    ),
+    ("send_action_goal", &[("action", r#""/a""#)]),
+    ("cancel_action_goal", &[("action", r#""/a""#)]),
+    (
+        "fragment",
+        &[
+            ("id", "1"),
+            ("data", r#""x""#),
+            ("num", "0"),
+            ("total", "1"),
+        ],
+    ),
+];
+
+/// The required members of an operation without `left_out`, as they stand behind its name.
+fn others(op: &str, left_out: &str) -> String {
+    let (_, members) = REQUIRED.iter().find(|(name, _)| *name == op).unwrap();
+    let kept = members.iter().filter(|(name, _)| *name != left_out);
+    kept.map(|(name, value)| format!(r#","{name}":{value}"#))
+        .collect()
+}
 
 #[test]
-fn a_missing_required_field_is_named() {
-    for (frame, field) in [
-        (r#"{"op":"advertise"}"#, "topic"),
-        (r#"{"op":"unadvertise"}"#, "topic"),
-        (r#"{"op":"publish","msg":{}}"#, "topic"),
-        (r#"{"op":"publish","topic":"/x"}"#, "msg"),
-        (r#"{"op":"subscribe"}"#, "topic"),
-        (r#"{"op":"unsubscribe"}"#, "topic"),
-        (r#"{"op":"advertise_service"}"#, "service"),
-        (r#"{"op":"unadvertise_service"}"#, "service"),
-        (r#"{"op":"call_service"}"#, "service"),
-        (
-            r#"{"op":"service_response","id":1,"values":{},"result":true}"#,
-            "service",
-        ),
-        (
-            r#"{"op":"service_response","service":"/s","values":{},"result":true}"#,
-            "id",
-        ),
-        (
-            r#"{"op":"service_response","service":"/s","id":1,"result":true}"#,
-            "values",
-        ),
-        (
-            r#"{"op":"service_response","service":"/s","id":1,"values":{}}"#,
-            "result",
-        ),
-    ] {
-        let message = status(frame);
-        assert!(
-            message.ends_with(&format!(": {field} is required")),
-            "{message}"
-        );
+fn a_missing_required_member_is_named() {
+    for (op, members) in REQUIRED {
+        for (name, _) in members {
+            let expected = format!("{op}: {name} is required");
+            assert_eq!(refusal(op, &others(op, name)), expected);
+        }
     }
+    assert_eq!(refusal("set_level", ""), "set_level: level is required");
 }
 
 #[test]
 fn a_name_is_a_non_empty_string_of_bounded_length() {
     let long = format!("\"/{}\"", "x".repeat(MAX_NAME));
-    for (op, field) in [
-        ("advertise", "topic"),
-        ("unadvertise", "topic"),
-        ("publish", "topic"),
-        ("subscribe", "topic"),
-        ("unsubscribe", "topic"),
-        ("advertise_service", "service"),
-        ("unadvertise_service", "service"),
-        ("call_service", "service"),
-        ("service_response", "service"),
-    ] {
+    for (op, members) in REQUIRED {
+        let Some((name, _)) = members.iter().find(|(_, good)| good.starts_with("\"/")) else {
+            continue;
+        };
         for bad in [
             "5",
             "null",
             "true",
             "[]",
             "{}",
-            "\"\"",
-            "\"\\ud800\"",
+            r#""""#,
+            r#""\ud800""#,
             &long,
         ] {
-            let frame = format!(
-                r#"{{"op":"{op}","{field}":{bad},"msg":{{}},"id":1,"values":{{}},"result":true}}"#
-            );
-            let message = status(&frame);
-            assert!(
-                message.starts_with(&format!("{op}: {field} must be ")),
-                "{message}"
-            );
+            let members = format!(r#"{},"{name}":{bad}"#, others(op, name));
+            let message = refusal(op, &members);
+            let expected = format!("{op}: {name} must be ");
+            assert!(message.starts_with(&expected), "{bad}: {message}");
             assert!(message.len() < 200, "{message}");
         }
     }
@@ -82,49 +99,104 @@ fn a_name_is_a_non_empty_string_of_bounded_length() {
     assert!(matches!(op(&frame), Op::Advertise { topic, .. } if topic == longest));
 }
 
+/// Operation, member, bad literals, and what the member must be.
+const BAD: [(&str, &str, &[&str], &str); 18] = [
+    ("advertise", "type", &["5", "null", "{}"], "a string"),
+    ("subscribe", "type", &["5", "null", "{}"], "a string"),
+    ("advertise_service", "type", &["5", "null"], "a string"),
+    (
+        "publish",
+        "msg",
+        &["5", "null", r#""x""#, "[]"],
+        "an object",
+    ),
+    (
+        "service_response",
+        "values",
+        &["5", "null", "[]"],
+        "an object",
+    ),
+    (
+        "service_response",
+        "result",
+        &["1", "null"],
+        "true or false",
+    ),
+    (
+        "subscribe",
+        "throttle_rate",
+        &["-1", "1e999", "-1e999", "null", r#""5""#, "true"],
+        "a number of ms, at least 0",
+    ),
+    (
+        "subscribe",
+        "queue_length",
+        &["-1", "1.5", "1e999", "null", "true"],
+        "an integer, at least 0",
+    ),
+    (
+        "subscribe",
+        "compression",
+        &[r#""zip""#],
+        "none, png, cbor or cbor-raw",
+    ),
+    (
+        "subscribe",
+        "fragment_size",
+        &["0", r#""5""#],
+        "an integer, at least 1",
+    ),
+    (
+        "call_service",
+        "timeout",
+        &["0", "-1", "1e999", "null", r#""1""#, "true"],
+        "a number of seconds greater than 0",
+    ),
+    ("send_action_goal", "action_type", &["5"], "a string"),
+    ("send_action_goal", "feedback", &["1"], "true or false"),
+    ("fragment", "data", &["5"], "a string"),
+    ("fragment", "num", &["-1"], "an integer, at least 0"),
+    ("fragment", "total", &["1.5"], "an integer, at least 0"),
+    (
+        "set_level",
+        "level",
+        &[r#""loud""#, r#""Info""#, "3", "null"],
+        "info, warning, error or none",
+    ),
+    (
+        "set_level",
+        "errors",
+        &[r#""words""#, "true", "null"],
+        "object or text",
+    ),
+];
+
 #[test]
-fn a_bad_type_is_named() {
-    for op in ["advertise", "subscribe", "advertise_service"] {
-        for bad in ["5", "null", "{}"] {
-            let frame = format!(r#"{{"op":"{op}","topic":"/x","service":"/x","type":{bad}}}"#);
-            assert!(status(&frame).starts_with(&format!("{op}: type must be a string, got ")));
+fn a_bad_member_is_refused_with_what_it_must_be() {
+    for (op, name, literals, expected) in BAD {
+        for bad in literals {
+            let others = match op {
+                "set_level" if name == "errors" => r#","level":"none""#.to_owned(),
+                "set_level" => String::new(),
+                _ => others(op, name),
+            };
+            let message = refusal(op, &format!(r#"{others},"{name}":{bad}"#));
+            let expected = format!("{op}: {name} must be {expected}");
+            assert!(message.starts_with(&expected), "{bad}: {message}");
         }
     }
 }
 
+/// It is kept as long as what it names, and comes back with every answer. Its quotes count: an id is any JSON value.
 #[test]
-fn a_message_is_an_object() {
-    for bad in ["5", "null", "\"x\"", "[]"] {
-        let message = status(&format!(r#"{{"op":"publish","topic":"/x","msg":{bad}}}"#));
-        assert!(
-            message.starts_with("publish: msg must be an object, got "),
-            "{message}"
-        );
-    }
-}
-
-#[test]
-fn the_values_of_a_response_without_fault_are_an_object() {
-    for bad in ["5", "null", "\"x\"", "[]"] {
-        let message = status(&format!(
-            r#"{{"op":"service_response","service":"/s","id":1,"result":true,"values":{bad}}}"#
-        ));
-        assert!(
-            message.starts_with("service_response: values must be an object, got "),
-            "{message}"
-        );
-    }
-}
-
-#[test]
-fn the_result_of_a_response_is_true_or_false() {
-    for bad in ["1", "null", "\"true\""] {
-        let frame = format!(
-            r#"{{"op":"service_response","service":"/s","id":1,"values":{{}},"result":{bad}}}"#
-        );
-        assert_eq!(
-            status(&frame),
-            format!("service_response: result must be true or false, got {bad}")
-        );
+fn an_id_that_is_kept_is_bounded() {
+    let id = |length: usize| format!(r#","id":"{}""#, "x".repeat(length - 2));
+    for op in ["send_action_goal", "subscribe", "fragment"] {
+        let longest = format!(r#"{{"op":"{op}"{}{}}}"#, others(op, "id"), id(MAX_NAME));
+        assert!(read(&longest).op.is_ok(), "{op}");
+        let message = refusal(op, &(others(op, "id") + &id(MAX_NAME + 1)));
+        let got = MAX_NAME + 1;
+        let expected = format!("{op}: id must be at most {MAX_NAME} bytes long, got {got}");
+        assert_eq!(message, expected);
     }
 }

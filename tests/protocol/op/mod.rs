@@ -6,7 +6,6 @@ mod actions;
 mod calls;
 mod connection;
 mod encodings;
-mod fragments;
 mod hostile;
 mod long;
 mod members;

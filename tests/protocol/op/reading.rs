@@ -1,6 +1,7 @@
 //! An operation is read from a frame: every one of them, its members in any order, its id.
 
 use pendularm::protocol::op::{Incoming, Op, read};
+use pendularm::protocol::wire::fragments::Piece;
 use pendularm::protocol::wire::payload::Payload;
 
 use super::{op, status};
@@ -139,4 +140,21 @@ fn what_is_no_operation_is_named() {
     }
     assert_eq!(status(r#"{"op":"fly"}"#), "unknown op \"fly\"");
     assert_eq!(status(r#"{"op":""}"#), "unknown op \"\"");
+}
+
+#[test]
+fn a_fragment_is_a_piece_with_its_number_and_how_many_there_are() {
+    let fragment = op(r#"{"op":"fragment","id":7,"data":"a\"b","num":1,"total":3}"#);
+    let Op::Fragment(piece) = fragment else {
+        panic!("{fragment:?}");
+    };
+    assert_eq!(
+        piece,
+        Piece {
+            id: "7".to_owned(),
+            data: "a\"b".to_owned(),
+            num: 1,
+            total: 3,
+        }
+    );
 }

@@ -1,7 +1,7 @@
 //! The queue: in which order frames leave, and which messages are dropped when it is full.
 
 use bytes::Bytes;
-use pendularm::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
+use pendularm::protocol::limits::{MEDIUM, SHORT};
 use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
 
 use super::{Bench, MIB};
@@ -90,25 +90,4 @@ fn responses_are_never_dropped() {
     bench.push("/a", vec![b'm'; 4 * MIB]);
     assert_eq!(bench.outbox.dropped(), 0);
     assert_eq!(bench.take(usize::MAX, usize::MAX).len(), 101);
-}
-
-#[test]
-fn the_longest_message_that_a_client_may_send_fits_with_its_newline() {
-    let mut bench = Bench::new();
-    bench.push("/a", vec![0; MAX_FRAME + 1]);
-    assert_eq!(bench.outbox.dropped(), 0);
-    assert_eq!(bench.take(1, usize::MAX).len(), 1);
-}
-
-#[test]
-fn an_outbox_is_empty_when_neither_a_message_nor_a_response_can_be_taken() {
-    let mut bench = Bench::new();
-    assert!(bench.outbox.is_empty());
-    bench.push("/a", "1");
-    assert!(!bench.outbox.is_empty());
-    bench.take_all();
-    bench.respond("r", &[]);
-    assert!(!bench.outbox.is_empty());
-    bench.take_all();
-    assert!(bench.outbox.is_empty());
 }

@@ -66,22 +66,6 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
 }
 
-#[test]
-fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
-    let now = Instant::now();
-    let topic: Arc<str> = "/x".into();
-    let mut outbox = Outbox::new();
-    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n:06}}}"));
-    let series: String = (0..3).map(numbered).collect();
-    outbox.push(&topic, Bytes::from(series), now);
-    fill(&mut outbox, numbered(0).len() + 1, now);
-    assert_eq!(outbox.dropped(), 2);
-    let mut batch = Vec::new();
-    outbox.take_frames(now, 9, usize::MAX, &mut batch);
-    assert_eq!(batch[0], numbered(2));
-    assert_eq!(batch.len(), 9);
-}
-
 /// As many go, and are counted, as would have gone message by message.
 #[test]
 fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
@@ -131,42 +115,4 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
         let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
         assert_eq!(batch, wanted, "{length}");
     }
-}
-
-#[test]
-fn a_throttled_topic_gets_each_message_of_a_series_by_itself() {
-    let now = Instant::now();
-    let topic: Arc<str> = "/x".into();
-    let mut outbox = Outbox::new();
-    outbox.set_throttle(&topic, Some((Duration::from_millis(10), 1)));
-    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
-    outbox.push(
-        &topic,
-        Bytes::from((0..5).map(numbered).collect::<String>()),
-        now,
-    );
-    let mut batch = Vec::new();
-    outbox.take_frames(now, 9, usize::MAX, &mut batch);
-    outbox.take_frames(now + Duration::from_millis(10), 9, usize::MAX, &mut batch);
-    assert_eq!(
-        batch,
-        [numbered(0), numbered(4)],
-        "the first, and the newest later"
-    );
-    assert_eq!((outbox.dropped(), outbox.topic_bytes()), (0, 0));
-}
-
-#[test]
-fn one_frame_of_a_series_is_taken_where_one_is_asked_for() {
-    let now = Instant::now();
-    let mut outbox = Outbox::new();
-    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
-    let series = Bytes::from((0..3).map(numbered).collect::<String>());
-    outbox.push(&"/x".into(), series, now);
-    for n in 0..3 {
-        let mut batch = Vec::new();
-        outbox.take_frames(now, 1, usize::MAX, &mut batch);
-        assert_eq!(batch, [numbered(n)]);
-    }
-    assert!(outbox.is_empty());
 }

@@ -66,29 +66,6 @@ fn a_held_back_message_takes_its_place_when_its_time_comes() {
 }
 
 #[test]
-fn topics_are_throttled_apart() {
-    let mut bench = Bench::new();
-    bench.throttle("/a", 100, 1);
-    bench.throttle("/b", 30, 1);
-    for frame in ["1", "2"] {
-        bench.push("/a", frame);
-        bench.push("/b", frame);
-        bench.push("/c", frame);
-    }
-    assert_eq!(bench.take_all(), ["1", "1", "1", "2"]);
-    assert_eq!(
-        bench.outbox.next_release(),
-        Some(bench.now + Duration::from_millis(30))
-    );
-    bench.advance(30);
-    assert_eq!(bench.take_all(), ["2"]);
-    assert_eq!(
-        bench.outbox.next_release(),
-        Some(bench.now + Duration::from_millis(70))
-    );
-}
-
-#[test]
 fn a_new_throttle_counts_from_the_last_delivery_and_lifting_it_lets_all_go() {
     let mut bench = Bench::new();
     bench.throttle("/a", 1000, 3);

@@ -7,8 +7,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::{ControlLoop, no_control};
 
-use super::{Dice, Tally, cases, property, run};
-use crate::recomputed::advised;
+use super::{Dice, Tally, advised, cases, property, run};
 
 /// Steps of a run at most; a longer one is cut.
 const MOST_STEPS: f64 = 3e5;

@@ -6,7 +6,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::gains::{GainsRequirements, GainsSearch, MOVES, SETTLED};
+use pendularm::study::gains::{GainsError, GainsRequirements, GainsSearch, MOVES, SETTLED};
 use pendularm::study::stability::limits;
 
 use super::{Dice, Tally, cases, property, run, tells};
@@ -63,4 +63,29 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
 #[test]
 fn gains_for_random_arms_hold_on_other_moves() {
     tells(property!(suggested_gains_hold, 12, 2_000));
+}
+
+fn refusal(control: &ControlLoop<2>, requirements: GainsRequirements) -> GainsError {
+    let searched = GainsSearch::new(control, requirements).and_then(|mut search| {
+        let mut answers = std::iter::repeat_with(|| search.advance());
+        answers.find_map(|answer| answer).unwrap()
+    });
+    searched.unwrap_err()
+}
+
+#[test]
+fn what_cannot_be_had_is_refused_with_its_reason() {
+    let slow = ControlLoop::free(Arm::<2>::default()).with_timestep(0.5);
+    let requirements = GainsRequirements {
+        settling_time: 4.0,
+        margin: 2.0,
+    };
+    let why = refusal(&slow, requirements).to_string();
+    assert!(
+        why.contains("within 4 s") && why.contains("margin of 2"),
+        "{why}"
+    );
+    let tiny = ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6);
+    let why = refusal(&tiny, requirements);
+    assert_eq!(why, GainsError::TooManySteps { steps: 4.0 / 1e-6 });
 }

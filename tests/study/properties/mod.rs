@@ -10,10 +10,19 @@ mod motions;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use pendularm::math::arm::Arm;
+use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::motion::Motion;
+use pendularm::study::stability::{ADVISED_PART, limits};
+
+/// The timestep that `/study/stability` advises.
+pub(crate) fn advised<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> f64 {
+    let motion = Motion::ahead(control, state).timestep;
+    let limits = limits(control).advised.unwrap_or(f64::INFINITY);
+    limits.min(ADVISED_PART * motion)
+}
 
 /// Random choices of one case.
 struct Dice(fastrand::Rng);
