@@ -28,9 +28,6 @@ class CourseTest(PageTest):
     def big(self):
         return self.page.text("#course-figure")
 
-    def values(self, service, **args):
-        return self.runtime.call(service, **args)["values"]
-
 
 class Tasks(CourseTest):
     def test_the_course_is_the_first_view_and_leaves_the_arm_alone(self):
@@ -146,7 +143,7 @@ class Tasks(CourseTest):
         self.step(6)
         self.wait(lambda: abs(self.values("/pid_controller/set_period")["period"] - 0.0055) < 1e-12, "the scene")
         self.assertEqual(self.page.run("location.hash"), "#step=6")
-        link = self.page.run("own('share.js').then((share) => share.address())")
+        link = self.page.run("own('views.js').then((share) => share.address())")
         self.assertIn("#step=6&links=2", link)
         self.page.click("#view-switch")
         self.page.until("document.querySelector('#period-field input[type=number]').checkVisibility()")

@@ -1,4 +1,4 @@
-"""The layout: a lesson fits a desktop's first screen, a telephone has the arm first, and nobody is left out."""
+"""The layout: the workbench fits a desktop's screen, a telephone has the arm first, and nobody is left out."""
 
 import pathlib
 import time
@@ -27,7 +27,8 @@ class Free:
     """Where the view is small nothing is in its corners."""
 
     def test_nothing_lies_over_the_arm(self):
-        self.page.click("#lesson-limit")
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
+        self.runtime.call("/pid_controller/enable", data=True)
         self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
         over = self.page.run("""(() => { const arm = document.querySelector('#arm').getBoundingClientRect();
             return [...document.querySelectorAll('.clock, .view-tools, #notice')].filter((one) => {
@@ -58,8 +59,8 @@ class Desktop(Access, Steady, PageTest):
     def box(self, selector):
         return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
 
-    def test_the_first_screen_holds_a_lesson(self):
-        for selector in ("#lesson-text", "#arm", "#notice", "#transport", "#history", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
+    def test_the_first_screen_holds_the_arm_its_settings_and_a_panel(self):
+        for selector in ("#arm", "#notice", "#transport", "#history", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
             self.assertLessEqual(self.box(selector)[3], 900, selector)
         for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#push-bars")):
             self.tab(panel)
@@ -78,7 +79,7 @@ class Desktop(Access, Steady, PageTest):
 
     def test_a_notice_does_not_cover_the_arm(self):
         self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.page.until("!document.querySelector('#notice').hidden")
         notice, arm = self.box("#notice"), self.box("#arm")
         self.assertGreaterEqual(notice[1], arm[3])
@@ -111,7 +112,8 @@ class Laptop(Free, Steady, PageTest):
     def test_captions_are_whole_while_an_arm_shakes(self):
         clipped = """[...document.querySelectorAll('#panel figcaption')].filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth)
             .map((one) => one.textContent)"""
-        self.page.click("#lesson-limit")
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
+        self.runtime.call("/pid_controller/enable", data=True)
         self.page.until("document.querySelector('#legend-drift-name').textContent === 'work'")
         for _ in range(40):
             self.assertEqual(self.page.run(clipped), [])
@@ -135,16 +137,10 @@ class Narrow(PageTest):
 class Phone(Free, Steady, Access, PageTest):
     view = PHONE
 
-    def test_arm_integrator_and_servo_come_first(self):
-        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lesson-choice', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
+    def test_arm_integrator_and_controller_come_first(self):
+        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
         self.assertEqual(tops, sorted(tops))
         self.assertEqual(self.page.run("document.documentElement.scrollWidth"), 390)
-
-    def test_a_lesson_brings_its_text_and_the_arm_into_sight(self):
-        self.page.click("#lesson-limit")
-        self.page.until("document.querySelector('#lesson-text').textContent.startsWith('The timestep is a good fifth')")
-        top, bottom = self.page.run("[document.querySelector('#lesson-text').getBoundingClientRect().top, document.querySelector('#arm').getBoundingClientRect().bottom]")
-        self.assertTrue(0 <= top < bottom <= 844, (top, bottom))
 
     def test_settings_that_fold_show_that_they_do(self):
         marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")
