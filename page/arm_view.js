@@ -305,7 +305,7 @@ function drawVelocities(n) {
 const CLOCK = 56;
 const LABEL = "11px system-ui, sans-serif";
 
-export function drawBackdrop(canvas, surface, scale, lengths, gravity) {
+function drawBackdrop(canvas, surface, scale, lengths, gravity) {
   canvas.width = surface.canvas.width;
   canvas.height = surface.canvas.height;
   const context = canvas.getContext("2d", { alpha: false });

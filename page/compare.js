@@ -155,7 +155,7 @@ const y = new Float64Array(MOST_LINKS + 1);
 const SMALLEST = 1e-13;
 const ROOM = { left: 50 };
 
-export class CompareView {
+class CompareView {
   constructor() {
     this.runs = [];
     this.times = [];

@@ -22,7 +22,7 @@ const [HEIGHT, TITLE, GAP] = [120, 18, 8];
 const ENERGIES = [{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }];
 
 const shown = [true, true, true];
-/** @type {{chart: any, name: string, surface: Surface}[]} */
+/** @type {{id: string, chart: any, name: string, surface: Surface}[]} */
 let plots = [];
 let span = 10; // s
 let frozenAt = NaN; // simulation time at which the plots were paused
@@ -40,7 +40,7 @@ export function startPlots() {
   ];
   plots = charts.map(([id, name, chart]) => {
     const surface = new Surface(byId(`plot-${id}`), () => chart.draw(surface.context, surface.width, surface.height, { ...view(id), cursor: cursor() }));
-    return { chart, name, surface };
+    return { id, chart, name, surface };
   });
   for (const { chart, surface: { canvas } } of plots.slice(0, 4)) {
     canvas.addEventListener("pointermove", (event) => hover(chart.timeAt(event.offsetX)));
@@ -68,7 +68,7 @@ export function startPlots() {
 }
 
 /** What a plot shows now. @param {string} id */
-function view(id = "") {
+function view(id) {
   return { now: edge(), span: shownSpan(), links: state.links, shown, level: id === "energy" ? reference() : NaN };
 }
 
@@ -167,15 +167,15 @@ function reference() {
 }
 
 /** Draws every plot, one below the other, on a context of `width`; gives the height. For pictures that are saved. */
-export function drawAll(context, width) {
+function drawAll(context, width) {
   let top = 0;
-  for (const { chart, name, surface } of plots) {
+  for (const { id, chart, name, surface } of plots) {
     const height = surface.height || HEIGHT;
     context.save();
     context.translate(0, top);
     write(context, name, 8, 9, "left", colors.ink, STRONG);
     context.translate(0, TITLE);
-    chart.draw(context, width, height, view());
+    chart.draw(context, width, height, view(id));
     context.restore();
     top += TITLE + height + GAP;
   }
@@ -184,7 +184,7 @@ export function drawAll(context, width) {
 }
 
 /** How high `drawAll` draws. */
-export function heightOfAll() {
+function heightOfAll() {
   return plots.reduce((sum, { surface }) => sum + TITLE + (surface.height || HEIGHT) + GAP, 0);
 }
 

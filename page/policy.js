@@ -258,7 +258,7 @@ export function others(limits) {
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
   if (most <= ALIKE * least) return "A better method does not help: the controller looks only once a step. It only makes the simulated motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
-  return `${best.join(", ")}: stable up to ${duration(most)}.`;
+  return `${best.join(", ")}: stable up to ${limitText(most)}.`;
 }
 
 /** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */

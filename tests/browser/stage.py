@@ -124,6 +124,12 @@ class PageTest(unittest.TestCase):
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
 
+    def shake(self):
+        """The controller shakes the arm: its timestep is a quarter beyond the limit."""
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
+
     def wait(self, done, why, seconds=60):
         """Waits for something of the runtime."""
         end = time.monotonic() + seconds
