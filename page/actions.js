@@ -1,15 +1,13 @@
 // @ts-check
-// Actions on all settings at once: the page applies them, undoes the last change, goes back to the defaults, starts a
-// lesson; and the reset that belongs to it.
+// Actions on all settings at once: the page applies them, undoes the last change, goes back to the defaults, sets a scene;
+// and the reset that belongs to it.
 // Invariant: every change can be undone, and what the runtime refused is said.
 
-import { announce } from "./announce.js";
-import { byId } from "./dom.js";
-import { goLive } from "./playback.js";
+import { announce, byId } from "./dom.js";
+import { goLive } from "./history.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
-import { set, state, watch } from "./store.js";
-import { openTab } from "./tabs.js";
+import { state, tell, watch } from "./store.js";
 
 const undo = new Undo();
 let applying = false;
@@ -28,7 +26,6 @@ export function startActions() {
   byId("undo").addEventListener("click", takeBack);
   byId("defaults").addEventListener("click", async () => {
     remember();
-    set("lesson", null);
     await apply(DEFAULTS[state.links]);
     announce("All settings are the defaults again.");
   });
@@ -36,7 +33,7 @@ export function startActions() {
     undo.past.length = 0;
     showUndo();
   });
-  for (const key of ["integrator", "params", "gains", "period", "enabled", "setpoint"]) watch(key, showUndo);
+  watch(["integrator", "params", "gains", "period", "enabled", "setpoint"], showUndo);
 }
 
 export async function takeBack() {
@@ -48,54 +45,37 @@ export async function takeBack() {
 }
 
 /** Applies what is given, and gives the refusals. The controller comes last, so that it never acts on half of the settings. */
-export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, servo, setpoint, start }) {
+export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, controller, setpoint, start }) {
   applying = true;
+  tell("anew");
   const answers = [];
-  if (servo === false) answers.push(await enable(false));
+  if (controller === false) answers.push(await enable(false));
   if (params) answers.push(await setParams(params));
   if (gains) answers.push(await setGains(gains));
   if (integrator) answers.push(await setIntegrator(integrator));
   if (period) answers.push(await setPeriod(period));
   if (setpoint) sendSetpoint(setpoint);
   if (start) answers.push(await setState(start.position ?? new Array(state.links).fill(0), start.velocity));
-  if (servo) answers.push(await enable(true));
+  if (controller) answers.push(await enable(true));
   applying = false;
   return answers.filter((answer) => !answer.result).map((answer) => answer.status);
 }
 
-/** Sets the scene of a lesson, from the starting pose; done again, it begins anew. */
-export async function startLesson(lesson) {
-  remember();
-  set("lesson", lesson);
-  openTab(lesson.panel);
-  return begin(lesson);
-}
-
-async function begin(lesson) {
-  const refusals = await setScene(lesson.settings(state.links), false);
-  announce(`${lesson.name}. ${lesson.text}`);
-  return refusals;
-}
-
 /** Sets all of the settings, from the starting pose, then running or paused; gives the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
-export async function setScene({ servo, setpoint, ...rest }, paused) {
+export async function setScene({ controller, setpoint, ...rest }, paused) {
   goLive();
   await enable(false);
-  const refusals = await apply({ ...rest, servo: null, setpoint: null });
+  const refusals = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
   // A reset takes the setpoint to the starting pose, so it is sent after it.
-  refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, servo, setpoint }));
+  refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint }));
   if (state.paused !== paused) await pause(paused);
   return answer.result ? refusals : [...refusals, answer.status];
 }
 
-/** Back to the starting pose; in a lesson, to how the lesson began. */
+/** Back to the starting pose. */
 export async function resetArm() {
   goLive();
-  if (state.lesson) {
-    const refusals = await begin(state.lesson);
-    return { result: refusals.length === 0, status: refusals.join(" "), values: {} };
-  }
   const answer = await reset();
   if (answer.result) announce("Reset: the arm is in its starting pose.");
   return answer;
@@ -107,7 +87,7 @@ export async function recover(timestep) {
   return set.result ? beginAnew() : set;
 }
 
-/** From the starting pose with all settings as they are, those of a lesson or not; the setpoint stays too. */
+/** From the starting pose with all settings as they are; the setpoint stays too. */
 export async function beginAnew() {
   goLive();
   const setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;

@@ -3,12 +3,12 @@
 // Arrow keys do the same for those who use no pointer.
 // Invariant: one request at a time leaves while aiming, at a bounded rate, and the last place is always sent.
 
-import { warn } from "./announce.js";
+import { warn } from "./dom.js";
 import { endEffector, showAim, toWorld } from "./arm_view.js";
-import { goalOptions, showGoalPlace, showGoalRefusal } from "./goal_panel.js";
+import { goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
 import { latestOnly } from "./latest.js";
 import { nearestInReach, nearestTurn } from "./mechanics.js";
-import { goLive } from "./playback.js";
+import { goLive } from "./history.js";
 import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
 import { state } from "./store.js";
 

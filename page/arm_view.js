@@ -1,27 +1,29 @@
 // @ts-check
 // The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
-// Invariant: a frame allocates nothing, and nothing is drawn while nothing is seen to change.
+// Invariant: nothing is drawn while nothing is seen to change; the backdrop is drawn once per size, parameters and theme.
 
-import { SECONDS as ARROW_SECONDS, arrowHead, drawVelocities } from "./arrows.js";
-import { drawBackdrop } from "./backdrop.js";
+import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
 import { byId } from "./dom.js";
-import { onFrame, wake } from "./frames.js";
-import { gravityLoad, joints, reach } from "./mechanics.js";
-import { follow, shown } from "./playback.js";
+import { fixed, significant } from "./format.js";
+import { gravityLoad, innerReach, joints, reach } from "./mechanics.js";
+import { follow, shown } from "./history.js";
 import { DEFAULT_EPSILON } from "./runtime.js";
 import { MOST_LINKS, state, watch } from "./store.js";
-import { Surface } from "./surface.js";
-import { colors, onTheme } from "./theme.js";
-import { drawLatest, drawTrail } from "./trail.js";
+import { onFrame, Surface, wake } from "./surface.js";
+import { colors } from "./theme.js";
+import { drawTrail, SECONDS as TRAIL_SECONDS } from "./trail.js";
 
 /** A joint that would be seen elsewhere by less has not moved [px]. */
 const SEEN = 0.1;
 const RIPPLE_MS = 700;
 const NO_DASH = [];
-const GHOST_DASH = [6, 5];
+const BOTH_WAYS = [-1, 1];
 const ROOM = 1.14; // of the reach, so that circles and labels have space
 const EFFORT_RADIUS = 19; // px
+/** An arrow is as long as the way in this time [s], within bounds [px]. */
+const ARROW_SECONDS = 0.15;
+const [SHORTEST_ARROW, LONGEST_ARROW] = [4, 140];
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
@@ -47,14 +49,13 @@ let aim = null;
 export function startArmView(canvas) {
   backdrop = document.createElement("canvas");
   behind = document.createElement("canvas");
-  surface = new Surface(canvas, resized);
+  surface = new Surface(canvas, () => {}, resized);
   context = surface.context;
-  onTheme(resized);
   watch("params", resized);
   watch("links", resized);
   watch("setpoint", () => { follow(); redraw(); });
   watch("playback", redraw);
-  for (const key of ["joint", "enabled"]) watch(key, redraw);
+  watch(["joint", "enabled"], redraw);
   let diverged = false;
   watch("diagnostics", ({ state: now }) => {
     if ((now === "diverged") !== diverged) redraw();
@@ -153,7 +154,7 @@ function drawArm(now) {
   if (!known) return false;
   context.lineCap = "round";
   context.lineJoin = "round";
-  drawLatest(context, n, lengths(), px, py, behindTime, shown.time);
+  drawTrail(context, n, lengths(), px, py, behindTime, shown.time, 1);
   drawTarget(n, ripple ? (now - reachedAt) / RIPPLE_MS : 1);
   drawLinks(n);
   return ripple;
@@ -168,7 +169,7 @@ function paintBehind(n) {
   paint.globalAlpha = 1;
   paint.drawImage(backdrop, 0, 0);
   paint.setTransform(context.getTransform());
-  drawTrail(paint, n, lengths(), px, py, shown.time);
+  drawTrail(paint, n, lengths(), px, py, shown.time - TRAIL_SECONDS, shown.time);
   if (shown.setpointKnown) drawGhost(paint, n);
   behindTime = shown.time;
 }
@@ -177,20 +178,11 @@ function drawGhost(paint, n) {
   joints(n, shown.setpoint, lengths(), x, y);
   paint.lineCap = "round";
   paint.lineJoin = "round";
-  paint.strokeStyle = colors.muted;
-  paint.lineWidth = 2;
   paint.globalAlpha = state.enabled ? 0.9 : 0.5;
-  paint.setLineDash(GHOST_DASH);
-  paint.beginPath();
-  paint.moveTo(px(0), py(0));
-  for (let i = 1; i <= n; i += 1) paint.lineTo(px(x[i]), py(y[i]));
-  paint.stroke();
+  paint.setLineDash(DASHED);
+  links(paint, n, x, y, px, py, colors.muted, 2);
   paint.setLineDash(NO_DASH);
-  for (let i = 1; i <= n; i += 1) {
-    paint.beginPath();
-    paint.arc(px(x[i]), py(y[i]), 4, 0, 2 * Math.PI);
-    paint.stroke();
-  }
+  for (let i = 1; i <= n; i += 1) circle(paint, px(x[i]), py(y[i]), 4, "", colors.muted, 2);
   paint.globalAlpha = 1;
 }
 
@@ -204,7 +196,7 @@ function drawTarget(n, ripple) {
     drawCross(shown, goal?.epsilon ?? DEFAULT_EPSILON, color, done ? 0.75 : 1);
     if (ripple < 1) {
       context.globalAlpha = 1 - ripple;
-      circle(shown.x, shown.y, 8 + 34 * ripple);
+      circle(context, px(shown.x), py(shown.y), 8 + 34 * ripple, "", color, 2);
     }
   }
   if (aim?.mode === "setpoint" || (aim?.mode === "arm" && aim.refused)) drawCross(aim, 0, aim.refused ? colors.bad : colors.ink, 1);
@@ -214,13 +206,8 @@ function drawTarget(n, ripple) {
 /** A thin line of what is left to go. */
 function drawWay(n, target, color) {
   joints(n, shown.position, lengths(), x, y);
-  context.strokeStyle = color;
-  context.lineWidth = 1.25;
   context.globalAlpha = 0.6;
-  context.beginPath();
-  context.moveTo(px(x[n]), py(y[n]));
-  context.lineTo(px(target.x), py(target.y));
-  context.stroke();
+  line(context, px(x[n]), py(y[n]), px(target.x), py(target.y), color, 1.25);
 }
 
 /** Cross hairs around the disc of radius epsilon within which the target counts as reached. */
@@ -228,38 +215,19 @@ function drawCross(target, epsilon, color, alpha) {
   const cx = px(target.x);
   const cy = py(target.y);
   const radius = Math.max(3, epsilon * scale);
-  context.globalAlpha = alpha;
-  context.strokeStyle = color;
-  context.fillStyle = color;
-  context.lineWidth = 2;
   if (epsilon > 0) {
     context.globalAlpha = 0.25 * alpha;
-    context.beginPath();
-    context.arc(cx, cy, radius, 0, 2 * Math.PI);
-    context.fill();
-    context.globalAlpha = alpha;
-    circle(target.x, target.y, radius);
+    circle(context, cx, cy, radius, color);
   }
+  context.globalAlpha = alpha;
+  if (epsilon > 0) circle(context, cx, cy, radius, "", color, 2);
   const inner = radius + 3;
   const outer = radius + 12;
-  context.beginPath();
-  for (let i = 0; i < 4; i += 1) {
-    const dx = i === 0 ? 1 : i === 1 ? -1 : 0;
-    const dy = i === 2 ? 1 : i === 3 ? -1 : 0;
-    context.moveTo(cx + dx * inner, cy + dy * inner);
-    context.lineTo(cx + dx * outer, cy + dy * outer);
+  for (const way of BOTH_WAYS) {
+    line(context, cx + way * inner, cy, cx + way * outer, cy, color, 2);
+    line(context, cx, cy + way * inner, cx, cy + way * outer, color, 2);
   }
-  if (Number.isFinite(target.phi)) {
-    context.moveTo(cx, cy);
-    context.lineTo(cx + 36 * Math.cos(target.phi), cy - 36 * Math.sin(target.phi));
-  }
-  context.stroke();
-}
-
-function circle(wx, wy, radius) {
-  context.beginPath();
-  context.arc(px(wx), py(wy), radius, 0, 2 * Math.PI);
-  context.stroke();
+  if (Number.isFinite(target.phi)) line(context, cx, cy, cx + 36 * Math.cos(target.phi), cy - 36 * Math.sin(target.phi), color, 2);
 }
 
 function drawLinks(n) {
@@ -270,29 +238,17 @@ function drawLinks(n) {
   for (let i = 0; i < n; i += 1) {
     // Heavier rods of the same length are drawn thicker, within reason.
     const thickness = room * Math.min(26, Math.max(7, 14 * Math.sqrt(state.params.masses[i] / l[i])));
-    bar(i, thickness + 4, colors.panel);
-    bar(i, thickness, diverged ? colors.bad : colors.joints[i]);
+    line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.panel, thickness + 4);
+    line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), diverged ? colors.bad : colors.joints[i], thickness);
   }
   base(room);
-  for (let i = 0; i < n; i += 1) pivot(i, room);
+  for (let i = 0; i < n; i += 1) {
+    const chosen = i === state.joint;
+    circle(context, px(x[i]), py(y[i]), 8 * room, colors.panel, chosen ? colors.accent : colors.ink, chosen ? 4 : 2.5);
+  }
   drawEfforts(n, room);
-  if (arrows) drawVelocities(context, n, shown.velocity, x, y, px, py);
-  context.fillStyle = colors.ink;
-  context.strokeStyle = colors.panel;
-  context.lineWidth = 2;
-  context.beginPath();
-  context.arc(px(x[n]), py(y[n]), 6 * room, 0, 2 * Math.PI);
-  context.fill();
-  context.stroke();
-}
-
-function bar(i, thickness, color) {
-  context.strokeStyle = color;
-  context.lineWidth = thickness;
-  context.beginPath();
-  context.moveTo(px(x[i]), py(y[i]));
-  context.lineTo(px(x[i + 1]), py(y[i + 1]));
-  context.stroke();
+  if (arrows) drawVelocities(n);
+  circle(context, px(x[n]), py(y[n]), 6 * room, colors.ink, colors.panel, 2);
 }
 
 /** The mount under the first joint. */
@@ -308,16 +264,6 @@ function base(room) {
   context.globalAlpha = 0.55;
   context.fill();
   context.globalAlpha = 1;
-}
-
-function pivot(i, room) {
-  context.beginPath();
-  context.arc(px(x[i]), py(y[i]), 8 * room, 0, 2 * Math.PI);
-  context.fillStyle = colors.panel;
-  context.fill();
-  context.lineWidth = i === state.joint ? 4 : 2.5;
-  context.strokeStyle = i === state.joint ? colors.accent : colors.ink;
-  context.stroke();
 }
 
 /** Effort as an arc around its joint: counter-clockwise is positive, a half turn is all that gravity could ask for. */
@@ -336,4 +282,101 @@ function drawEfforts(n, room) {
     context.stroke();
     arrowHead(context, px(x[i]) + radius * Math.cos(end), py(y[i]) + radius * Math.sin(end), end - Math.sign(sweep) * (Math.PI / 2), 8 * room);
   }
+}
+
+/** How fast the end of each link moves. */
+function drawVelocities(n) {
+  let [vx, vy, omega] = [0, 0, 0];
+  for (let i = 0; i < n; i += 1) {
+    omega += shown.velocity[i];
+    vx -= omega * (y[i + 1] - y[i]);
+    vy += omega * (x[i + 1] - x[i]);
+    const size = ARROW_SECONDS * scale * Math.hypot(vx, vy);
+    if (!(size > SHORTEST_ARROW)) continue;
+    const part = (ARROW_SECONDS * scale * Math.min(size, LONGEST_ARROW)) / size;
+    const [fromX, fromY, dx, dy] = [px(x[i + 1]), py(y[i + 1]), part * vx, -part * vy];
+    context.fillStyle = colors.good;
+    line(context, fromX, fromY, fromX + dx, fromY + dy, colors.good, 2.5);
+    arrowHead(context, fromX + dx, fromY + dy, Math.atan2(dy, dx), 9);
+  }
+}
+
+/** The clock stands over the upper end of the vertical axis [px]. */
+const CLOCK = 56;
+const LABEL = "11px system-ui, sans-serif";
+
+function drawBackdrop(canvas, surface, scale, lengths, gravity) {
+  canvas.width = surface.canvas.width;
+  canvas.height = surface.canvas.height;
+  const context = canvas.getContext("2d", { alpha: false });
+  context.setTransform(surface.canvas.width / Math.max(1, surface.width), 0, 0, surface.canvas.height / Math.max(1, surface.height), 0, 0);
+  const { width, height } = surface;
+  context.fillStyle = colors.page;
+  context.fillRect(0, 0, width, height);
+  const cx = width / 2;
+  const cy = height / 2;
+  drawReach(context, cx, cy, scale, lengths);
+  drawGrid(context, width, height, scale);
+  drawGravity(context, width, gravity);
+}
+
+function drawReach(context, cx, cy, scale, lengths) {
+  context.fillStyle = colors.panel;
+  context.beginPath();
+  context.arc(cx, cy, reach(lengths) * scale, 0, 2 * Math.PI);
+  const inner = innerReach(lengths) * scale;
+  if (inner > 0) context.arc(cx, cy, inner, 0, 2 * Math.PI, true);
+  context.fill();
+  context.globalAlpha = 0.7;
+  context.setLineDash([2, 5]);
+  for (const radius of [reach(lengths) * scale, inner]) circle(context, cx, cy, radius, "", colors.muted, 1.25);
+  context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
+/** Lines at a round number of metres, at least 45 pixels apart. */
+function drawGrid(context, width, height, scale) {
+  const rough = 45 / scale;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const metres = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough);
+  const digits = Math.max(0, -Math.floor(Math.log10(metres)));
+  const every = metres * scale < 64 ? 2 : 1; // labels need more room than lines
+  context.font = LABEL;
+  context.fillStyle = colors.muted;
+  context.lineWidth = 1;
+  // All lines first, so that none crosses out a label.
+  for (const [labels, size, vertical] of [[false, width, true], [false, height, false], [true, width, true], [true, height, false]]) {
+    const most = Math.floor(size / 2 / scale / metres);
+    for (let i = -most; i <= most; i += 1) {
+      const at = Math.round(size / 2 + (vertical ? i : -i) * metres * scale) + 0.5;
+      if (!labels) {
+        line(context, vertical ? at : 0, vertical ? 0 : at, vertical ? at : width, vertical ? height : at, i === 0 ? colors.line : colors.grid);
+        continue;
+      }
+      const label = fixed(i * metres, digits);
+      const edge = at < (vertical ? 24 : CLOCK) || at > size - 24;
+      if (i % every !== 0 || edge) continue;
+      context.textAlign = vertical ? "center" : "left";
+      context.textBaseline = vertical ? "alphabetic" : "middle";
+      write(context, vertical && i === most - (most % every) ? `${label} m` : label, vertical ? at : 6, vertical ? height - 6 : at);
+    }
+  }
+}
+
+/** Text with a rim of the background, so that lines behind it do not cross it out. */
+function write(context, text, x, y) {
+  context.strokeStyle = colors.page;
+  context.lineWidth = 4;
+  context.strokeText(text, x, y);
+  context.fillText(text, x, y);
+  context.lineWidth = 1;
+}
+
+function drawGravity(context, width, gravity) {
+  const x = width - 26;
+  const text = gravity > 0 ? `g ${significant(gravity, 3)} m/s²` : "no gravity";
+  writeText(context, text, x - (gravity > 0 ? 12 : -14), 28, "right", colors.muted, "12px system-ui, sans-serif");
+  if (!(gravity > 0)) return;
+  line(context, x, 12, x, 38, colors.muted, 2);
+  arrowHead(context, x, 38, Math.PI / 2, 8);
 }

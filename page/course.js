@@ -49,7 +49,7 @@ const SOME_SCENES = 3;
 
 /** @param {number} links @param {number} period @param {Partial<Settings>} [changed] @returns {Settings} */
 function controlled(links, period, changed = {}) {
-  return { ...structuredClone(DEFAULTS[links]), integrator: { method: "rk4", timestep: FINE }, period: { period, delay: false }, servo: true, ...changed };
+  return { ...structuredClone(DEFAULTS[links]), integrator: { method: "rk4", timestep: FINE }, period: { period, delay: false }, controller: true, ...changed };
 }
 
 /** @type {Step[]} */
@@ -128,7 +128,7 @@ export const STEPS = [
   {
     id: "energy", title: "Without a controller",
     text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the black line.",
-    scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, servo: false }),
+    scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => methods.has("rk4") || methods.has("verlet") },
     question: {
@@ -183,9 +183,9 @@ export function shrinks(bars) {
   return third > 0 && largest(bars.slice(-third)) < largest(bars.slice(0, third));
 }
 
-/** "5.5 of 4.3 ms": a time and its limit, in one unit. @param {number} time [s] @param {number} limit [s] */
+/** "5.5 of 4.3 ms": a time and its limit. @param {number} time [ms] @param {number} limit [ms] */
 export function ofLimit(time, limit) {
-  const short = (/** @type {number} */ seconds) => String(Number((1e3 * seconds).toPrecision(2)));
+  const short = (/** @type {number} */ ms) => String(Number(ms.toPrecision(2)));
   if (!(time >= 0)) return "–";
   if (Number.isNaN(limit) || limit === Infinity) return `${short(time)} ms`;
   return limit === 0 ? `${short(time)} ms, never stable` : `${short(time)} of ${short(limit)} ms`;

@@ -1,6 +1,8 @@
 // @ts-check
-// Makes elements from code: text is always text, never markup, whatever the runtime sends.
-// Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need.
+// Makes elements from code, and says aloud to screen readers what others see happen: goals reached, refusals, a lost connection.
+// Text is always text, never markup, whatever the runtime sends.
+// Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need. Only events are said aloud:
+// values that change all the time are in texts that are read when asked for.
 
 /** `el("p", { class: "note" }, "text", child)`; `on...` properties are listeners. */
 /** @returns {any} */
@@ -37,4 +39,29 @@ export function setText(element, text) {
 /** The same for an attribute, `class` among them. */
 export function setAttribute(element, name, text) {
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
+}
+
+const REPEAT_MS = 3000;
+let lastText = "";
+let lastTime = -Infinity;
+
+function say(id, text) {
+  const now = performance.now();
+  if (text === lastText && now - lastTime < REPEAT_MS) return; // a drag may be refused many times a second
+  lastText = text;
+  lastTime = now;
+  const region = byId(id);
+  // Emptied first, since a region that does not change is not read again.
+  region.textContent = "";
+  requestAnimationFrame(() => {
+    region.textContent = text;
+  });
+}
+
+export function announce(text) {
+  say("announce-polite", text);
+}
+
+export function warn(text) {
+  say("announce-assertive", text);
 }

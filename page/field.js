@@ -2,8 +2,7 @@
 // A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
 // Invariant: the field has the value in force, except while somebody is changing it.
 
-import { warn } from "./announce.js";
-import { el, setText } from "./dom.js";
+import { el, setText, warn } from "./dom.js";
 import { plain, significant } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { watch } from "./store.js";
@@ -27,8 +26,26 @@ export function refusal(...describes) {
   };
   // There is a connection again, or all settings are set anew.
   watch("connection", (now) => { if (now === "open") show(""); });
-  watch("lesson", () => show(""));
-  return { element: text, show };
+  watch("anew", () => show(""));
+  /** Shows what came of a call, and gives its answer. @param {Promise<{result: boolean, status: string, values: any}>} call */
+  const report = async (call) => {
+    const answer = await call;
+    show(answer.result ? "" : answer.status);
+    return answer;
+  };
+  return { element: text, show, report };
+}
+
+/**
+ * A form: options, buttons, and where a refusal is shown; gives the latter. A button of the type submit is pressed by Enter too.
+ * @param {HTMLElement} place @param {{input: HTMLElement, element: HTMLElement}[]} options @param {[string, () => void, object?][]} buttons @param {...HTMLElement} last
+ */
+export function panel(place, options, buttons, ...last) {
+  const made = buttons.map(([text, act, attributes]) => el("button", { type: "button", onclick: act, ...attributes }, text));
+  const said = refusal(...options.map(({ input }) => input), ...made);
+  place.append(el("form", { novalidate: true, onsubmit: (event) => event.preventDefault() },
+    el("div", { class: "options" }, ...options.map(({ element }) => element)), el("div", { class: "buttons" }, ...made), said.element, ...last));
+  return said;
 }
 
 /**
@@ -40,7 +57,7 @@ export function refusal(...describes) {
  * @param {boolean} [options.log] whether the slider goes by ratios; with `low` > 0, or `zero` at its left end
  * @param {boolean} [options.zero] whether the left end means 0
  * @param {string} [options.zeroText] what 0 means, in words under the left end
- * @param {(value: number) => Promise<{result: boolean, status: string}>} options.commit
+ * @param {(value: number) => Promise<{result: boolean, status: string, values: any}>} options.commit
  * @param {string} [options.className] of the slider
  */
 export function numberField({ label, short = label, unit, low, high, log = false, zero = false, zeroText = "", commit, className = "" }) {
@@ -77,9 +94,8 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   const submit = async (value) => {
     pending += 1;
-    const answer = await commit(value);
+    await said.report(commit(value));
     pending -= 1;
-    said.show(answer.result ? "" : answer.status);
     show();
   };
   const slide = latestOnly(submit, SEND_MS);
@@ -131,7 +147,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
       describe();
     },
     value: () => accepted,
-    refuse: said.show,
+    report: said.report,
   };
 }
 

@@ -2,15 +2,15 @@
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
 // Invariant: no shortcut acts while somebody types, and all can be switched off.
 
-import { announce } from "./announce.js";
 import { resetArm, takeBack } from "./actions.js";
-import { chooseJoint, nudgeSetpoint, push, switchServo } from "./controls.js";
-import { byId, el } from "./dom.js";
+import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
+import { announce, byId, el } from "./dom.js";
 import { METHODS } from "./format.js";
-import { stepBy } from "./playback.js";
+import { stepBy } from "./history.js";
 import { togglePlots, zoomPlots } from "./plots.js";
 import { cancelGoal, setIntegrator } from "./runtime.js";
 import { state } from "./store.js";
+import { push } from "./tasks_panel.js";
 import { setPaused, singleStep, togglePause } from "./transport.js";
 
 const NUDGE = 0.05; // rad, as on the classic page
@@ -29,9 +29,9 @@ const shortcuts = [
   ["d", "push the joint clockwise", () => pushNow(-1)],
   ["q", "setpoint of the joint − 0.05 rad", () => nudgeSetpoint(-NUDGE)],
   ["e", "setpoint of the joint + 0.05 rad", () => nudgeSetpoint(NUDGE)],
-  ["c", "controller on or off", () => switchServo(!state.enabled)],
-  ["x", "controller on or off", () => switchServo(!state.enabled)],
-  ["s", "controller off", () => switchServo(false)],
+  ["c", "controller on or off", () => switchController(!state.enabled)],
+  ["x", "controller on or off", () => switchController(!state.enabled)],
+  ["s", "controller off", () => switchController(false)],
   ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
   [" ", "pause or run", togglePause],
   [".", "single step", singleStep],

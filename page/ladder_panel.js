@@ -2,17 +2,16 @@
 // Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
 // Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
 
-import { announce } from "./announce.js";
-import { byId, el, setText } from "./dom.js";
+import { Chart, DASHED, line, STRONG, TEXT } from "./chart.js";
+import { announce, byId, el, setText } from "./dom.js";
 import { option, refusal } from "./field.js";
-import { METHODS, duration, methodName, significant } from "./format.js";
-import { wake } from "./frames.js";
-import { MOVE_TO, TIMESTEPS, cheapest, errorText, read, rungs, stamp, uncertaintyOf } from "./ladder.js";
-import { drawLadder } from "./ladder_chart.js";
+import { duration, methodName, METHODS, shortName, significant } from "./format.js";
+import { cheapest, errorText, MOVE_TO, read, rungs, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
+import { LogScale, powerOfTen } from "./scale.js";
 import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
-import { onTheme } from "./theme.js";
+import { colors } from "./theme.js";
 
 const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
@@ -31,8 +30,7 @@ let asked = ""; // the settings that `found` is about
 let running = 0; // counts the measurements that were begun; only the newest goes on
 
 export function startLadder() {
-  surface = new Surface(byId("ladder"), draw);
-  onTheme(draw);
+  surface = new Surface(byId("ladder"), () => drawLadder(surface, found));
   seconds = option({ label: "duration", unit: "s", value: SECONDS });
   go = el("button", { type: "submit", class: "primary" }, "Measure");
   said = refusal(go);
@@ -40,7 +38,7 @@ export function startLadder() {
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
   setText(byId("ladder-text"), INVITATION);
   // The measurement is of another loop.
-  for (const key of ["links", "params", "gains", "period", "enabled"]) watch(key, () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
+  watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
 }
 
 /** All that a measurement depends on, as a text. */
@@ -57,7 +55,7 @@ function forget(text) {
   setText(go, "Measure");
   setText(byId("ladder-text"), text);
   byId("ladder-table").replaceChildren();
-  draw();
+  surface.redraw();
 }
 
 async function measure() {
@@ -72,7 +70,7 @@ async function measure() {
   setText(go, "Measuring…");
   const length = seconds.number() ?? SECONDS;
   const about = stamp(state, length);
-  const refused = await climb(length, () => mine === running, (rung) => { found.push(rung); draw(); });
+  const refused = await climb(length, () => mine === running, (rung) => { found.push(rung); surface.redraw(); });
   if (mine !== running) return;
   said.show(refused);
   setText(go, "Measure");
@@ -131,7 +129,31 @@ function cellOf(method, timestep) {
   return one ? errorText(one) : "–";
 }
 
-function draw() {
-  wake(); // other pictures may be waiting; this one is cheap and rare
-  if (surface && surface.width > 0) drawLadder(surface, found);
+
+const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };
+const CROSS = 4;
+
+/** @param {import("./surface.js").Surface} surface @param {Rung[]} found */
+export function drawLadder({ context, width, height }, found) {
+  const runs = found.filter(({ wall }) => wall > 0);
+  const errors = runs.flatMap(({ error, sampling }) => [error ?? 0, sampling ?? 0]).filter((error) => error > 0);
+  if (errors.length === 0) return;
+  const chart = new Chart(context, width, height, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
+  chart.frame({ across: "run time", up: "error [rad]" });
+  METHODS.forEach(([method], i) => {
+    const color = colors.methods[i];
+    const own = runs.filter((one) => one.method === method);
+    const points = (/** @type {"error" | "sampling"} */ key) => own.flatMap((one) => (Number(one[key]) > 0 ? [[one.wall, Number(one[key])]] : []));
+    chart.path(points("error"), color);
+    for (const [wall, error] of points("error")) chart.dot(wall, error, color, 3);
+    chart.path(points("sampling"), color, { dash: DASHED });
+    for (const { wall, divergedAt } of own) {
+      if (divergedAt === null) continue;
+      const [x, y] = [chart.x(wall), chart.top];
+      line(context, x - CROSS, y - CROSS, x + CROSS, y + CROSS, color, 1.75);
+      line(context, x - CROSS, y + CROSS, x + CROSS, y - CROSS, color, 1.75);
+    }
+    // The methods by their colours, side by side, so that no two names overprint.
+    chart.words(shortName(method), chart.left + (i * (chart.right - chart.left)) / METHODS.length, 10, "left", color, STRONG);
+  });
 }

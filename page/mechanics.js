@@ -30,42 +30,23 @@ export function gravityLoad(n, q, arm, load, at = 0) {
   }
 }
 
-/** Kinetic energy [J]. */
-export function kinetic(n, q, qd, arm) {
-  const { masses, lengths } = arm;
-  let phi = 0;
-  let omega = 0;
-  let vx = 0; // velocity of the joint before the link
-  let vy = 0;
-  let total = 0;
+/** Kinetic and potential energy [J]; the latter is 0 in the starting pose, stretched along x. */
+export function energies(n, q, qd, { gravity, masses, lengths }) {
+  let [phi, omega, y, kinetic, potential] = [0, 0, 0, 0, 0];
+  let [vx, vy] = [0, 0]; // velocity of the joint before the link
   for (let i = 0; i < n; i += 1) {
     phi += q[i];
     omega += qd[i];
     const c = (lengths[i] * Math.cos(phi)) / 2;
     const s = (lengths[i] * Math.sin(phi)) / 2;
-    const cx = vx - s * omega;
-    const cy = vy + c * omega;
     const spin = (lengths[i] * lengths[i] * omega * omega) / 12;
-    total += (masses[i] * (cx * cx + cy * cy + spin)) / 2;
+    kinetic += (masses[i] * ((vx - s * omega) ** 2 + (vy + c * omega) ** 2 + spin)) / 2;
+    potential += masses[i] * gravity * (y + s);
     vx -= 2 * s * omega;
     vy += 2 * c * omega;
+    y += 2 * s;
   }
-  return total;
-}
-
-/** Potential energy [J]; 0 in the starting pose, stretched along x. */
-export function potential(n, q, arm) {
-  const { gravity, masses, lengths } = arm;
-  let phi = 0;
-  let y = 0;
-  let total = 0;
-  for (let i = 0; i < n; i += 1) {
-    phi += q[i];
-    const half = (lengths[i] * Math.sin(phi)) / 2;
-    total += masses[i] * gravity * (y + half);
-    y += 2 * half;
-  }
-  return total;
+  return { kinetic, potential };
 }
 
 export function reach(lengths) {

@@ -1,47 +1,49 @@
 // @ts-check
-// The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor.
-// Invariant: pausing the plots stops only the drawing; recording goes on.
+// The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and files to keep,
+// the recording as CSV, the plots as PNG or SVG.
+// Invariant: pausing the plots stops only the drawing; recording goes on. A file is handed to the browser and released.
 
-import { announce } from "./announce.js";
-import { cursor, hover } from "./cursor.js";
-import { byId, el, setText } from "./dom.js";
+import { STRONG, write } from "./chart.js";
+import { announce, byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
-import { onFrame, wake } from "./frames.js";
-import { PhasePlot } from "./phase_plot.js";
-import { shown as pose } from "./playback.js";
+import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, POSITION, POTENTIAL, record, SETPOINT, shown as pose, TIME, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
-import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./history.js";
+import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
-import { StripChart } from "./strip_chart.js";
-import { colors, onTheme } from "./theme.js";
+import { PhasePlot, StripChart } from "./strip_chart.js";
+import { Surface } from "./surface.js";
+import { SvgContext } from "./svg_context.js";
+import { colors } from "./theme.js";
 
 /** No more than this is shown of an arm that has diverged: the blow-up is the end of it [s]. */
 const BLOW_UP_SECONDS = 2;
+/** Of a plot in a picture that is saved: its height where it is not shown, its title's, and the gap below [px]. */
+const [HEIGHT, TITLE, GAP] = [120, 18, 8];
+const ENERGIES = [{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }];
 
 const shown = [true, true, true];
-let charts = [];
+/** @type {{id: string, chart: any, name: string, surface: Surface}[]} */
+let plots = [];
 let span = 10; // s
 let frozenAt = NaN; // simulation time at which the plots were paused
 let drawnVersion = -1;
-let stale = true;
 let legends = [];
 
 export function startPlots() {
-  const joint = (column) => ({ column, perJoint: true });
-  charts = [
-    new StripChart(byId("plot-position"), [joint(POSITION), { ...joint(SETPOINT), dashed: true }], 0.2, 300),
-    new StripChart(byId("plot-velocity"), [joint(VELOCITY)], 0.2, 300),
-    new StripChart(byId("plot-effort"), [joint(EFFORT), { ...joint(LOAD), dashed: true }], 1, 5000),
-    new StripChart(byId("plot-energy"), [
-      { column: KINETIC, perJoint: false, color: "kinetic" }, { column: POTENTIAL, perJoint: false, color: "potential" },
-      { column: ENERGY, perJoint: false },
-    ], 0.1, 5000),
-    new PhasePlot(byId("plot-phase")),
+  /** @type {[string, string, any][]} */
+  const charts = [
+    ["position", "Position [rad]", new StripChart([{ column: POSITION }, { column: SETPOINT, dashed: true }], 0.2, 300)],
+    ["velocity", "Velocity [rad/s]", new StripChart([{ column: VELOCITY }], 0.2, 300)],
+    ["effort", "Effort [N m]", new StripChart([{ column: EFFORT }, { column: LOAD, dashed: true }], 1, 5000)],
+    ["energy", "Energy [J]", new StripChart(ENERGIES, 0.1, 5000)],
+    ["phase", "Velocity [rad/s] over position [rad]", new PhasePlot()],
   ];
-  for (const one of charts) one.surface.onResize = redraw;
-  for (const one of charts.slice(0, 4)) {
-    const { canvas } = one.surface;
-    canvas.addEventListener("pointermove", (event) => hover(one.timeAt(event.offsetX)));
+  plots = charts.map(([id, name, chart]) => {
+    const surface = new Surface(byId(`plot-${id}`), () => chart.draw(surface.context, surface.width, surface.height, { ...view(id), cursor: cursor() }));
+    return { id, chart, name, surface };
+  });
+  for (const { chart, surface: { canvas } } of plots.slice(0, 4)) {
+    canvas.addEventListener("pointermove", (event) => hover(chart.timeAt(event.offsetX)));
     canvas.addEventListener("pointerleave", () => hover(NaN));
     canvas.addEventListener("wheel", (event) => {
       if (!event.ctrlKey) return; // without it the wheel scrolls
@@ -49,8 +51,6 @@ export function startPlots() {
       zoomPlots(event.deltaY < 0 ? 1 : -1);
     }, { passive: false });
   }
-  onTheme(redraw);
-  onFrame(drawPlots);
   watch("cursor", () => { redraw(); showValues(); });
   watch("playback", () => { if (pose.playing) return; redraw(); showValues(); });
   watch("links", makeLegends);
@@ -65,6 +65,11 @@ export function startPlots() {
   });
   byId("plot-pause").addEventListener("click", togglePlots);
   byId("plot-fix").addEventListener("click", toggleScales);
+}
+
+/** What a plot shows now. @param {string} id */
+function view(id) {
+  return { now: edge(), span: shownSpan(), links: state.links, shown, level: id === "energy" ? reference() : NaN };
 }
 
 export function togglePlots() {
@@ -84,7 +89,7 @@ export function zoomPlots(way) {
 
 function toggleScales() {
   const kept = byId("plot-fix").getAttribute("aria-pressed") !== "true";
-  for (const one of charts) for (const axis of [one.axis, one.across, one.up]) if (axis) axis.fixed = kept;
+  for (const { chart } of plots) for (const axis of [chart.axis, chart.across]) if (axis) axis.fixed = kept;
   press("plot-fix", kept, kept ? "Fixed" : "Fix");
   redraw();
 }
@@ -110,8 +115,7 @@ function edge() {
 }
 
 export function redraw() {
-  stale = true;
-  wake();
+  for (const { surface } of plots) surface.redraw();
 }
 
 /** Draws the lines as they are now, if anything has moved since. */
@@ -162,40 +166,65 @@ function reference() {
   return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;
 }
 
-function drawPlots() {
-  if (!stale) return false;
-  stale = false;
-  const now = edge();
-  const seconds = shownSpan();
-  charts[3].reference = reference();
-  for (const chart of charts) chart.draw(now, seconds, state.links, shown, cursor());
-  return false;
-}
-
 /** Draws every plot, one below the other, on a context of `width`; gives the height. For pictures that are saved. */
-export function drawAll(context, width) {
-  const [gap, title] = [8, 18];
-  const names = ["Position [rad]", "Velocity [rad/s]", "Effort [N m]", "Energy [J]", "Velocity [rad/s] over position [rad]"];
+function drawAll(context, width) {
   let top = 0;
-  charts.forEach((chart, k) => {
-    const { height } = chart.surface;
+  for (const { id, chart, name, surface } of plots) {
+    const height = surface.height || HEIGHT;
     context.save();
     context.translate(0, top);
-    context.font = "600 12px system-ui, sans-serif";
-    context.textAlign = "left";
-    context.textBaseline = "alphabetic";
-    context.fillStyle = colors.ink;
-    context.fillText(names[k], 8, 13);
-    context.translate(0, title);
-    chart.drawOn(context, width, height || 120, edge(), shownSpan(), state.links, shown, NaN);
+    write(context, name, 8, 9, "left", colors.ink, STRONG);
+    context.translate(0, TITLE);
+    chart.draw(context, width, height, view(id));
     context.restore();
-    top += title + (height || 120) + gap;
-  });
+    top += TITLE + height + GAP;
+  }
   redraw();
   return top;
 }
 
 /** How high `drawAll` draws. */
-export function heightOfAll() {
-  return charts.reduce((sum, { surface }) => sum + (surface.height || 120) + 26, 0);
+function heightOfAll() {
+  return plots.reduce((sum, { surface }) => sum + TITLE + (surface.height || HEIGHT) + GAP, 0);
+}
+
+const WIDTH = 640; // CSS pixels
+const DENSITY = 2; // of a PNG
+const KEPT_MS = 10000;
+
+export function startSave() {
+  const choice = byId("plot-save");
+  choice.addEventListener("change", () => {
+    const kind = choice.value;
+    choice.value = "";
+    save(kind);
+  });
+}
+
+async function save(kind) {
+  const contents = { csv: () => new Blob([csvText(state.links, presentSettings(state))], { type: "text/csv" }), svg, png }[kind];
+  if (contents) hand(await contents(), `pendularm.${kind}`);
+}
+
+/** The plots as an SVG file. */
+export function svg() {
+  const context = new SvgContext(WIDTH, heightOfAll(), colors.panel);
+  drawAll(context, WIDTH);
+  return new Blob([context.toString()], { type: "image/svg+xml" });
+}
+
+function png() {
+  const canvas = el("canvas", { width: WIDTH * DENSITY, height: heightOfAll() * DENSITY });
+  const context = canvas.getContext("2d");
+  context.scale(DENSITY, DENSITY);
+  context.fillStyle = colors.panel;
+  context.fillRect(0, 0, WIDTH, heightOfAll());
+  drawAll(context, WIDTH);
+  return new Promise((done) => canvas.toBlob(done, "image/png"));
+}
+
+function hand(blob, name) {
+  const url = URL.createObjectURL(blob);
+  el("a", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), KEPT_MS);
 }

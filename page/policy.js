@@ -1,11 +1,9 @@
 // @ts-check
-// A verdict on the present timestep: the limit of the loop in force, where it holds, and the verdict in words.
+// A verdict on the present timestep: the limit of the loop in force, where it holds, and both verdict and reason in words.
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 
-import { duration, fixed, significant } from "./format.js";
-import { isFree, noGains } from "./gains.js";
+import { duration, fixed, methodName, METHODS, significant } from "./format.js";
 
-/** @typedef {import("./gains.js").Gains} Gains */
 /** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
 /**
  * @typedef {object} Verdict
@@ -63,11 +61,7 @@ export function limitInForce(/** @type {any} */ state) {
   const answer = answerInForce(state);
   const free = state.enabled === false || (state.gains != null && isFree(state.gains));
   const { links } = state;
-  if (!answer) {
-    // Without a study the arm's own word will do; it is about the loop in force too, but names no pose.
-    const told = state.stabilityMissing ? state.diagnostics?.timestep_limit ?? NaN : NaN;
-    return { limit: told, where: free ? "left to itself" : "at the setpoint", everyPose: NaN, advised: NaN };
-  }
+  if (!answer) return { limit: NaN, where: "", everyPose: NaN, advised: NaN };
   const diverged = state.diagnostics?.state === "diverged";
   const held = free && doublingTime(state, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
   const fast = diverged || state.integrator?.timestep > held;
@@ -193,17 +187,6 @@ function excess(at, time, limit, where) {
     : `No timestep is stable, ${where}.`;
 }
 
-/** The limits of the active loop, here and everywhere, and the timestep to use; empty while that is not known. */
-export function adviceText(/** @type {any} */ state) {
-  const { limit, where, everyPose, advised } = limitInForce(state);
-  if (!answerInForce(state) || Number.isNaN(limit)) return "";
-  if (limit === 0) return `No timestep is stable, ${where}.`;
-  const elsewhere = everyPose < limit ? `; in every pose ${everyPose > 0 ? `up to ${duration(everyPose)}` : "none is"}` : "";
-  const advice = advised > 0 && advised < Infinity ? ` Advised: ${duration(advised)}.` : "";
-  if (state.diagnostics?.state === "diverged" && state.integrator.timestep <= limit) return `It diverged at ${duration(state.integrator.timestep)}.${advice}`;
-  return `Stable up to ${limitText(limit)}, ${where}${elsewhere}.${advice}`;
-}
-
 /** @param {number} limit */
 export function limitText(limit) {
   if (Number.isNaN(limit)) return "…";
@@ -225,4 +208,86 @@ function afterReset(answer) {
   const found = answer.minimum_over_poses_held;
   const safe = answer.certified === false ? answer.minimum_over_poses_bound ?? found : found;
   return safe > 0 ? SHARE * safe : NaN;
+}
+
+/** @typedef {Record<string, number>} Limits largest stable timestep of each method [s] */
+
+/** Limits within this factor are said to be alike. */
+const ALIKE = 1.15;
+/** The study looks at what grows at so many times the limit. */
+const BEYOND = 1.1;
+/** Steps in one swing of a deviation that flips at every step. */
+const FLIP = 2;
+const NEARLY = 0.99;
+
+/** @param {any} state @param {any} answer of the present method, null while it is not known @param {Limits} limits */
+export function whyText(state, answer, limits) {
+  const method = state.integrator?.method;
+  if (!answer || !(limits[method] >= 0)) return "";
+  const limit = limits[method];
+  if (state.enabled === false || isFree(state.gains)) return whyFree(answer, method, limit);
+  if (limit === Infinity) return "";
+  if (limit === 0) {
+    return answer.equilibrium_kind === "unstable" || answer.timestep_limit_continuous === 0
+      ? "Why: these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
+      : "Why: nothing damps the arm here, and a torque that is kept for a step comes a little late. Raise the derivative gains.";
+  }
+  return `Why ${duration(limit)}: ${cause(answer)} ${others(limits)}`;
+}
+
+/** @param {any} answer @param {string} method @param {number} limit */
+function whyFree({ critical }, method, limit) {
+  if (limit === 0) return `Why: nothing damps the free arm. Every step of ${methodName(method)} adds a little to each swing, however short the step is.`;
+  if (limit === Infinity || !critical) return "";
+  return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings have a smaller limit.`;
+}
+
+/** The motion that grows first beyond the smallest limit of all poses. @param {any} answer */
+export function cause({ critical, minimum_over_poses_held: least }) {
+  if (!critical || !(least > 0)) return "beyond it a deviation grows.";
+  const joint = `joint ${critical.joint + 1}`;
+  const percent = significant(100 * (critical.growth_per_step - 1), 2);
+  const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
+  if (flips) return `${joint} is the fastest. A torque that is kept longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
+  return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain damps it.`;
+}
+
+/** @param {Limits} limits */
+export function others(limits) {
+  const finite = Object.values(limits);
+  const [least, most] = [Math.min(...finite), Math.max(...finite)];
+  if (most <= ALIKE * least) return "A better method does not help: the controller looks only once a step. It only makes the simulated motion more exact.";
+  const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
+  return `${best.join(", ")}: stable up to ${limitText(most)}.`;
+}
+
+/** @typedef {{gravity: number, masses: number[], lengths: number[]}} Arm */
+/** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
+
+/** @param {Gains} gains */
+export function isFree(gains) {
+  return [...gains.kp, ...gains.ki, ...gains.kd].every((one) => one === 0);
+}
+
+/** @param {number} n @returns {Gains} */
+export function noGains(n) {
+  return { kp: new Array(n).fill(0), ki: new Array(n).fill(0), kd: new Array(n).fill(0) };
+}
+
+/** @param {Gains} gains @param {number} factor @returns {Gains} */
+export function scaled(gains, factor) {
+  const times = (/** @type {number[]} */ list) => list.map((one) => factor * one);
+  return { kp: times(gains.kp), ki: times(gains.ki), kd: times(gains.kd) };
+}
+
+/** Gains are sent with three digits. */
+const ROUNDED = 0.02;
+
+/** By what `gains` are a multiple of `base`; NaN if they are none. @param {Gains | null} gains @param {Gains | null} base */
+export function factorOf(gains, base) {
+  if (!gains || !base || gains.kp.length !== base.kp.length) return NaN;
+  const pairs = /** @type {const} */ (["kp", "ki", "kd"]).flatMap((key) => gains[key].map((one, i) => [one, base[key][i]]));
+  const found = pairs.filter(([, one]) => one > 0).map(([a, b]) => a / b);
+  const isMultiple = found.length > 0 && pairs.every(([a, b]) => (b > 0 ? Math.abs(a / b / found[0] - 1) < ROUNDED : a === 0));
+  return isMultiple ? found[0] : NaN;
 }

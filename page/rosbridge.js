@@ -121,8 +121,3 @@ export class Rosbridge {
 function failure(status) {
   return { values: {}, result: false, status };
 }
-
-/** Whether an answer says that nobody provides the service. */
-export function nobodyProvides(answer) {
-  return !answer.result && /no provider|not served|does not exist/i.test(answer.status);
-}

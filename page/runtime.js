@@ -2,17 +2,15 @@
 // The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
-import { announce, warn } from "./announce.js";
+import { announce, warn } from "./dom.js";
 import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { motionHasChanged, question } from "./policy.js";
-import { Rosbridge, nobodyProvides } from "./rosbridge.js";
+import { Rosbridge } from "./rosbridge.js";
 import { MOST_LINKS, set, state, tell, watch } from "./store.js";
 
 /** Other clients change settings too, and no topic tells of it. */
 const POLL_MS = 1000;
-/** A service that nobody provides is asked for again, rarely: a provider may come. */
-const MISSING_POLLS = 15;
 /** A trajectory may be on its way to the arm while diagnostics from before it still arrive. */
 const TRAJECTORY_MS = 400;
 /** So long after our own reset the clock's jump is taken to be its. */
@@ -23,8 +21,6 @@ const STILL_MS = 1000;
 const HIDDEN_MS = 100;
 /** But what was done to a paused arm here is seen at once: so long all of them come [ms]. */
 const TOUCHED_MS = 300;
-/** Estimates of the error are shown as the median of two seconds of them. */
-const ESTIMATE_MS = 200;
 /** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
 /** A joint state is as old as this at most when it arrives. */
@@ -35,9 +31,6 @@ const STABILITY_MS = 200;
 export const DEFAULT_EPSILON = 0.02;
 
 let bridge;
-let arrived = 0; // joint states since the rate was last computed
-let counted = performance.now();
-let missingPolls = 0;
 let lastTrajectory = -Infinity;
 let lastReset = -Infinity;
 let touched = -Infinity;
@@ -58,18 +51,13 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_action/feedback", feedback);
   bridge.subscribe("/ik_action/result", goalResult);
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
-  bridge.subscribe("/arm_sim/error_estimate", (msg) => set("estimate", msg));
   pace();
-  setInterval(tick, POLL_MS);
-  for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
-    watch(key, () => { if (!state.stabilityMissing) askStability(); });
-  }
-  for (const key of ["params", "enabled"]) {
-    watch(key, () => {
-      set("pushed", false);
-      if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
-    });
-  }
+  setInterval(poll, POLL_MS);
+  watch(["integrator", "gains", "params", "enabled", "setpoint", "links"], askStability);
+  watch(["params", "enabled"], () => {
+    set("pushed", false);
+    if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
+  });
   watch("paused", pace);
   document.addEventListener("visibilitychange", pace);
 }
@@ -77,11 +65,6 @@ export function start(whenReset, whenChanging) {
 /** As many joint states as are drawn or recorded: all of a moving arm in sight, a few of one that is paused or hidden. */
 function pace() {
   bridge.throttle("/joint_states", rests() ? STILL_MS : document.hidden ? HIDDEN_MS : 0);
-  bridge.throttle("/arm_sim/error_estimate", isStill() ? STILL_MS : ESTIMATE_MS);
-}
-
-export function isStill() {
-  return document.hidden || rests();
 }
 
 function rests() {
@@ -99,21 +82,16 @@ function connection(now) {
   const before = state.connection;
   set("connection", now);
   if (now === "open") {
-    missingPolls = 0;
     // It may be another runtime, or the same one started anew: nothing of the old one holds.
     state.setpointKnown = false;
     set("stability", null);
     state.motion = null;
-    set("lesson", null);
-    set("stabilityMissing", false);
     set("goal", null);
     set("trial", null);
-    set("estimate", null);
     poll();
     announce("Connected to the arm.");
   } else if (now === "lost" && before === "open") {
     warn("The connection is lost. The page reconnects by itself.");
-    set("rate", 0);
   }
 }
 
@@ -122,7 +100,6 @@ function connection(now) {
 function jointStates(msg) {
   const n = Math.min(msg.position.length, MOST_LINKS);
   const time = msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9;
-  arrived += 1;
   if (n !== state.links) {
     state.setpointKnown = false;
     set("links", n);
@@ -185,7 +162,7 @@ function told(text) {
 }
 
 function diagnostics(msg) {
-  const report = { clients: NaN, dropped: NaN };
+  const report = {};
   for (const status of msg.status) {
     const values = Object.fromEntries(status.values.map(({ key, value }) => [key, value]));
     if (status.name === "arm_sim") {
@@ -195,9 +172,6 @@ function diagnostics(msg) {
       if (late && setpoint.length === state.links && setpoint.every(Number.isFinite)) keepSetpoint(setpoint);
       report.level = status.level;
       report.message = status.message;
-    } else if (status.name === "gateway") {
-      report.clients = Number(values.connections);
-      report.dropped = Number(values.messages_dropped);
     }
   }
   const before = state.diagnostics?.state;
@@ -229,15 +203,6 @@ function goalResult(msg) {
 
 // Settings: each call asks or changes, and stores what is now in force.
 
-function tick() {
-  const now = performance.now();
-  const rate = (arrived * 1000) / Math.max(1, now - counted);
-  set("rate", state.rate > 0 && arrived > 0 ? (state.rate + rate) / 2 : rate); // timers come and go by some milliseconds
-  arrived = 0;
-  counted = now;
-  poll();
-}
-
 function poll() {
   if (!bridge.open || document.hidden) return;
   setParams({});
@@ -246,7 +211,7 @@ function poll() {
   setPeriod({});
   pause();
   enable();
-  if (!state.stabilityMissing || (missingPolls += 1) % MISSING_POLLS === 0) askStability();
+  askStability();
 }
 
 async function settings(service, args, keep) {
@@ -340,8 +305,6 @@ export function sendSetpoint(positions) {
 /** Asks about the loop in force, unless its answer is there; computing takes a while, so only the newest question counts. */
 const askNow = latestOnly(async (asked) => {
   const answer = await bridge.call("/study/stability", asked);
-  const missing = nobodyProvides(answer);
-  if (missing !== state.stabilityMissing) set("stabilityMissing", missing);
   state.stabilityAsked = answer.result ? JSON.stringify(asked) : "";
   keepMotion(answer.result ? answer.values : null);
   set("stability", answer.result ? answer.values : null);

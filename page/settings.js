@@ -5,15 +5,16 @@
 
 import { METHODS, exact } from "./format.js";
 
-/** @typedef {import("./gains.js").Gains} Gains */
-/** @typedef {import("./gains.js").Arm} Arm */
+/** @typedef {import("./policy.js").Gains} Gains */
+/** @typedef {import("./policy.js").Arm} Arm */
 /**
  * @typedef {object} Settings
  * @property {{method?: string, timestep?: number} | null} integrator
  * @property {Partial<Arm> | null} params
  * @property {Partial<Gains> | null} gains
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
- * @property {boolean | null} servo
+ * @property {boolean | null} controller whether it is on
+ * @property {boolean} [servo] the same, as the scenes say it
  * @property {number[] | null} setpoint
  * @property {{ position?: number[], velocity?: number[] } | null} [start] where the arm is let go [rad, rad/s]; in links only
  */
@@ -30,7 +31,7 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
     gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
     period: { period: 0, delay: false },
-    servo: false,
+    controller: false,
     setpoint: [0, 0],
   },
   3: {
@@ -38,7 +39,7 @@ export const DEFAULTS = {
     params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
     gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
     period: { period: 0, delay: false },
-    servo: false,
+    controller: false,
     setpoint: [0, 0, 0],
   },
 };
@@ -51,19 +52,19 @@ export function presentSettings(/** @type {any} */ { links, integrator, params, 
     params,
     gains,
     period: { period: period.period, delay: period.delay },
-    servo: enabled,
+    controller: enabled,
     setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
   };
 }
 
 /** @param {Settings} settings @param {number} links */
-export function toFragment({ integrator, params, gains, period, servo, setpoint }, links) {
+export function toFragment({ integrator, params, gains, period, controller, setpoint }, links) {
   const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
   const parts = [
     ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
     ["gravity", exact(params?.gravity ?? NaN)], ["masses", list(params?.masses ?? [])], ["lengths", list(params?.lengths ?? [])],
     ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])],
-    ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["servo", servo ? "on" : "off"],
+    ["period", exact(period?.period ?? NaN)], ["delay", period?.delay ? "on" : "off"], ["controller", controller ? "on" : "off"],
   ];
   if (setpoint) parts.push(["setpoint", list(setpoint)]);
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
@@ -85,7 +86,7 @@ export function fromFragment(/** @type {string} */ hash) {
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
-    servo: onOff("servo") ?? null,
+    controller: onOff("controller") ?? onOff("servo") ?? null,
     setpoint: numbers("setpoint") ?? null,
     ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
   };

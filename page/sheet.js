@@ -4,16 +4,14 @@
 
 import { byId, el } from "./dom.js";
 import { option, refusal } from "./field.js";
-import { METHODS, duration, methodName, significant } from "./format.js";
-import { limitText } from "./policy.js";
+import { METHODS, significant } from "./format.js";
+import { cause, limitText, others } from "./policy.js";
 import { stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
 import { state } from "./store.js";
 
 /** @type {[string, string][]} */
 const LISTS = [["masses", "mass [kg]"], ["lengths", "length [m]"], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"], ["kd", "kd [N m s/rad]"]];
-/** Limits within this factor are said to be alike. */
-const ALIKE = 1.1;
 
 /** @type {Record<string, any[]>} */
 let fields = {};
@@ -52,7 +50,7 @@ async function make() {
   said.show("");
   const link = new URL(location.href);
   link.search = "";
-  link.hash = toFragment({ ...DEFAULTS[state.links], params, gains, servo: true, setpoint }, state.links);
+  link.hash = toFragment({ ...DEFAULTS[state.links], params, gains, controller: true, setpoint }, state.links);
   byId("sheet").replaceChildren(...sheet(params, gains, answers, link.href));
   byId("sheet").hidden = false;
   byId("sheet").scrollIntoView({ block: "nearest" });
@@ -74,7 +72,7 @@ function sheet(params, gains, answers, link) {
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
     )),
     el("p", {}, reason(answers.rk4, period)),
-    el("p", {}, gain(answers)),
+    el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])])))),
     el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
     el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
   ];
@@ -87,20 +85,6 @@ function least(answer) {
 
 /** @param {any} answer @param {number} period */
 export function reason(answer, period) {
-  const { critical } = answer;
   if (period === 0) return "Reason: these gains do not hold the arm, however often the controller looks. Raise the derivative gains or lower the integral gains.";
-  if (!critical || period === Infinity) return "Reason: nothing limits this arm.";
-  const flips = Math.abs(critical.frequency * 2.2 * (answer.minimum_over_poses_held ?? NaN) - 1) < 0.05;
-  return flips
-    ? `Reason: joint ${critical.joint + 1} is the fastest. A torque that is kept too long pushes it past the target; 10 % beyond the limit the deviation flips and grows ${significant(100 * (critical.growth_per_step - 1), 2)} % at each step.`
-    : `Reason: a swing of joint ${critical.joint + 1} at ${significant(critical.frequency, 3)} Hz. The torque comes too late and drives it.`;
-}
-
-/** @param {Record<string, any>} answers */
-export function gain(answers) {
-  const limits = METHODS.map(([method]) => /** @type {[string, number]} */ ([method, least(answers[method])]));
-  const best = limits.reduce((a, b) => (b[1] > a[1] ? b : a));
-  const worst = limits.reduce((a, b) => (b[1] < a[1] ? b : a));
-  if (!(best[1] > ALIKE * worst[1])) return "A better method does not allow a longer timestep: the controller’s waiting sets the limit. It only makes the simulated motion more exact.";
-  return `${methodName(best[0])} allows the longest timestep, ${limitText(best[1])}; ${methodName(worst[0])} allows ${worst[1] > 0 ? duration(worst[1]) : "none"}.`;
+  return !answer.critical || period === Infinity ? "Reason: nothing limits this arm." : `Reason: ${cause(answer)}`;
 }

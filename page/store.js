@@ -13,7 +13,6 @@ export const state = {
   position: new Float64Array(MOST_LINKS), // rad
   velocity: new Float64Array(MOST_LINKS), // rad/s
   effort: new Float64Array(MOST_LINKS), // N m
-  rate: 0, // joint states per second
   // The setpoint is known from the trajectories that pass, from resets, and from the diagnostics.
   setpoint: new Float64Array(MOST_LINKS), // rad
   setpointKnown: false,
@@ -26,24 +25,24 @@ export const state = {
   diagnostics: null, // { level, message, state, ...numbers }
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
-  stabilityMissing: false,
   motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
-  estimate: null, // message of /arm_sim/error_estimate
   pushed: false, // whether an effort has acted with the controller off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
   view: "course", // or "workbench"
   tab: "plots", // the panel that is shown
   joint: 0, // the joint that keys and the phase plot are about
-  lesson: null, // the lesson that was chosen; see `lessons.js`
 };
 
 const watchers = new Map(); // key -> functions
 const everything = []; // functions
 
-export function watch(key, react) {
-  if (!watchers.has(key)) watchers.set(key, []);
-  watchers.get(key).push(react);
+/** What the verdict on the loop in force depends on. */
+export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "stability"];
+
+/** @param {string | string[]} keys @param {(value: any) => void} react */
+export function watch(keys, react) {
+  for (const key of [keys].flat()) watchers.set(key, [...(watchers.get(key) ?? []), react]);
 }
 
 export function set(key, value) {

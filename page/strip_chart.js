@@ -1,188 +1,151 @@
 // @ts-check
-// A strip chart: quantities over the last seconds of simulation time, one colour per joint.
-// Invariant: rows are read where they stand in the history. It draws on whatever context it is given, a canvas or an SVG file.
+// Charts of the recording: quantities over the last seconds of simulation time, and velocity over position, where the present state
+// is a dot; one colour per joint.
+// Invariant: rows are read where they stand in the history. They draw on whatever context they are given.
 
-import { Axis, LOG_END } from "./axis.js";
-import { Pencil } from "./pencil.js";
-import { TIME, firstAfter, record } from "./history.js";
-import { Surface } from "./surface.js";
+import { Chart, DASHED } from "./chart.js";
+import { between, firstAfter, POSITION, record, TIME, VELOCITY } from "./history.js";
+import { Axis, LOG_END, times } from "./scale.js";
+import { MOST_LINKS } from "./store.js";
 import { colors } from "./theme.js";
 
-const LEFT = 46;
-const RIGHT = 8;
-const TOP = 6;
-const BOTTOM = 16;
-const SOLID = [];
-const DASHED = [5, 4];
+/** @typedef {{column: number, dashed?: boolean, color?: string}} Series of each joint, or one in a colour of its own */
 
 export class StripChart {
-  /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {{column: number, dashed?: boolean, perJoint: boolean, color?: string}[]} series
-   * @param {number} least smallest span of the vertical axis
-   * @param {number} sane beyond it the scale is logarithmic
-   */
-  constructor(canvas, series, least, sane) {
+  /** @param {Series[]} series @param {number} least smallest span of the vertical axis @param {number} sane beyond it the scale is logarithmic */
+  constructor(series, least, sane) {
     this.series = series;
     this.axis = new Axis(3, least, sane);
-    this.reference = NaN; // a level worth comparing with
-    this.surface = new Surface(canvas, () => {});
-    this.now = 0;
-    this.span = 1;
-    this.leftAt = NaN; // when a value first left the scale
+    this.chart = /** @type {Chart | null} */ (null); // the one that was drawn last
+    this.from = NaN; // the instant at its left edge
+    this.span = NaN;
   }
 
-  /** Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor`. */
-  draw(now, span, links, shown, cursor) {
-    const { context, width, height } = this.surface;
-    if (width < LEFT + RIGHT + 10) return;
-    this.surface.clear();
-    this.drawOn(context, width, height, now, span, links, shown, cursor);
-  }
-
-  drawOn(context, width, height, now, span, links, shown, cursor) {
-    this.now = now;
+  /**
+   * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor` and a level worth comparing with.
+   * @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number, level?: number}} what
+   */
+  draw(context, width, height, { now, span, links, shown, cursor = NaN, level = NaN }) {
+    this.from = now - span;
     this.span = span;
-    this.width = width;
-    this.height = height;
-    const first = Math.max(0, firstAfter(now - span) - 1);
+    const first = Math.max(0, firstAfter(this.from) - 1);
     const last = Math.min(record.length, firstAfter(now) + 1);
-    this.fitAxis(first, last, links, shown);
-    this.drawFrame(context);
-    context.save();
-    context.beginPath();
-    context.rect(LEFT, 0, width - LEFT - RIGHT, height - BOTTOM);
-    context.clip();
-    if (Number.isFinite(this.reference)) this.level(context, this.reference);
-    context.lineJoin = "round";
-    for (const one of this.series) {
-      context.setLineDash(one.dashed ? DASHED : SOLID);
-      context.lineWidth = one.dashed ? 1.25 : 1.75;
-      context.globalAlpha = one.dashed ? 0.85 : 1;
-      const columns = one.perJoint ? links : 1;
-      for (let joint = 0; joint < columns; joint += 1) {
-        if (one.perJoint && !shown[joint]) continue;
-        context.strokeStyle = one.perJoint ? colors.joints[joint] : colors[one.color ?? "ink"];
-        this.drawLine(context, one.column + joint, first, last);
-      }
-    }
-    context.setLineDash(SOLID);
-    if (Number.isFinite(this.leftAt)) this.mark(context, this.leftAt, colors.bad);
-    if (Number.isFinite(cursor)) this.mark(context, cursor, colors.accent);
-    context.restore();
-  }
-
-  fitAxis(first, last, links, shown) {
-    const { axis } = this;
+    const lines = this.series.flatMap((one) => (one.color ? [{ ...one, color: colors[one.color] }]
+      : colors.joints.slice(0, links).map((color, joint) => ({ ...one, color, column: one.column + joint })).filter((_, joint) => shown[joint])));
+    const leftAt = this.fit(lines, first, last, level);
+    const chart = new Chart(context, width, height, times(this.from, now), this.axis);
+    this.chart = chart;
+    chart.frame();
     const { data } = record;
-    axis.begin();
-    this.leftAt = NaN;
-    for (const one of this.series) {
-      const columns = one.perJoint ? links : 1;
-      for (let joint = 0; joint < columns; joint += 1) {
-        if (one.perJoint && !shown[joint]) continue;
-        for (let i = first; i < last; i += 1) {
-          const value = data[record.at(i) + one.column + joint];
-          axis.offer(value);
-          if (!(Math.abs(value) < LOG_END) && !(this.leftAt <= data[record.at(i) + TIME]) && value === value) this.leftAt = data[record.at(i) + TIME];
-        }
+    chart.inside(() => {
+      if (Number.isFinite(level)) chart.path([[this.from, level], [now, level]], colors.muted, { width: 1, dash: DASHED });
+      for (const { column, color, dashed } of lines) {
+        chart.line(last - first, (i) => data[record.at(first + i) + TIME], (i) => data[record.at(first + i) + column], color, dashed ? { width: 1.25, dash: DASHED, alpha: 0.85 } : {});
+      }
+      chart.upright(leftAt, colors.bad);
+      chart.upright(cursor, colors.accent);
+    });
+    if (!this.axis.log) return;
+    const end = Number.isFinite(leftAt) ? `, beyond 1e12 from ${leftAt.toFixed(2)} s` : "";
+    chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);
+  }
+
+  /** Fits the axis; gives when a value first left the scale, NaN if none did. */
+  fit(lines, first, last, level) {
+    const { data } = record;
+    let [min, max, leftAt] = Number.isFinite(level) ? [level, level, NaN] : [Infinity, -Infinity, NaN];
+    for (const { column } of lines) {
+      for (let i = first; i < last; i += 1) {
+        const row = record.at(i);
+        const value = data[row + column];
+        if (value < min) min = value;
+        if (value > max) max = value;
+        if (Math.abs(value) >= LOG_END && !(leftAt <= data[row + TIME])) leftAt = data[row + TIME];
       }
     }
-    if (Number.isFinite(this.reference)) axis.offer(this.reference);
-    axis.end();
+    this.axis.fit(min, max);
+    return leftAt;
   }
 
-  x(time) {
-    return this.width - RIGHT - ((this.now - time) / this.span) * (this.width - LEFT - RIGHT);
-  }
-
-  y(value) {
-    return this.height - BOTTOM - this.axis.place(value) * (this.height - TOP - BOTTOM);
-  }
-
-  /** The instant at `x` CSS pixels from the left; NaN beside the plot. */
+  /** The instant at `x` CSS pixels from the left; NaN beside the plot. @param {number} x */
   timeAt(x) {
-    if (x < LEFT || x > this.surface.width - RIGHT) return NaN;
-    return this.now - ((this.surface.width - RIGHT - x) / (this.surface.width - LEFT - RIGHT)) * this.span;
-  }
-
-  drawFrame(context) {
-    const { axis, width, height, now, span } = this;
-    context.setLineDash(SOLID);
-    context.globalAlpha = 1;
-    context.lineWidth = 1;
-    context.font = "11px system-ui, sans-serif";
-    context.fillStyle = colors.muted;
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    for (let i = 0; i < axis.count; i += 1) {
-      const y = Math.round(this.y(axis.values[i])) + 0.5;
-      context.strokeStyle = Math.abs(axis.values[i]) < (axis.log ? 0.5 : axis.step / 2) ? colors.line : colors.grid;
-      context.beginPath();
-      context.moveTo(LEFT, y);
-      context.lineTo(width - RIGHT, y);
-      context.stroke();
-      context.fillText(axis.labels[i], LEFT - 6, y);
-    }
-    // Seconds of simulation time along the bottom.
-    const every = span > 60 ? 20 : span > 15 ? 5 : span > 6 ? 2 : span > 2 ? 1 : 0.2;
-    context.textAlign = "center";
-    context.textBaseline = "alphabetic";
-    context.strokeStyle = colors.grid;
-    for (let k = Math.max(0, Math.ceil((now - span) / every)); k * every <= now; k += 1) {
-      const x = this.x(k * every);
-      context.beginPath();
-      context.moveTo(x, TOP);
-      context.lineTo(x, height - BOTTOM);
-      context.stroke();
-      if (x > LEFT + 8 && x < width - RIGHT - 8) context.fillText(second(k, every), x, height - 3);
-    }
-    if (!axis.log) return;
-    context.fillStyle = colors.bad;
-    context.textAlign = "left";
-    const end = Number.isFinite(this.leftAt) ? `, beyond 1e12 from ${this.leftAt.toFixed(2)} s` : "";
-    context.fillText(`logarithmic${end}`, LEFT + 4, TOP + 9);
-  }
-
-  level(context, value) {
-    context.setLineDash(DASHED);
-    context.strokeStyle = colors.muted;
-    context.beginPath();
-    context.moveTo(LEFT, this.y(value));
-    context.lineTo(this.width - RIGHT, this.y(value));
-    context.stroke();
-  }
-
-  mark(context, time, color) {
-    context.strokeStyle = color;
-    context.lineWidth = 1;
-    context.beginPath();
-    context.moveTo(this.x(time), 0);
-    context.lineTo(this.x(time), this.height - BOTTOM);
-    context.stroke();
-  }
-
-  drawLine(context, column, first, last) {
-    const { data } = record;
-    const pencil = new Pencil(context);
-    context.beginPath();
-    for (let i = first; i < last; i += 1) {
-      const row = record.at(i);
-      const value = data[row + column];
-      if (Number.isFinite(value)) pencil.to(this.x(data[row + TIME]), this.y(value));
-      else pencil.lift();
-    }
-    pencil.lift();
-    context.stroke();
+    const { chart } = this;
+    if (!chart || x < chart.left || x > chart.right) return NaN;
+    return this.from + ((x - chart.left) / (chart.right - chart.left)) * this.span;
   }
 }
 
-// Labels of the first minutes, made once each.
-const seconds = new Map();
-function second(k, every) {
-  if (every < 1) return (k * every).toFixed(1);
-  const t = k * every;
-  if (t >= 3600) return String(t);
-  if (!seconds.has(t)) seconds.set(t, String(t));
-  return seconds.get(t);
+/** The path fades towards the past in this many pieces. */
+const PIECES = 5;
+/** Beyond it the scales are logarithmic [rad, rad/s]. */
+const SANE = 300;
+/** Points of the path are about so far from each other, but for an arm that shakes [px]. */
+const NEAR = 4;
+const MOST_POINTS = 6;
+/** A way so short is drawn with the next one [px]. */
+const UNSEEN = 0.05;
+
+const q = new Float64Array(MOST_LINKS);
+const v = new Float64Array(MOST_LINKS);
+
+export class PhasePlot {
+  constructor() {
+    this.across = new Axis(4, 0.5, SANE);
+    this.axis = new Axis(4, 0.5, SANE);
+    this.chart = /** @type {Chart | null} */ (null);
+  }
+
+  /** @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number}} what */
+  draw(context, width, height, { now, span, links, shown, cursor = NaN }) {
+    const first = firstAfter(now - span);
+    const last = Math.min(record.length, firstAfter(now) + 1);
+    const joints = Array.from({ length: links }, (_, joint) => joint).filter((joint) => shown[joint]);
+    this.fit(this.across, POSITION, joints, first, last);
+    this.fit(this.axis, VELOCITY, joints, first, last);
+    const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 30 });
+    this.chart = chart;
+    chart.frame({ across: "position [rad]" });
+    const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
+    chart.inside(() => { for (const joint of joints) this.drawPath(context, joint, first, last, at); });
+  }
+
+  fit(axis, column, joints, first, last) {
+    let [min, max] = [Infinity, -Infinity];
+    for (let i = first; i < last; i += 1) {
+      for (const joint of joints) {
+        const value = record.data[record.at(i) + column + joint];
+        if (value < min) min = value;
+        if (value > max) max = value;
+      }
+    }
+    axis.fit(min, max);
+  }
+
+  drawPath(context, joint, first, last, at) {
+    const { data } = record;
+    const { chart } = this;
+    const rows = last - 1 - first;
+    for (let piece = 0; piece < PIECES && rows > 0; piece += 1) {
+      chart.begin(colors.joints[joint], { width: 1.5, alpha: (piece + 1) / PIECES });
+      const to = first + Math.floor(((piece + 1) * rows) / PIECES);
+      for (let i = first + Math.floor((piece * rows) / PIECES); i < to; i += 1) this.extend(context, joint, record.at(i), record.at(i + 1));
+      chart.end();
+    }
+    const row = record.at(at) + joint;
+    if (rows > 0) chart.dot(data[row + POSITION], data[row + VELOCITY], colors.joints[joint]);
+  }
+
+  /** From the row at `a` to the one at `b`, on the way that the replay shows. */
+  extend(context, joint, a, b) {
+    const { data } = record;
+    const { chart } = this;
+    const [across, up] = [chart.x(data[b + POSITION + joint]), chart.y(data[b + VELOCITY + joint])];
+    const way = Math.abs(across - chart.x(data[a + POSITION + joint])) + Math.abs(up - chart.y(data[a + VELOCITY + joint]));
+    if (way < UNSEEN) return;
+    const points = Math.min(MOST_POINTS, Math.ceil(way / NEAR) || 1);
+    for (let point = 0; point <= points; point += 1) {
+      between(a, b, data[a + TIME] + (point / points) * (data[b + TIME] - data[a + TIME]), q, v);
+      context.lineTo(chart.x(q[joint]), chart.y(v[joint]));
+    }
+  }
 }

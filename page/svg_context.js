@@ -4,39 +4,32 @@
 
 const ESCAPES = /** @type {Record<string, string>} */ ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" });
 
-/** @param {string} text */
-function escaped(text) {
-  return text.replace(/[&<>"]/g, (one) => ESCAPES[one]);
-}
-
-/** @param {number} value */
-function short(value) {
-  return String(Math.round(value * 100) / 100);
+/** @param {...number} values */
+function short(...values) {
+  return values.map((value) => String(Math.round(value * 100) / 100)).join(" ");
 }
 
 export class SvgContext {
+  strokeStyle = "#000";
+  fillStyle = "#000";
+  lineWidth = 1;
+  globalAlpha = 1;
+  font = "11px sans-serif";
+  textAlign = "left";
+  textBaseline = "alphabetic";
+  lineJoin = "miter";
+  dash = /** @type {number[]} */ ([]);
+  path = "";
+  parts = /** @type {string[]} */ ([]);
+  /** Groups that were open at each save. @type {number[]} */
+  saves = [];
+  open = 0;
+  clips = 0;
+
   /** @param {number} width @param {number} height @param {string} background */
   constructor(width, height, background) {
-    this.width = width;
-    this.height = height;
-    /** @type {string[]} */
-    this.parts = [`<rect width="${short(width)}" height="${short(height)}" fill="${background}"/>`];
-    this.strokeStyle = "#000";
-    this.fillStyle = "#000";
-    this.lineWidth = 1;
-    this.globalAlpha = 1;
-    this.font = "11px sans-serif";
-    this.textAlign = "left";
-    this.textBaseline = "alphabetic";
-    this.lineJoin = "miter";
-    this.lineCap = "butt";
-    /** @type {number[]} */
-    this.dash = [];
-    this.path = "";
-    /** @type {number[]} groups that were open at each save */
-    this.saves = [];
-    this.open = 0;
-    this.clips = 0;
+    this.size = `width="${short(width)}" height="${short(height)}"`;
+    this.parts.push(`<rect ${this.size} fill="${background}"/>`);
   }
 
   save() {
@@ -56,7 +49,7 @@ export class SvgContext {
 
   /** @param {number} x @param {number} y */
   translate(x, y) {
-    this.group(`transform="translate(${short(x)} ${short(y)})"`);
+    this.group(`transform="translate(${short(x, y)})"`);
   }
 
   clip() {
@@ -76,28 +69,22 @@ export class SvgContext {
 
   /** @param {number} x @param {number} y */
   moveTo(x, y) {
-    this.path += `M${short(x)} ${short(y)}`;
+    this.path += `M${short(x, y)}`;
   }
 
-  /** @param {number} x @param {number} y */
+  /** As a canvas does, it begins a path where there is none. @param {number} x @param {number} y */
   lineTo(x, y) {
-    this.path += `L${short(x)} ${short(y)}`;
-  }
-
-  /** @param {number} a @param {number} b @param {number} c @param {number} d @param {number} x @param {number} y */
-  bezierCurveTo(a, b, c, d, x, y) {
-    this.path += `C${[a, b, c, d, x, y].map(short).join(" ")}`;
+    this.path += `${this.path ? "L" : "M"}${short(x, y)}`;
   }
 
   /** @param {number} x @param {number} y @param {number} width @param {number} height */
   rect(x, y, width, height) {
-    this.path += `M${short(x)} ${short(y)}h${short(width)}v${short(height)}h${short(-width)}Z`;
+    this.path += `M${short(x, y)}h${short(width)}v${short(height)}h${short(-width)}Z`;
   }
 
   /** A whole circle; the plots draw no others. @param {number} x @param {number} y @param {number} radius */
   arc(x, y, radius) {
-    const r = short(radius);
-    this.path += `M${short(x - radius)} ${short(y)}a${r} ${r} 0 1 0 ${short(2 * radius)} 0a${r} ${r} 0 1 0 ${short(-2 * radius)} 0Z`;
+    this.path += `M${short(x - radius, y)}a${short(radius, radius)} 0 1 0 ${short(2 * radius)} 0a${short(radius, radius)} 0 1 0 ${short(-2 * radius)} 0Z`;
   }
 
   stroke() {
@@ -113,11 +100,12 @@ export class SvgContext {
   fillText(text, x, y) {
     const anchor = { center: "middle", right: "end" }[this.textAlign] ?? "start";
     const lift = this.textBaseline === "middle" ? 4 : 0;
-    this.parts.push(`<text x="${short(x)}" y="${short(y + lift)}" text-anchor="${anchor}" fill="${this.fillStyle}" style="font:${this.font}">${escaped(text)}</text>`);
+    const escaped = text.replace(/[&<>"]/g, (one) => ESCAPES[one]);
+    this.parts.push(`<text x="${short(x)}" y="${short(y + lift)}" text-anchor="${anchor}" fill="${this.fillStyle}" style="font:${this.font}">${escaped}</text>`);
   }
 
   /** The file. */
   toString() {
-    return `<svg xmlns="http://www.w3.org/2000/svg" width="${short(this.width)}" height="${short(this.height)}">${this.parts.join("")}</svg>\n`;
+    return `<svg xmlns="http://www.w3.org/2000/svg" ${this.size}>${this.parts.join("")}</svg>\n`;
   }
 }

@@ -1,6 +1,6 @@
 // @ts-check
 // Light and dark, and the colours that the canvases take from the style sheet.
-// Invariant: colours are spelled in `colors.css` only.
+// Invariant: colours are spelled in `style.css` only.
 
 import { byId } from "./dom.js";
 

@@ -1,17 +1,19 @@
 // @ts-check
-// Pause, single step and reset, and what is said under the arm: the verdict on the timestep, warnings, divergence.
-// Invariant: a notice offers what can be done about it, and goes when its cause is gone.
+// Under the arm: pause, single step and reset; the recording's controls: scrub, step, replay in slow motion, back to live, and the
+// stopwatch; and what is said there: the verdict on the timestep, warnings, divergence.
+// Invariant: a notice offers what can be done about it, and goes when its cause is gone. The recording's controls move what is shown,
+// never the arm.
 
 import { beginAnew, recover, resetArm } from "./actions.js";
-import { announce, warn } from "./announce.js";
-import { byId, el, setText } from "./dom.js";
-import { switchServo, takeSuggestion } from "./controls.js";
+import { switchController, takeSuggestion } from "./controls.js";
+import { announce, byId, el, setAttribute, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
+import { advance, goLive, halt, play, seek, shown, span, stepBy } from "./history.js";
 import { limitInForce, verdict } from "./policy.js";
-import { nobodyProvides } from "./rosbridge.js";
 import { pause, setPeriod, step } from "./runtime.js";
-import { state, watch } from "./store.js";
+import { LOOP, state, watch } from "./store.js";
+import { onFrame, wake } from "./surface.js";
 
 /** Below this real-time factor a warning of the runtime is about its pace. */
 const SLOW = 0.95;
@@ -24,36 +26,28 @@ export function startTransport() {
   byId("transport").after(said.element);
   byId("pause").addEventListener("click", togglePause);
   byId("step").addEventListener("click", singleStep);
-  byId("reset").addEventListener("click", () => report(resetArm()));
+  byId("reset").addEventListener("click", () => said.report(resetArm()));
   watch("paused", (paused) => {
     setText(byId("pause-text"), paused ? "Run" : "Pause");
     byId("pause").classList.toggle("is-paused", paused === true);
     announce(paused ? "Paused." : "Running.");
   });
-  const causes = ["diagnostics", "connection", "enabled", "goal", "integrator", "gains", "params", "period", "setpoint", "stability", "trial"];
-  for (const key of causes) watch(key, showNotice);
-}
-
-async function report(call) {
-  const answer = await call;
-  said.show(answer.result ? "" : answer.status);
-  return answer;
+  watch([...LOOP, "goal", "trial"], showNotice);
 }
 
 export function togglePause() {
-  return report(pause(!state.paused));
+  return said.report(pause(!state.paused));
 }
 
 export function setPaused(paused) {
-  return report(pause(paused));
+  return said.report(pause(paused));
 }
 
 /** One step, or as many as the box says; the arm is paused first, since only then can it be stepped. */
 export async function singleStep() {
   const steps = Number(byId("step-count").value);
-  if (!state.paused && !(await report(pause(true))).result) return;
-  const answer = await step(steps);
-  said.show(nobodyProvides(answer) ? `This runtime can't be stepped: ${answer.status}` : answer.result ? "" : answer.status);
+  if (!state.paused && !(await said.report(pause(true))).result) return;
+  said.report(step(steps));
 }
 
 // Notices, the gravest first
@@ -83,19 +77,19 @@ function choose() {
       ? { key: "connecting", kind: "calm", text: "Looking for the arm…", buttons: [] }
       : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
   }
-  const smaller = slow ? [["Control at every step", () => report(setPeriod({ period: 0 }))]]
-    : advised > 0 ? [[`Restart at ${duration(advised)}`, () => report(recover(advised))]] : [];
+  const smaller = slow ? [["Control at every step", () => said.report(setPeriod({ period: 0 }))]]
+    : advised > 0 ? [[`Restart at ${duration(advised)}`, () => said.report(recover(advised))]] : [];
   // No timestep helps where the gains are at fault.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => report(beginAnew())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && !state.paused && diagnostics.real_time_factor < SLOW) {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "servo", kind: "calm", text: "The controller is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the controller on", () => switchServo(true)]] };
+    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm doesn't move.", buttons: [["Run", togglePause]] };
@@ -107,4 +101,78 @@ function choose() {
 function whenOf(message) {
   const time = /t = ([\d.e-]+) s/.exec(message);
   return time ? ` at t = ${fixed(Number(time[1]), 3)} s` : "";
+}
+
+/** How far back a replay begins [s]. */
+const REPLAY_SECONDS = 5;
+const SCRUB_STEPS = 1000;
+
+let lastFrame = NaN;
+let watchFrom = NaN; // simulation time at which the stopwatch was started
+let watchTo = NaN; // and stopped
+
+export function startHistory() {
+  byId("history-play").addEventListener("click", () => {
+    if (shown.playing) halt();
+    else play(speed(), REPLAY_SECONDS);
+    wake();
+  });
+  byId("history-speed").addEventListener("change", () => { shown.speed = speed(); });
+  byId("history-back").addEventListener("click", () => stepBy(-1));
+  byId("history-on").addEventListener("click", () => stepBy(1));
+  byId("history-live").addEventListener("click", goLive);
+  byId("watch").addEventListener("click", stopwatch);
+  byId("history-scrub").addEventListener("input", ({ target }) => {
+    const all = span();
+    if (!all) return;
+    shown.playing = false;
+    const part = Number(target.value) / SCRUB_STEPS;
+    if (part === 1) goLive();
+    else seek(all.from + part * (all.to - all.from));
+  });
+  watch("playback", showHistory);
+  onFrame(playOn);
+}
+
+function speed() {
+  return Number(byId("history-speed").value);
+}
+
+/** Gives whether it plays on. */
+function playOn(now) {
+  const seconds = Number.isFinite(lastFrame) ? (now - lastFrame) / 1000 : 0;
+  lastFrame = shown.playing ? now : NaN;
+  advance(seconds);
+  return shown.playing;
+}
+
+/** A few times a second, and whenever the recording is touched. */
+export function showHistory() {
+  const all = span();
+  const scrub = byId("history-scrub");
+  const part = shown.live || !all || all.to === all.from ? 1 : (shown.time - all.from) / (all.to - all.from);
+  scrub.value = String(Math.round(part * SCRUB_STEPS));
+  setAttribute(scrub, "aria-valuetext", shown.live ? "live" : `${fixed(shown.time, 2)} s, ${fixed(state.time - shown.time, 2)} s ago`);
+  byId("history-live").disabled = shown.live;
+  setText(byId("history-play"), shown.playing ? "Hold" : "Replay");
+  byId("stage").classList.toggle("recording", !shown.live);
+  showStopwatch();
+}
+
+function stopwatch() {
+  const time = shown.time;
+  if (Number.isNaN(watchFrom)) watchFrom = time;
+  else if (Number.isNaN(watchTo)) watchTo = time;
+  else {
+    watchFrom = NaN;
+    watchTo = NaN;
+  }
+  showStopwatch();
+}
+
+function showStopwatch() {
+  const runs = Number.isFinite(watchFrom);
+  byId("watch-hud").hidden = !runs;
+  setText(byId("watch"), !runs ? "Stopwatch" : Number.isNaN(watchTo) ? "Stop" : "Clear");
+  if (runs) setText(byId("watch-hud"), `stopwatch ${fixed((Number.isNaN(watchTo) ? shown.time : watchTo) - watchFrom, 3)} s`);
 }

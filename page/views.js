@@ -1,13 +1,19 @@
 // @ts-check
-// The two views of the page, Course and Workbench, and the full screen.
-// Invariant: a view only shows and hides; the arm and all settings are the same in both.
+// The two views of the page, Course and Workbench, the panels beside the arm as tabs, the full screen, the number of links; and
+// the settings in the page's address, behind the #, to be sent to others.
+// Invariant: a view only shows and hides; the arm and all settings are the same in both. Opening an address changes nothing; its
+// settings wait for a click. Any page can link here, and a link must not be able to drive the arm.
 
-import { byId, setAddress, setText } from "./dom.js";
+import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
+import { stepInLink } from "./course_view.js";
+import { announce, byId, el, setAddress, setText } from "./dom.js";
+import { isAlone } from "./kernel.js";
+import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
 /** A link that brings settings but no step is about the workbench. */
-const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|servo|setpoint|workbench)\b/;
+const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|controller|servo|setpoint|workbench)\b/;
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));
@@ -16,6 +22,7 @@ export function startViews() {
     else document.documentElement.requestFullscreen?.();
   });
   document.addEventListener("fullscreenchange", () => setText(byId("full-screen"), document.fullscreenElement ? "Leave full screen" : "Full screen"));
+  startLinks();
   watch("view", (view) => {
     document.body.dataset.view = view;
     setText(byId("view-switch"), view === "course" ? "Workbench" : "Course");
@@ -24,8 +31,103 @@ export function startViews() {
   set("view", stepIn(location.hash) < 0 && SETTINGS.test(location.hash) ? "workbench" : "course");
 }
 
+/** Where the arm is in this page its number of links can be chosen: another number is another arm, in the page loaded anew. */
+function startLinks() {
+  if (!isAlone) return;
+  byId("links-choice").hidden = false;
+  watch("links", (links) => { byId("links").value = String(links); });
+  byId("links").addEventListener("change", ({ target }) => {
+    const address = new URL(location.href);
+    address.searchParams.delete("links");
+    address.hash = `${stepInLink()}links=${target.value}`;
+    setAddress(address);
+    location.reload();
+  });
+}
+
 /** @param {"course" | "workbench"} view */
 function show(view) {
   if (view === "workbench" && stepIn(location.hash) >= 0) setAddress(location.pathname + location.search);
   set("view", view);
+}
+
+const NAMES = ["plots", "stability", "error", "compare", "tasks"];
+
+export function startTabs() {
+  NAMES.forEach((name, i) => {
+    const tab = byId(`tab-${name}`);
+    tab.addEventListener("click", () => openTab(name));
+    tab.addEventListener("keydown", ({ key }) => {
+      const way = { ArrowLeft: -1, ArrowRight: 1 }[key];
+      if (!way) return;
+      const next = NAMES[(i + way + NAMES.length) % NAMES.length];
+      openTab(next);
+      byId(`tab-${next}`).focus();
+    });
+  });
+}
+
+export function openTab(name) {
+  for (const one of NAMES) {
+    byId(one).hidden = one !== name;
+    byId(`tab-${one}`).setAttribute("aria-selected", String(one === name));
+    byId(`tab-${one}`).tabIndex = one === name ? 0 : -1;
+  }
+  if (state.tab !== name) set("tab", name);
+}
+
+const SHOWN_MS = 2500;
+
+export function startShare() {
+  byId("share").addEventListener("click", share);
+  if (location.hash.length > 1) watch("params", offer);
+}
+
+/** The page's address with the present settings behind the #. */
+export function address() {
+  const link = new URL(location.href);
+  link.search = ""; // it may hold a token
+  link.hash = stepInLink() + toFragment(/** @type {any} */ (presentSettings(state)), state.links);
+  return link.href;
+}
+
+async function share() {
+  if (!presentSettings(state)) return;
+  const link = address();
+  setAddress(new URL(link).hash);
+  let said = "Link copied";
+  try {
+    await navigator.clipboard.writeText(link);
+  } catch {
+    said = "Link is in the address bar";
+  }
+  setText(byId("share-text"), said);
+  announce(said);
+  setTimeout(() => setText(byId("share-text"), "Share"), SHOWN_MS);
+}
+
+let wasOffered = false;
+
+function offer() {
+  if (wasOffered) return;
+  wasOffered = true;
+  const settings = fromFragment(location.hash);
+  if (!Object.values(settings).some((one) => one !== null)) return;
+  const banner = byId("offer");
+  const given = new URLSearchParams(location.hash.slice(1));
+  const text = [...given].filter(([name]) => name !== "links" && name !== "step").map(([name, value]) => `${name} ${value}`).join(" · ").slice(0, 300);
+  const done = () => { banner.hidden = true; };
+  const refused = el("p", { class: "refusal" });
+  banner.replaceChildren(
+    el("p", {}, "This link brings settings: ", el("span", { class: "offer-text" }, text)),
+    el("button", { type: "button", class: "primary", onclick: async () => {
+      remember();
+      const refusals = await apply(settings);
+      setText(refused, refusals.join(" "));
+      if (refusals.length === 0) done();
+    } }, "Apply"),
+    el("button", { type: "button", onclick: done }, "Ignore"), refused,
+  );
+  banner.hidden = false;
+  announce("This link brings settings. Apply or ignore them.");
 }

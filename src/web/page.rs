@@ -22,17 +22,13 @@ macro_rules! assets {
 
 /// Every file of the page.
 pub const ASSETS: &[Asset] = assets! {
-    "index.html" "icon.svg" "base.css" "colors.css" "course.css" "frame.css" "panels.css"
-    "settings.css" "small.css" "style.css" "view.css" "actions.js" "aim.js" "announce.js"
-    "arm_view.js" "arrows.js" "axis.js" "backdrop.js" "compare.js" "compare_view.js" "controls.js"
-    "course.js" "course_charts.js" "course_view.js" "csv.js" "cursor.js" "dom.js" "field.js"
-    "format.js" "frames.js" "gains.js" "goal_panel.js" "history.js" "history_panel.js" "kernel.js" "keyboard.js"
-    "ladder.js" "ladder_chart.js" "ladder_panel.js" "latest.js" "lessons.js" "lessons_panel.js"
-    "limits_view.js" "main.js" "map_view.js" "mechanics.js" "pencil.js" "phase_plot.js"
-    "playback.js" "plots.js" "policy.js" "readouts.js" "resample.js" "ring.js" "rosbridge.js"
-    "runs.js" "runtime.js" "save.js" "scale.js" "scenes.js" "settings.js" "share.js" "sheet.js"
-    "smooth.js" "steps_view.js" "store.js" "strip_chart.js" "surface.js" "svg_context.js" "tabs.js"
-    "theme.js" "trail.js" "transport.js" "trial_panel.js" "views.js" "why.js"
+    "index.html" "icon.svg" "style.css" "actions.js" "aim.js" "arm_view.js" "chart.js"
+    "compare.js" "controls.js" "course.js" "course_view.js" "dom.js" "field.js" "format.js"
+    "history.js" "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js" "latest.js" "main.js"
+    "mechanics.js" "pencil.js" "plots.js" "policy.js" "readouts.js" "rosbridge.js" "runtime.js"
+    "scale.js" "scenes.js" "settings.js" "sheet.js" "stability_panel.js" "store.js"
+    "strip_chart.js" "surface.js" "svg_context.js" "tasks_panel.js" "theme.js" "trail.js"
+    "transport.js" "views.js"
 };
 
 /// The file at `path`, if that is one of the page's.

@@ -7,7 +7,7 @@ Invariant: the browser that was started is the one that is stopped, and its prof
 """
 
 import base64
-import fcntl
+import collections
 import json
 import os
 import queue
@@ -24,10 +24,46 @@ FLAGS = [
     "--enable-precise-memory-info", "--js-flags=--expose-gc", "--remote-debugging-pipe",
 ]
 ANSWER_SECONDS = 60
+# Width, height and RGBA of a PNG in base64, the latter in base64 too.
+DECODE = """(async () => {
+  const bytes = Uint8Array.from(atob("%s"), (one) => one.charCodeAt(0));
+  const picture = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+  const { width, height } = picture;
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.drawImage(picture, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
+  let text = "";
+  for (let i = 0; i < data.length; i += 1 << 15) text += String.fromCharCode(...data.subarray(i, i + (1 << 15)));
+  return [width, height, btoa(text)];
+})()"""
 
 
 class BrowserError(Exception):
     """The browser answered with an error, or not at all."""
+
+
+def close(one, other, tolerance=24):
+    """Whether two colors are alike."""
+    return all(abs(a - b) <= tolerance for a, b in zip(one, other))
+
+
+class Image:
+    """A picture that the browser has decoded; `image[x, y]` is (red, green, blue)."""
+
+    def __init__(self, width, height, data):
+        self.width, self.height, self.data = width, height, base64.b64decode(data)
+
+    def __getitem__(self, place):
+        at = 4 * (place[1] * self.width + place[0])
+        return tuple(self.data[at:at + 3])
+
+    def pixels(self):
+        """All colors, row by row."""
+        return zip(*(self.data[channel::4] for channel in range(3)))
+
+    def count(self, color, tolerance=24):
+        """How many pixels are `color`, each channel within `tolerance`."""
+        return sum(number for one, number in collections.Counter(self.pixels()).items() if close(one, color, tolerance))
 
 
 class Browser:
@@ -37,21 +73,14 @@ class Browser:
         self.profile = tempfile.mkdtemp(prefix="pendularm-browser-")
         commands, to_browser = os.pipe()
         from_browser, answers = os.pipe()
-        # Away from 3 and 4, which the child's copies take.
-        ends = [fcntl.fcntl(fd, fcntl.F_DUPFD, 20) for fd in (commands, answers)]
-        spare = [os.open(os.devnull, os.O_RDONLY) for _ in range(4)]  # keeps subprocess's own pipe off 3 and 4
-
-        def take_ends():
-            os.dup2(ends[0], 3)
-            os.dup2(ends[1], 4)
-
+        ends = f'exec "$@" 3<&{commands} 4>&{answers}'
         self.process = subprocess.Popen(
-            [binary, *FLAGS, *extra, f"--user-data-dir={self.profile}", "about:blank"],
-            preexec_fn=take_ends, pass_fds=(3, 4), start_new_session=True,
+            ["bash", "-c", ends, "bash", binary, *FLAGS, *extra, f"--user-data-dir={self.profile}", "about:blank"],
+            pass_fds=(commands, answers), start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )
-        for fd in (commands, answers, *ends, *spare):
-            os.close(fd)
+        os.close(commands)
+        os.close(answers)
         self._to = os.fdopen(to_browser, "wb", buffering=0)
         self._from = os.fdopen(from_browser, "rb")
         self._next = 1
@@ -238,6 +267,9 @@ class Page:
         self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}}); e.focus(); e.select(); }})()")
         self.send("Input.insertText", {"text": text})
         self.key("Enter")
+
+    def decode(self, png):
+        return Image(*self.run(DECODE % base64.b64encode(png).decode()))
 
     def screenshot(self, path=None, whole=False, clip=None):
         """A PNG of the window, the whole page or a `clip` (x, y, width, height)."""

@@ -9,7 +9,6 @@ import os
 import signal
 import socket
 import subprocess
-import threading
 
 BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
 # Far longer than anything takes [s]; a longer wait is a failure.
@@ -61,11 +60,6 @@ class Runtime:
                 pass
             return frame
 
-    def offers(self, service):
-        """Whether anybody provides the service."""
-        answer = self.call(service)
-        return answer["result"] or "no provider" not in answer["status"]
-
     def next(self, topic):
         """The next message on a topic."""
         with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as tcp, tcp.makefile("rw") as lines:
@@ -87,34 +81,3 @@ class Runtime:
 
     def end_effector(self):
         return self.joints()[-1]
-
-
-class Provider:
-    """A client that provides services, each a function from arguments to values; use it with `with`."""
-
-    def __init__(self, port, services):
-        self.tcp = socket.create_connection(("127.0.0.1", port), PATIENCE)
-        self.tcp.settimeout(None)
-        # For reading only: writing through the same object would drop the lines that it has read ahead.
-        self.lines = self.tcp.makefile("r")
-        self.services = services
-        for name in services:
-            self._send({"op": "advertise_service", "service": name})
-        threading.Thread(target=self._answer, daemon=True).start()
-
-    def _send(self, frame):
-        self.tcp.sendall(json.dumps(frame).encode() + b"\n")
-
-    def _answer(self):
-        for line in self.lines:
-            call = json.loads(line)
-            if call["op"] == "call_service":
-                values = self.services[call["service"]](call["args"])
-                self._send({"op": "service_response", "service": call["service"], "id": call["id"], "values": values, "result": True})
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.tcp.shutdown(socket.SHUT_RDWR)
-        self.tcp.close()

@@ -11,7 +11,6 @@ import unittest
 
 from alone import Alone
 from chromium import Browser
-from png import Image
 from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
@@ -19,6 +18,8 @@ ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
 IS_FILE = os.environ.get("FORM") == "file"
 # A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
 FOREIGN = "elsewhere.example"
+
+NUMBER = "input[type=number]"
 
 _browser = None
 
@@ -33,6 +34,11 @@ def browser():
 def needs_server(why):
     """A test that the page in a file has no part in, and the reason."""
     return unittest.skipIf(IS_FILE, why)
+
+
+def milliseconds(seconds):
+    """A time as the page writes it."""
+    return f"{float(format(1000 * seconds, '.3g')):g} ms"
 
 
 def close_browser():
@@ -71,6 +77,17 @@ class PageTest(unittest.TestCase):
         # The page's own modules, those that run, by name.
         page.run(f"window.own = {'async (name) => pendularm[name]' if IS_FILE else '(name) => import(`/${name}`)'}; 0")
 
+    def values(self, service, **args):
+        return self.runtime.call(service, **args)["values"]
+
+    frames = "own('surface.js').then(({ count }) => count.frames)"
+
+    def drawn(self, seconds):
+        """Frames that the page draws in that time, or a little more."""
+        before = self.page.run(self.frames)
+        time.sleep(seconds)
+        return self.page.run(self.frames) - before
+
     def tab(self, name):
         """Opens a panel beside the arm."""
         self.page.click(f"#tab-{name}")
@@ -91,7 +108,7 @@ class PageTest(unittest.TestCase):
             box = self.page.run(look)
             # An element that came above it meanwhile has moved it out of the picture.
             if box == before:
-                return Image(picture)
+                return self.page.decode(picture)
         self.fail(f"{selector} does not come to rest")
 
     def color(self, name):
@@ -106,6 +123,12 @@ class PageTest(unittest.TestCase):
         self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+
+    def shake(self):
+        """The controller shakes the arm: its timestep is a quarter beyond the limit."""
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
 
     def wait(self, done, why, seconds=60):
         """Waits for something of the runtime."""

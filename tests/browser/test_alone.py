@@ -50,10 +50,15 @@ class AloneTest(PageTest):
         self.assertTrue(self.runtime.call("/study/gains")["result"])
         self.assertEqual(page.complaints, [])
 
-    def test_an_address_chooses_the_number_of_links(self):
+    def test_an_address_and_a_list_choose_the_number_of_links(self):
         page = browser().page(f"{FILE.as_uri()}#step=2&links=3")
         self.addCleanup(page.close)
         page.until(SHOWN, why="the arm runs")
         self.runtime.page = page
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 3)
+        page.until("document.querySelector('#links').checkVisibility() && document.querySelector('#links').value === '3'")
+        page.run("window.old = 1; document.querySelector('#links').value = '2'; document.querySelector('#links').dispatchEvent(new Event('change'))")
+        page.until(f"window.old === undefined && {SHOWN} && document.querySelector('#links').value === '2'", why="the page anew")
+        self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 2)
+        self.assertEqual(page.run("location.hash"), "#step=2&links=2")
         self.assertEqual(page.complaints, [])

@@ -2,51 +2,22 @@
 
 import math
 
-from runtime import Provider
-from stage import PageTest
-
-NUMBER = "input[type=number]"
-
-
-def stability(_):
-    """Limits as the study would answer them; the numbers are made up."""
-    return {"timestep_limit_held": 0.018, "timestep_limit_continuous": 0.024, "minimum_over_poses_held": 0.009,
-            "minimum_over_poses_continuous": 0.012, "advised_timestep": 0.004}
-
-
-def rollout(args):
-    """A swing as the study would answer it, made up; Euler's grows."""
-    count = round(args["duration"] / args["timestep"])
-    times = [k * args["timestep"] for k in range(0, count + 1, max(1, count // (args["samples"] - 1)))]
-    growth = 0.2 if args["integrator"] == "euler" else 0.0
-    joints = range(len(args["q0"]))
-    phase = [[(2 + i) * t for i in joints] for t in times]
-    return {
-        "times": times,
-        "positions": [[math.exp(growth * t) * math.cos(a) - 1.5 for a in p] for t, p in zip(times, phase)],
-        "velocities": [[math.exp(growth * t) * (growth * math.cos(a) - (2 + i) * math.sin(a)) for i, a in enumerate(p)] for t, p in zip(times, phase)],
-        "efforts": [[0 for _ in joints] for _ in times], "energy": [growth * t for t in times],
-        "evaluations": count, "wall_time": 1e-3, "error": growth,
-    }
-
+from stage import NUMBER, PageTest
 
 class Controls(PageTest):
-    def values(self, service):
-        return self.runtime.call(service)["values"]
-
     def field(self, name, joint=None):
         return f"#{name} {NUMBER}" if joint is None else f"#{name} .field:nth-of-type({joint}) {NUMBER}"
 
     # The view
 
     def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2)))
         self.wait(lambda: math.dist(self.runtime.end_effector(), (0.7, 1.2)) < 0.02, "end effector at the target")
         self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
 
     def test_a_shift_drag_places_the_setpoint_without_a_goal(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)), shift=True)
         self.wait(lambda: math.dist(self.runtime.end_effector(), (-0.4, 1.3)) < 0.02, "end effector at the setpoint")
         self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
@@ -103,7 +74,7 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#goal-body .refusal').textContent === ''", why="another goal was accepted")
 
     def test_arrow_keys_in_the_view_move_the_target(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.page.run("document.querySelector('#arm').focus()")
         self.runtime.call("/arm_sim/reset")
         self.page.until("own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)", why="the page has seen the reset")
@@ -127,7 +98,6 @@ class Controls(PageTest):
             self.page.fill(self.field(f"{gain}-fields", joint), str(value))
             before[gain][joint - 1] = value
         self.wait(lambda: self.values("/pid_controller/set_gains") == before, "gains")
-        self.page.until("document.querySelector('#out-timestep').textContent === '2 ms'")
 
     def test_the_control_period_is_set_beside_the_timestep_and_can_be_undone(self):
         slider = "document.querySelector('#period-field input[type=range]')"
@@ -137,7 +107,7 @@ class Controls(PageTest):
         self.page.until("!document.querySelector('#undo').disabled")
         self.page.click("#undo")
         self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0, "undone")
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.page.until(f"{slider}.getAttribute('aria-valuetext').startsWith('every step, stable up to ')")
         self.keep("clocks")
         marks = self.page.run("[...document.querySelectorAll('#timestep-field .mark, #period-field .mark')].map((one) => one.getBoundingClientRect().x)")
@@ -162,7 +132,7 @@ class Controls(PageTest):
         self.runtime.call("/arm_sim/set_params", gravity=5)
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '5'")
-        self.page.until("document.querySelector('#servo').getAttribute('aria-checked') === 'true'")
+        self.page.until("document.querySelector('#controller').getAttribute('aria-checked') === 'true'")
 
     def test_a_refusal_is_shown_beside_its_field_which_goes_back(self):
         for field, wrong, service, shown in (
@@ -204,52 +174,10 @@ class Controls(PageTest):
         stamp = self.runtime.next("/joint_states")["header"]["stamp"]
         return stamp["sec"] + stamp["nanosec"] * 1e-9
 
-    def test_divergence_is_unmistakable_and_offers_reset(self):
-        # Four times what held control bears at these gains: it must leave the finite numbers.
-        self.runtime.call("/arm_sim/set_integrator", method="euler", timestep=0.05)
-        self.page.click("#servo")
-        self.page.until("document.querySelector('#stage').classList.contains('diverged')", why="diverged")
-        self.page.until(r"/^Diverged at t = [\d.]+ s\. /.test(document.querySelector('#notice').textContent)")
-        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
-        self.keep("diverged")
-        self.assertGreater(self.image("#arm").count(self.color("bad")), 500)
-        self.runtime.call("/arm_sim/set_integrator", method="rk4", timestep=0.001)
-        # The first button was another, with a timestep to reset to; the page hears now and then what others have set.
-        self.page.until("document.querySelector('#notice button').textContent === 'Restart'")
-        self.page.click("#notice button")
-        self.page.until("document.querySelector('#run-state').textContent === 'running'")
-        self.page.until("!document.querySelector('#stage').classList.contains('diverged')")
-
-    def study(self):
-        """The study's services: the runtime's own, or a stand-in's of the same fields where it has none."""
-        if not self.runtime.offers("/study/stability"):
-            self.assertEqual(self.page.until("document.querySelector('#out-limit').textContent"), "not offered")
-            self.page.click("#compare-form button[type=submit]")
-            self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('no provider')")
-            provider = Provider(self.runtime.port, {"/study/stability": stability, "/study/rollout": rollout})
-            self.addCleanup(provider.__exit__)
-            self.page.go(self.runtime.url)  # a page asks again only now and then
-            self.connected()
-
-    def test_a_timestep_above_the_stability_limit_is_warned_of(self):
-        self.study()
-        self.page.click("#servo")
-        self.page.until("document.querySelector('#out-servo').textContent === 'on'")
-        limit = self.runtime.call("/study/stability")["values"]["timestep_limit_held"]
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("!document.querySelector('#timestep-field .mark').hidden")
-        self.runtime.call("/arm_sim/set_integrator", timestep=2 * limit)
-        self.page.until("document.querySelector('#notice').textContent.includes('is above the limit')")
-        self.page.until("document.querySelector('#out-limit').classList.contains('bad')")
-        self.keep("limit")
-        self.page.click("#notice button")
-        self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] < limit, "the advised timestep")
-        self.page.until("document.querySelector('#notice').hidden")
-
     # Trial
 
     def test_the_trial_runs_counts_skips_and_stops(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.tab("tasks")
         self.page.fill("#trial-body .option:nth-of-type(1) input", "120")
         self.page.fill("#trial-body .option:nth-of-type(2) input", "0.05")
@@ -272,19 +200,12 @@ class Controls(PageTest):
 
     # Comparison
 
-    def test_a_comparison_without_a_duration_takes_five_seconds(self):
-        self.tab("compare")
-        self.page.fill("#compare-form .compare-row input", "")
-        self.page.click("#compare-form button[type=submit]")
-        self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 60, "played to its end")
-        run = self.color("run1")
-        self.assertTrue(self.image("#compare-angle").count(run) > 20, "a line")
-
     def test_any_number_of_runs_is_compared_with_a_reference(self):
         self.tab("compare")
         for _ in range(2):
             self.page.click("#compare-form .compare-rows > button")
         self.page.run("document.querySelectorAll('#compare-rows select')[2].value = 'verlet'")
+        self.page.fill("#compare-form .compare-row input", "")  # five seconds
         self.page.click("#compare-form button[type=submit]")
         self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
         self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 30, "played to its end")
@@ -294,31 +215,6 @@ class Controls(PageTest):
         self.assertEqual(self.page.run("document.querySelectorAll('#compare-table tbody tr').length"), 4)
         self.assertIn("Against Runge–Kutta 4 at", self.page.text("#compare-text"))
         self.keep("compare")
-
-    def test_a_run_that_diverges_says_when_and_claims_nothing(self):
-        self.runtime.call("/pid_controller/enable", data=True)
-        self.tab("compare")
-        self.page.run("document.querySelectorAll('#compare-form .compare-row select')[1].value = 'on'")
-        self.page.run("document.querySelectorAll('#compare-rows input')[0].value = '0.05'")
-        self.page.run("document.querySelectorAll('#compare-rows input')[1].value = '0.002'")
-        self.page.click("#compare-form button[type=submit]")
-        self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
-        rows = self.page.run("[...document.querySelectorAll('#compare-table tbody tr')].map((row) => [...row.cells].map((one) => one.textContent))")
-        self.assertRegex(rows[0][1], r"^diverged at t = \d+\.\d\d s$")
-        self.assertEqual(rows[0][2:4], ["–", "–"])
-        self.assertEqual(rows[1][1], "lasts")
-        self.assertRegex(self.page.text("#compare-text"), r"Euler, 50 ms diverged at t = ")
-        self.keep("compare-diverged")
-
-    def test_runs_of_different_timesteps_meet_at_common_instants(self):
-        common = "own('resample.js').then(({ commonSamples }) => commonSamples(%s))"
-        # 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
-        self.assertEqual(self.page.run(common % "5, [0.01, 0.001]"), 501)
-        self.assertEqual(self.page.run(common % "4, [0.01, 0.005]"), 401)
-        self.assertEqual(self.page.run(common % "5, [0.01, 0.007]"), 601)
-        # Between samples a cubic is met exactly, by its values and slopes at both ends: t^3 at 0.25.
-        value = self.page.run("own('resample.js').then(({ resample }) => resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]))")
-        self.assertEqual(value, [[0.25 ** 3], [1], None])
 
     # Keys
 
@@ -334,10 +230,10 @@ class Controls(PageTest):
         for key, on in (("c", True), ("c", False), ("x", True), ("s", False), ("s", False), ("x", True)):
             self.page.key(key)
             self.wait(lambda: self.values("/pid_controller/enable")["data"] is on, key)
-            self.page.until(f"document.querySelector('#servo').ariaChecked === '{str(on).lower()}'")
+            self.page.until(f"document.querySelector('#controller').ariaChecked === '{str(on).lower()}'")
 
     def test_q_and_e_move_the_setpoint_of_the_chosen_joint(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.wait(lambda: self.time() > 1, "a second")
         self.page.click("#reset")
         self.page.until("document.querySelector('#announce-polite').textContent.startsWith('Reset')")
@@ -379,7 +275,7 @@ class Controls(PageTest):
         for _ in range(120):
             self.page.key("Tab")
             seen.add(self.page.run("document.activeElement.id"))
-        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "servo", "plot-pause", "plot-save", "tab-plots", "defaults", "lesson-euler", "history-scrub"} - seen
+        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "controller", "plot-pause", "plot-save", "tab-plots", "defaults", "history-scrub"} - seen
         self.assertEqual(missing, set())
 
     # Links to share
@@ -392,30 +288,14 @@ class Controls(PageTest):
         page.click("#offer button")
         self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 1.62, "masses": [1, 2], "lengths": [1, 1]}, "parameters")
         self.wait(lambda: self.values("/arm_sim/set_integrator") == {"method": "verlet", "timestep": 0.002}, "integrator")
-        self.wait(lambda: self.values("/pid_controller/enable")["data"], "servo")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
         page.until("document.querySelector('#offer').hidden")
-
-    def test_a_shared_link_brings_back_what_it_was_made_of(self):
-        self.runtime.call("/arm_sim/set_params", gravity=2.5, lengths=[0.7, 1.1])
-        self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '2.5'")
-        self.page.click("#share")
-        fragment = self.page.until("location.hash")
-        self.runtime.call("/arm_sim/set_params", gravity=9.81, lengths=[1, 1])
-        page = self.open(fragment)
-        page.click("#offer button")
-        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 2.5, "masses": [1, 1], "lengths": [0.7, 1.1]}, "parameters")
-
 
 class ThreeLinks(PageTest):
     links = 3
 
-    def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
-        self.page.click("#servo")
-        self.page.drag(self.on_canvas((2.4, 0.2)), self.on_canvas((1.0, 1.6)))
-        self.wait(lambda: math.dist(self.runtime.end_effector(), (1.0, 1.6)) < 0.02, "end effector at the target")
-
     def test_a_goal_may_have_an_orientation(self):
-        self.page.click("#servo")
+        self.page.click("#controller")
         self.tab("tasks")
         for i, value in enumerate(("1.2", "1.1", "0.5"), 1):
             self.page.fill(f"#goal-body .option:nth-of-type({i}) input", value)

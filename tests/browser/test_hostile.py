@@ -4,6 +4,7 @@ Invariant: each test ends by asking the runtime itself, past the browser, that n
 """
 
 import http.server
+import json
 import pathlib
 import tempfile
 import threading
@@ -44,6 +45,27 @@ window.tried = (async () => ({
 </script>
 """.replace("FRAME", repr(FRAME))
 
+# Tries everything that a page can do to another address; none of it throws, all of it is told.
+INTRUDER = """
+<script>
+const told = {};
+const frame = FRAME + "\\n";
+const socket = (url) => new Promise((done) => {
+  const one = new WebSocket(url);
+  one.onopen = () => { one.send(frame); setTimeout(() => done("open"), 500); };
+  one.onclose = () => done("closed");
+});
+const post = (type) => fetch(`http://TARGET/`, {method: "POST", mode: "no-cors", headers: {"content-type": type}, body: "\\n" + frame}).then(() => "sent", () => "failed");
+window.tried = (async () => {
+  told.socket = await socket(`ws://TARGET/`);
+  told.post = await post("text/plain");
+  told.put = await fetch(`http://TARGET/`, {method: "PUT", body: frame}).then(() => "read", () => "failed");
+  told.read = await fetch(`http://TARGET/`).then(() => "read", () => "failed");
+  return told;
+})();
+</script>
+""".replace("FRAME", repr(FRAME))
+
 # This script is of the runtime's own origin, as far as the browser knows.
 REBOUND = """
 (async () => {
@@ -63,7 +85,7 @@ REBOUND = """
 """.replace("FRAME", repr(FRAME))
 
 
-def serve(case, html, port=0):
+def serve(html, port=0):
     """Serves one page of somebody else's until the value that is returned second is called; gives its port first."""
 
     class Handler(http.server.BaseHTTPRequestHandler):
@@ -98,7 +120,7 @@ class Hostile(PageTest):
         self.addCleanup(self.runtime.__exit__)
 
     def visit(self, html, host=FOREIGN):
-        port, stop = serve(self, html.replace("TARGET", f"127.0.0.1:{self.runtime.port}"))
+        port, stop = serve(html.replace("TARGET", f"127.0.0.1:{self.runtime.port}"))
         self.addCleanup(stop)
         page = browser().page(f"http://{host}:{port}/")
         self.addCleanup(page.close)
@@ -109,6 +131,24 @@ class Hostile(PageTest):
 
     def write(self, name, text):
         (pathlib.Path(self.report.name) / name).write_text(text)
+
+    def test_a_foreign_page_can_neither_open_the_websocket_nor_post_a_command(self):
+        told = self.visit(INTRUDER).run("window.tried")
+        self.assertEqual((told["socket"], told["put"], told["read"]), ("closed", "failed", "failed"))
+        self.unmoved()
+
+    def test_a_page_without_an_origin_can_neither(self):
+        script = INTRUDER.replace("TARGET", f"127.0.0.1:{self.runtime.port}") + "<script>tried.then((t) => parent.postMessage(t, `*`))</script>"
+        page = browser().page("about:blank")
+        self.addCleanup(page.close)
+        page.run("new Promise((done) => { const frame = document.createElement('iframe'); frame.sandbox = 'allow-scripts';"
+                 f" frame.srcdoc = {json.dumps(script)}; onmessage = ({{ data }}) => {{ window.told = data; done(); }}; document.body.append(frame); }})")
+        self.assertEqual(page.run("window.told.socket"), "closed")
+        self.unmoved()
+
+    def test_these_tests_can_fail_a_page_of_this_machine_is_let_in(self):
+        self.assertEqual(self.visit(INTRUDER, "127.0.0.1").run("window.tried")["socket"], "open")
+        self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 0, "a loopback origin may")
 
     def test_a_form_that_posts_itself_moves_nothing(self):
         for host in (FOREIGN, "127.0.0.1"):
@@ -132,13 +172,13 @@ class Hostile(PageTest):
             self.wait(lambda: refused() == 2, f"two refusals, got {page.complaints}")
 
     def test_a_page_that_an_option_names_may_frame_the_page(self):
-        port, stop = serve(self, "")
+        port, stop = serve("")
         stop()
         self.runtime.stop()
         site = f"http://{FOREIGN}:{port}"
         self.runtime = Runtime("--report", self.report.name, "--allow-frame", site)
         self.addCleanup(self.runtime.__exit__)
-        _, stop = serve(self, f'<iframe src="{self.runtime.url}"></iframe>', port)
+        _, stop = serve(f'<iframe src="{self.runtime.url}"></iframe>', port)
         self.addCleanup(stop)
         page = browser().page(f"{site}/")
         self.addCleanup(page.close)
@@ -152,7 +192,7 @@ class Hostile(PageTest):
         page.until("window.opened.closed")
 
     def test_a_page_whose_name_was_pointed_here_can_ask_for_nothing_by_any_method(self):
-        port, stop = serve(self, "x")
+        port, stop = serve("x")
         page = browser().page(f"http://{FOREIGN}:{port}/")
         self.addCleanup(page.close)
         stop()
@@ -161,6 +201,7 @@ class Hostile(PageTest):
         self.runtime.start()
         told = page.run(REBOUND)
         self.assertEqual(told.pop("GET"), 403)
+        self.assertIn(FOREIGN, page.run("fetch('/').then((one) => one.text())"))
         self.assertEqual(told.pop("socket"), "closed")
         self.assertEqual(set(told.values()), {"failed"}, told)
         self.unmoved()
@@ -200,7 +241,7 @@ class Cookie(PageTest):
     token = "open-sesame-and-some-more"
 
     def setUp(self):
-        port, stop = serve(self, "x")
+        port, stop = serve("x")
         self.addCleanup(stop)
         self.foreign = f"http://{FOREIGN}:{port}"
         self.runtime = Runtime("--token", self.token, "--allow-origin", self.foreign)

@@ -45,9 +45,9 @@ test("bars that flip and grow are told from bars that die away", () => {
 });
 
 test("a time stands beside its limit in one unit", () => {
-  assert.equal(ofLimit(0.0055, 0.004316), "5.5 of 4.3 ms");
-  assert.equal(ofLimit(0.001, NaN), "1 ms");
-  assert.equal(ofLimit(0.005, 0), "5 ms, never stable");
+  assert.equal(ofLimit(5.5, 4.316), "5.5 of 4.3 ms");
+  assert.equal(ofLimit(1, NaN), "1 ms");
+  assert.equal(ofLimit(5, 0), "5 ms, never stable");
 });
 
 test("a link names a step by number or by name", () => {

@@ -3,10 +3,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { csvText } from "../../page/csv.js";
+import { csvText } from "../../page/history.js";
 import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
 import { record, take } from "../../page/history.js";
-import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/runs.js";
+import { commonSamples, describeRun, distances, divergedAt, energyGained, partsAt, resample } from "../../page/ladder.js";
 import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
@@ -44,6 +44,12 @@ test("a run that diverged says when, and claims neither energy nor error", () =>
   assert.notEqual(away[6], null);
 });
 
+test("runs of different timesteps meet at common instants, and between samples a cubic is met exactly", () => {
+  // 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
+  assert.deepEqual([[5, [0.01, 0.001]], [4, [0.01, 0.005]], [5, [0.01, 0.007]]].map(([seconds, steps]) => commonSamples(seconds, steps)), [501, 401, 601]);
+  assert.deepEqual(resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]), [[0.25 ** 3], [1], null]);
+});
+
 test("the last sample may lie a step before the end", () => {
   assert.equal(endOf([0, 0.9], 1, 0.1), null);
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
@@ -70,7 +76,7 @@ test("the cheapest run that is good enough is found for each method", () => {
 test("place and value of a logarithmic scale are each other's inverse", () => {
   const scale = new LogScale(1e-4, 0.1);
   assert.ok(Math.abs(scale.value(scale.place(0.003)) - 0.003) < 1e-15);
-  assert.deepEqual(scale.ticks(4).map((one) => one.toExponential(0)), ["1e-4", "1e-3", "1e-2", "1e-1"]);
+  assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
 });
 
 function arm(method, timestep, enabled = false) {
@@ -101,7 +107,7 @@ test("a file holds its settings, and what is not finite is empty", () => {
   state.setpointKnown = false;
   take();
   const lines = csvText(2, DEFAULTS[2]).split("\r\n");
-  for (const setting of ["# method=rk4", "# timestep=0.001", "# kp=1000,250", "# masses=1,1", "# servo=off"]) assert.ok(lines.includes(setting), setting);
+  for (const setting of ["# method=rk4", "# timestep=0.001", "# kp=1000,250", "# masses=1,1", "# controller=off"]) assert.ok(lines.includes(setting), setting);
   const header = lines.find((line) => line.startsWith("time [s]"));
   const row = lines[lines.indexOf(header) + 1].split(",");
   assert.equal(header.split(",").length, row.length);

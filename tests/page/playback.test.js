@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { advance, follow, goLive, play, seek, shown, span, stepBy } from "../../page/playback.js";
+import { advance, follow, goLive, play, seek, shown, span, stepBy } from "../../page/history.js";
 import { record, take } from "../../page/history.js";
 import { state } from "../../page/store.js";
 

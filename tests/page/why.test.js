@@ -5,7 +5,7 @@ import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { DEFAULTS } from "../../page/settings.js";
-import { whyText } from "../../page/why.js";
+import { whyText } from "../../page/policy.js";
 
 // As /study/stability answers for the usual gains, stretched out.
 const SERVED = {

@@ -1,13 +1,11 @@
-// Numbers in words, scales, medians, settings in links, and the way back.
+// Numbers in words, scales, settings in links, and the way back.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Axis, symmetricLog } from "../../page/axis.js";
 import { duration, exact, fixed, plain, short, significant } from "../../page/format.js";
-import { LESSONS } from "../../page/lessons.js";
+import { Axis, symmetricLog } from "../../page/scale.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
-import { Median } from "../../page/smooth.js";
 
 test("a field shows four digits, and its exponent whole", () => {
   assert.equal(plain(3.00591098005247), "3.006");
@@ -35,13 +33,9 @@ test("durations have the unit that suits them", () => {
 
 test("an axis is linear while values are sane, logarithmic once they explode", () => {
   const axis = new Axis(4, 0.2, 100);
-  axis.begin();
-  for (const value of [-1, 3]) axis.offer(value);
-  axis.end();
+  axis.fit(-1, 3);
   assert.ok(!axis.log && axis.low <= -1 && axis.high >= 3);
-  axis.begin();
-  for (const value of [-1, 3, 1e148]) axis.offer(value);
-  axis.end();
+  axis.fit(-1, 1e148);
   assert.ok(axis.log);
   // Equal factors are equal distances, and one radian is still told from none.
   const distance = axis.place(1e11) - axis.place(1e9);
@@ -53,14 +47,10 @@ test("an axis is linear while values are sane, logarithmic once they explode", (
 
 test("a fixed scale stays", () => {
   const axis = new Axis(4, 0.2, 100);
-  axis.begin();
-  axis.offer(2);
-  axis.end();
+  axis.fit(2, 2);
   const { high } = axis;
   axis.fixed = true;
-  axis.begin();
-  axis.offer(50);
-  axis.end();
+  axis.fit(2, 50);
   assert.equal(axis.high, high);
 });
 
@@ -69,21 +59,16 @@ test("the symmetric logarithm is odd and near zero the identity over ln 10", () 
   assert.ok(Math.abs(symmetricLog(1e-6) - 1e-6 / Math.LN10) < 1e-12);
 });
 
-test("a median is not moved by one wild reading, and forgets", () => {
-  const median = new Median(5);
-  for (const value of [1, 1.1, 1e9, 0.9, 1]) median.add(value);
-  assert.equal(median.value, 1);
-  for (let k = 0; k < 5; k += 1) median.add(7);
-  assert.equal(median.value, 7);
-  median.clear();
-  assert.ok(Number.isNaN(median.value));
-});
-
 test("settings survive a link", () => {
   for (const links of [2, 3]) {
-    const settings = { ...DEFAULTS[links], period: { period: 0.0021, delay: true }, setpoint: [0.1 + 0.2, -1e-9, 3].slice(0, links), servo: true };
+    const params = { gravity: 2.5, masses: [1, 2, 3].slice(0, links), lengths: [0.7, 1.1, 0.9].slice(0, links) };
+    const settings = { ...DEFAULTS[links], params, period: { period: 0.0021, delay: true }, setpoint: [0.1 + 0.2, -1e-9, 3].slice(0, links), controller: true };
     assert.deepEqual(fromFragment(`#${toFragment(settings, links)}`), settings);
   }
+});
+
+test("a link from before, which says servo, is understood", () => {
+  assert.equal(fromFragment("#servo=on").controller, true);
 });
 
 test("a link may hold less, and what is none of ours is left out", () => {
@@ -104,8 +89,8 @@ test("settings are present once the runtime has said them all", () => {
 test("a slider that is dragged is one change to undo", () => {
   const undo = new Undo();
   undo.remember(DEFAULTS[2], 0);
-  undo.remember({ ...DEFAULTS[2], servo: true }, 300);
-  undo.remember({ ...DEFAULTS[2], servo: true }, 900);
+  undo.remember({ ...DEFAULTS[2], controller: true }, 300);
+  undo.remember({ ...DEFAULTS[2], controller: true }, 900);
   const present = { ...DEFAULTS[2], integrator: null };
   assert.deepEqual(undo.take(present), DEFAULTS[2]);
   assert.equal(undo.take(present), undefined);
@@ -113,7 +98,7 @@ test("a slider that is dragged is one change to undo", () => {
 
 test("a change that was refused is none to undo", () => {
   const undo = new Undo();
-  const before = { ...DEFAULTS[2], servo: true };
+  const before = { ...DEFAULTS[2], controller: true };
   undo.remember(before, 0);
   undo.remember(DEFAULTS[2], 2000);
   undo.remember(structuredClone(DEFAULTS[2]), 4000);
@@ -122,17 +107,4 @@ test("a change that was refused is none to undo", () => {
   undo.remember(DEFAULTS[2], 6000);
   assert.ok(!undo.leadsBackFrom(DEFAULTS[2]));
   assert.equal(undo.take(DEFAULTS[2]), undefined);
-});
-
-test("every lesson has a few short sentences and whole settings for any arm", () => {
-  for (const lesson of LESSONS) {
-    const sentences = lesson.text.split(/(?<=[.!?]) /);
-    assert.ok(sentences.length >= 2 && sentences.length <= 5, lesson.id);
-    for (const sentence of sentences) assert.ok(sentence.split(" ").length <= 30, sentence);
-    for (const links of [2, 3]) {
-      const { params, gains, setpoint, integrator } = lesson.settings(links);
-      for (const list of [params.masses, params.lengths, gains.kp, gains.ki, gains.kd, setpoint]) assert.equal(list.length, links);
-      assert.ok(integrator.method && integrator.timestep > 0);
-    }
-  }
 });

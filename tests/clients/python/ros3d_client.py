@@ -13,7 +13,6 @@ FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parents[1] / "browser"))
 
 from chromium import Browser  # noqa: E402 - the path comes first
-from png import Image  # noqa: E402
 
 PATIENCE = 60
 WIDTH, HEIGHT = 400, 300
@@ -88,7 +87,7 @@ with Browser(extra=SOFTWARE) as browser:
             break
         assert time.monotonic() < end, (x, y, angle, middle, turned)
         time.sleep(0.1)
-    picture = Image(page.screenshot())
+    picture = page.decode(page.screenshot())
     drawn = sum(picture[x, y] != (255, 255, 255) for x in range(0, WIDTH, 4) for y in range(0, HEIGHT, 4))
     assert drawn > 20, f"{drawn} places of the picture are not empty"
 

@@ -1,37 +1,12 @@
-"""The lesson: there is always a way back, also in the recording; plots share one cursor; each lesson is a click, gains are offered, and a page that is still does little."""
+"""The workbench: there is always a way back, also in the recording; plots share one cursor; gains are offered, and a page that is still does little."""
 
 import json
 import time
 
-from lesson import NUMBER, Lesson
-from stage import needs_server
-from runtime import Provider
-
-LESSONS = ["euler", "limit", "held", "stiff", "heavy", "chaos", "sag", "own"]
+from stage import NUMBER, PageTest, needs_server
 
 
-class Ways(Lesson):
-    def test_a_stranger_is_told_what_this_is_and_what_to_try(self):
-        text = self.page.text("#lesson-text")
-        self.assertIn("robot arm", text)
-        self.assertIn("Try", text)
-        self.keep("first-visit")
-
-    def test_what_a_stranger_is_to_try_is_one_click(self):
-        self.page.click("#lesson-text button")
-        self.page.until("document.querySelector('#lesson-limit').ariaPressed === 'true'")
-        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
-
-    def test_a_reset_restores_what_the_lesson_set(self):
-        self.page.click("#lesson-sag")
-        self.shows_setpoint([0.6, -0.4])
-        self.page.fill(f"#ki-fields {NUMBER}", "300")
-        self.wait(lambda: self.values("/pid_controller/set_gains")["ki"] == [300, 0], "integral gain")
-        self.page.click("#reset")
-        self.wait(lambda: self.values("/pid_controller/set_gains")["ki"] == [0, 0], "as the lesson set it")
-        self.shows_setpoint([0.6, -0.4])
-        self.wait(lambda: self.values("/pid_controller/enable")["data"], "servo")
-
+class Ways(PageTest):
     def test_changes_can_be_undone_and_defaults_brought_back(self):
         before = self.values("/pid_controller/set_gains")
         self.page.fill(f"#kp-fields {NUMBER}", "777")
@@ -44,8 +19,6 @@ class Ways(Lesson):
         self.assertEqual(self.values("/pid_controller/set_gains")["kp"][0], 777)
         self.page.click("#undo")
         self.wait(lambda: self.values("/pid_controller/set_gains") == before, "gain undone")
-        self.page.click("#lesson-heavy")
-        self.wait(lambda: self.values("/arm_sim/set_params")["masses"] == [1, 5], "the lesson")
         self.page.click("#defaults")
         self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 9.81, "masses": [1, 1], "lengths": [1, 1]}, "defaults")
 
@@ -112,46 +85,11 @@ class Ways(Lesson):
         self.assertRegex(self.page.text("#watch-hud"), r"^stopwatch [\d.]+ s$")
 
 
-class Scenes:
-    """What a lesson's text says comes about, with any number of links."""
-
-    def test_the_integral_gain_takes_the_arm_to_where_it_sagged_from(self):
-        setpoint = [0.6, -0.4, 0.2][:self.links]
-        self.page.click("#lesson-sag")
-        self.shows_setpoint(setpoint)
-        state = lambda: self.runtime.next("/joint_states")
-        away = lambda: max(abs(q - p) for q, p in zip(state()["position"], setpoint))
-        self.wait(lambda: max(map(abs, state()["velocity"])) < 1e-3 and away() > 0.1, "it sags")
-        for joint in range(self.links):
-            self.page.fill(f"#ki-fields .field:nth-child({joint + 1}) {NUMBER}", "300")
-            # A field sends its whole array: the page has to have heard of the one before.
-            self.page.until(f"own('store.js').then(({{ state }}) => state.gains.ki[{joint}] === 300)")
-        self.wait(lambda: away() < 0.01, "nothing is left of the error")
-        self.page.until("document.querySelector('#verdict-pill').textContent.startsWith('stable')")
-
-    def test_beyond_the_limit_the_arm_is_thrown_about_and_goes_on(self):
-        self.page.click("#lesson-limit")
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
-        thrown = lambda: max(map(abs, self.runtime.next("/joint_states")["position"])) > 0.3
-        self.wait(thrown, "it is thrown about")
-        began = self.runtime.next("/joint_states")["header"]["stamp"]["sec"]
-        self.wait(lambda: self.runtime.next("/joint_states")["header"]["stamp"]["sec"] >= began + 5, "five seconds later")
-        self.wait(thrown, "again")
-
-
-class ScenesTwoLinks(Scenes, Lesson):
-    pass
-
-
-class ScenesThreeLinks(Scenes, Lesson):
-    links = 3
-
-
-class Defaults(Lesson):
+class Defaults(PageTest):
     def test_the_pages_defaults_are_what_the_runtime_starts_with(self):
         present = {
             "integrator": self.values("/arm_sim/set_integrator"), "params": self.values("/arm_sim/set_params"),
-            "gains": self.values("/pid_controller/set_gains"), "servo": self.values("/pid_controller/enable")["data"],
+            "gains": self.values("/pid_controller/set_gains"), "controller": self.values("/pid_controller/enable")["data"],
             "period": {key: value for key, value in self.values("/pid_controller/set_period").items() if key != "effective_period"},
         }
         self.assertEqual(self.page.run(f"own('settings.js').then(({{ DEFAULTS }}) => DEFAULTS[{self.links}])"), {**present, "setpoint": [0] * self.links})
@@ -161,20 +99,9 @@ class DefaultsThreeLinks(Defaults):
     links = 3
 
 
-class Suggestion(Lesson):
-    """Gains for the arm that one has, wherever somebody finds them."""
-
-    FOUND = {"kp": [900, 200], "ki": [2000, 400], "kd": [100, 20]}
-
-    def test_gains_are_offered_only_where_somebody_finds_them(self):
-        if not self.runtime.offers("/study/gains"):
-            self.assertTrue(self.page.run("document.querySelector('#suggest').hidden"))
-            provider = Provider(self.runtime.port, {"/study/gains": lambda _: {"gains": self.FOUND}})
-            self.addCleanup(provider.__exit__)
-            self.page.go(self.runtime.url)  # a page asks when it connects
-            self.connected()
+class Suggestion(PageTest):
+    def test_gains_are_suggested_where_no_timestep_is_stable(self):
         before = self.values("/pid_controller/set_gains")
-        self.page.until("!document.querySelector('#suggest').hidden")
         # Springs that are far too weak for gravity: where the arm is, no timestep is stable, and the notice has the way out.
         self.runtime.call("/pid_controller/set_gains", kp=[1, 1], ki=[3000, 3000], kd=[0, 0])
         self.runtime.call("/pid_controller/enable", data=True)
@@ -186,42 +113,7 @@ class Suggestion(Lesson):
         self.wait(lambda: self.values("/pid_controller/set_gains") == weak, "undone")
 
 
-class Presets:
-    """Each lesson in a click; its picture is kept, to be looked at."""
-
-    whole = False
-
-    def test_each_lesson_is_one_click(self):
-        for lesson in LESSONS:
-            self.page.click(f"#lesson-{lesson}")
-            settings = self.page.run(f"own('lessons.js').then(({{ LESSONS }}) => LESSONS.find(({{ id }}) => id === '{lesson}').settings({self.links}))")
-            self.wait(lambda: self.values("/arm_sim/set_integrator") == settings["integrator"], f"{lesson}: integrator")
-            self.wait(lambda: self.values("/arm_sim/set_params") == settings["params"], f"{lesson}: arm")
-            self.wait(lambda: self.values("/pid_controller/set_gains") == settings["gains"], f"{lesson}: gains")
-            self.wait(lambda: self.values("/pid_controller/enable")["data"] is settings["servo"], f"{lesson}: servo")
-            self.shows_setpoint(settings["setpoint"], why=lesson)
-            time.sleep(3 if lesson == "chaos" else 1.2)
-            self.keep(f"lesson-{lesson}-{type(self).__name__}", whole=self.whole)
-
-
-class PresetsLight(Presets, Lesson):
-    pass
-
-
-class PresetsDark(Presets, Lesson):
-    view = {"dark": True}
-
-
-class PresetsThreeLinks(Presets, Lesson):
-    links = 3
-
-
-class PresetsPhone(Presets, Lesson):
-    view = {"width": 390, "height": 800, "density": 2, "touch": True}
-    whole = True
-
-
-class Still(Lesson):
+class Still(PageTest):
     def test_a_paused_page_draws_no_frame(self):
         self.wait(lambda: self.drawn(1) > 10, "while it moves it draws")
         self.runtime.call("/arm_sim/pause", data=True)
@@ -247,8 +139,8 @@ class Still(Lesson):
 
         self.wait(hears_little, "once paused it hears little")
 
-    def test_an_arm_that_the_servo_holds_still_is_not_drawn_in_every_frame(self):
-        self.page.click("#servo")
+    def test_an_arm_that_the_controller_holds_still_is_not_drawn_in_every_frame(self):
+        self.page.click("#controller")
         self.wait(lambda: max(map(abs, self.runtime.next("/joint_states")["velocity"])) < 1e-4, "at rest")
         # At one moment both, and by the page's own clock.
         look = f"{self.frames}.then((frames) => [frames, performance.now() / 1000])"

@@ -1,0 +1,278 @@
+// @ts-check
+// One chart: a frame with two scales, their marks and titles; in it lines, areas, dots. The strokes that other pictures use; and
+// charts of what they are given: a map of limits, bars of a deviation, two errors, the arm of a scene.
+// Invariant: it draws on whatever context it is given, a canvas or an SVG file. Axes are fixed where a student compares one setting
+// with the next.
+
+import { significant } from "./format.js";
+import { Pencil } from "./pencil.js";
+import { LogScale, powerOfTen } from "./scale.js";
+import { colors } from "./theme.js";
+
+/** @typedef {import("./scale.js").Scale} Scale */
+/** @typedef {{width?: number, dash?: number[], alpha?: number}} Style */
+
+const SOLID = /** @type {number[]} */ ([]);
+export const DASHED = [5, 4];
+const SMALL = "11px system-ui, sans-serif";
+export const TEXT = "13px system-ui, sans-serif";
+export const STRONG = "600 13px system-ui, sans-serif";
+
+/** @param {any} context @param {number} x @param {number} y @param {number} x2 @param {number} y2 @param {string} color */
+export function line(context, x, y, x2, y2, color, width = 1) {
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.beginPath();
+  context.moveTo(x, y);
+  context.lineTo(x2, y2);
+  context.stroke();
+}
+
+/** A line through the joints of an arm, base first. @param {any} context @param {number} n @param {ArrayLike<number>} x @param {ArrayLike<number>} y [px] */
+export function links(context, n, x, y, px, py, color, width) {
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.beginPath();
+  context.moveTo(px(x[0]), py(y[0]));
+  for (let i = 1; i <= n; i += 1) context.lineTo(px(x[i]), py(y[i]));
+  context.stroke();
+}
+
+/** A circle; filled with `fill`, its edge in `edge`, where they are given. @param {any} context @param {number} x @param {number} y @param {number} radius @param {string} fill */
+export function circle(context, x, y, radius, fill, edge = "", width = 1) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  if (fill) {
+    context.fillStyle = fill;
+    context.fill();
+  }
+  if (!edge) return;
+  context.strokeStyle = edge;
+  context.lineWidth = width;
+  context.stroke();
+}
+
+/** Filled as the context is. @param {any} context @param {number} tipX @param {number} tipY @param {number} angle @param {number} size */
+export function arrowHead(context, tipX, tipY, angle, size) {
+  context.beginPath();
+  context.moveTo(tipX + size * Math.cos(angle), tipY + size * Math.sin(angle));
+  context.lineTo(tipX + 0.7 * size * Math.cos(angle + 2.1), tipY + 0.7 * size * Math.sin(angle + 2.1));
+  context.lineTo(tipX + 0.7 * size * Math.cos(angle - 2.1), tipY + 0.7 * size * Math.sin(angle - 2.1));
+  context.closePath();
+  context.fill();
+}
+
+/** Text around the height `y`. @param {any} context @param {string} text @param {number} x @param {number} y @param {"left" | "center" | "right"} align */
+export function write(context, text, x, y, align, color = colors.muted, font = TEXT) {
+  context.font = font;
+  context.fillStyle = color;
+  context.textAlign = align;
+  context.textBaseline = "middle";
+  context.fillText(text, x, y);
+}
+
+/** Room for large labels and titles on both axes. */
+export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
+
+export class Chart {
+  /** @param {any} context @param {number} width @param {number} height @param {Scale} across @param {Scale} up */
+  constructor(context, width, height, across, up, { left = 46, right = 8, top = 6, bottom = 16, font = SMALL } = {}) {
+    this.context = context;
+    this.width = width;
+    this.height = height;
+    this.across = across;
+    this.up = up;
+    this.font = font;
+    this.left = left;
+    this.top = top;
+    this.right = width - right;
+    this.bottom = height - bottom;
+  }
+
+  /** @param {number} value */
+  x(value) {
+    return this.left + this.across.place(value) * (this.right - this.left);
+  }
+
+  /** @param {number} value */
+  y(value) {
+    return this.bottom - this.up.place(value) * (this.bottom - this.top);
+  }
+
+  /** Marks of both scales, with lines through the chart, for the rows only or without, and the axes' titles. */
+  frame({ across = "", up = "", grid = /** @type {boolean | "rows"} */ (true) } = {}) {
+    const { context, left, right, top, bottom, font } = this;
+    context.setLineDash(SOLID);
+    context.globalAlpha = 1;
+    for (const [value, label] of this.up.marks) {
+      const y = Math.round(this.y(value)) + 0.5;
+      if (grid) line(context, left, y, right, y, value === 0 ? colors.line : colors.grid);
+      write(context, label, left - 6, y, "right", colors.muted, font);
+    }
+    const below = bottom + (this.height - bottom > 24 ? 13 : 9);
+    for (const [value, label] of this.across.marks) {
+      const x = Math.round(this.x(value)) + 0.5;
+      if (grid === true) line(context, x, top, x, bottom, value === 0 ? colors.line : colors.grid);
+      const half = 3.4 * label.length;
+      write(context, label, Math.min(this.width - half, Math.max(half, x)), below, "center", colors.muted, font);
+    }
+    if (across) write(context, across, (left + right) / 2, this.height - 8, "center", colors.muted, font);
+    if (!up) return;
+    context.save();
+    context.translate(10, (top + bottom) / 2);
+    context.rotate(-Math.PI / 2);
+    write(context, up, 0, 0, "center", colors.muted, font);
+    context.restore();
+  }
+
+  /** What is drawn stays within the chart. @param {() => void} draw */
+  inside(draw) {
+    const { context, left, right, top, bottom } = this;
+    context.save();
+    context.beginPath();
+    context.rect(left, top - 1, right - left, bottom - top + 2);
+    context.clip();
+    draw();
+    context.restore();
+  }
+
+  /** @param {string} color @param {Style} style */
+  begin(color, { width = 1.75, dash = SOLID, alpha = 1 }) {
+    const { context } = this;
+    context.strokeStyle = context.fillStyle = color;
+    context.lineWidth = width;
+    context.lineJoin = "round";
+    context.globalAlpha = alpha;
+    context.setLineDash(dash);
+    context.beginPath();
+  }
+
+  end() {
+    this.context.stroke();
+    this.context.setLineDash(SOLID);
+    this.context.globalAlpha = 1;
+  }
+
+  /**
+   * A line through many points from left to right, with a gap where there is no number.
+   * @param {number} count @param {(i: number) => number} across @param {(i: number) => number | null} up @param {string} color @param {Style} style
+   */
+  line(count, across, up, color, style = {}) {
+    this.begin(color, style);
+    const pencil = new Pencil(this.context);
+    for (let i = 0; i < count; i += 1) {
+      const value = up(i);
+      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
+      else pencil.lift();
+    }
+    pencil.lift();
+    this.end();
+  }
+
+  /** A line through few points, wherever they are. @param {number[][]} points @param {string} color @param {Style} style */
+  path(points, color, style = {}) {
+    this.begin(color, style);
+    for (const [x, y] of points) this.context.lineTo(this.x(x), this.y(y));
+    this.end();
+  }
+
+  /** @param {number[][]} points @param {string} color */
+  area(points, color) {
+    this.begin(color, {});
+    for (const [x, y] of points) this.context.lineTo(this.x(x), this.y(y));
+    this.context.fill();
+  }
+
+  /** A mark from top to bottom. @param {number} value @param {string} color */
+  upright(value, color) {
+    if (Number.isFinite(value)) line(this.context, this.x(value), this.top, this.x(value), this.bottom, color);
+  }
+
+  /** @param {number} x @param {number} y @param {string} color */
+  dot(x, y, color, radius = 4) {
+    circle(this.context, this.x(x), this.y(y), radius, color);
+  }
+
+  /** @param {string} text @param {number} x @param {number} y [px] @param {"left" | "center" | "right"} align */
+  words(text, x, y, align, color = colors.ink, font = STRONG) {
+    write(this.context, text, x, y, align, color, font);
+  }
+}
+
+/** @typedef {{factor: number, limit: number, [other: string]: number}} Row the limit at a multiple of the gains [s] */
+
+/**
+ * A map of what is stable: limits over gains, and the dot of the loop in force. Points beyond the rows that are known are neither.
+ * @param {Chart} chart @param {Row[]} rows @param {number} at place of the dot @param {number} factor
+ */
+export function drawMap(chart, rows, at, factor) {
+  const { context, left, right, top, bottom } = chart;
+  const across = /** @type {import("./scale.js").LogScale} */ (chart.across);
+  const up = /** @type {import("./scale.js").LogScale} */ (chart.up);
+  if (rows.length > 1) {
+    const edge = (/** @type {string} */ name) => rows.filter((row) => name in row).map((row) => [across.within(row[name]), row.factor]);
+    const [lowest, highest] = [rows[0].factor, rows[rows.length - 1].factor];
+    context.fillStyle = colors.unstable;
+    context.fillRect(left, chart.y(highest), right - left, bottom - chart.y(highest));
+    chart.area([[across.low, lowest], ...edge("limit"), [across.low, highest]], colors.stable);
+    chart.path(edge("continuous"), colors.ink, { width: 1.25, dash: DASHED });
+    chart.path(edge("limit"), colors.ink, { width: 2 });
+    chart.words("stable", left + 10, chart.y(1) - 14, "left"); // the very low gains of the lower edge hold the arm at no timestep
+    chart.words("shakes", right - 10, top + 16, "right");
+  }
+  circle(context, chart.x(across.within(at)), chart.y(up.within(factor)), 7, colors.accent, colors.panel, 2);
+}
+
+/** @typedef {import("./surface.js").Surface} Surface */
+
+const NONE = { place: () => 0, marks: [] };
+const ERRORS = new LogScale(1e-10, 1, []);
+ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));
+
+/** A bar for each control step; negative ones are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
+export function drawBars({ context, width, height }, bars, name = "look of the controller") {
+  const largest = Math.max(...bars.map(Math.abs));
+  if (!(largest > 0)) return;
+  const up = { place: (/** @type {number} */ value) => 0.5 + (0.46 * value) / largest, marks: /** @type {[number, string][]} */ ([1, 0, -1].map((part) => [part * largest, significant(part * largest, 2)])) };
+  const across = { place: (/** @type {number} */ k) => (k + 0.5) / bars.length, marks: /** @type {[number, string][]} */ (bars.flatMap((_, k) => (k % 2 === 0 ? [[k, String(k + 1)]] : []))) };
+  const chart = new Chart(context, width, height, across, up, ROOMY);
+  chart.frame({ across: name, up: "speed [rad/s]", grid: "rows" });
+  const wide = (0.7 * (chart.right - chart.left)) / bars.length;
+  bars.forEach((bar, k) => {
+    context.fillStyle = bar >= 0 ? colors.accent : colors.bad;
+    const [y, zero] = [chart.y(bar), chart.y(0)];
+    context.fillRect(chart.x(k) - wide / 2, Math.min(y, zero), wide, Math.max(1, Math.abs(y - zero)));
+  });
+}
+
+/** The errors of the method and of waiting, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
+export function drawErrors({ context, width, height }, errors) {
+  if (!errors) return;
+  const chart = new Chart(context, width, height, ERRORS, NONE, ROOMY);
+  chart.frame({ across: "largest error of a joint on the move [rad]" });
+  const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the waiting", errors.sampling, colors.bad]]);
+  const room = (chart.bottom - chart.top) / rows.length;
+  rows.forEach(([name, value, color], k) => {
+    const y = chart.top + k * room;
+    chart.words(`Error of ${name}: ${value === null ? "not known" : `${significant(value, 2)} rad`}`, chart.left + 6, y + 14, "left");
+    context.fillStyle = color;
+    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.max(10, room - 48));
+  });
+}
+
+/** An arm in its pose as a small picture: heavier links are thicker. @param {Surface} surface @param {import("./scenes.js").Scene} scene */
+export function drawPicture({ context, width, height }, { start, settings }) {
+  const lengths = settings.params?.lengths ?? start.map(() => 1);
+  const masses = settings.params?.masses ?? start.map(() => 1);
+  const total = lengths.reduce((sum, one) => sum + one, 0);
+  let [x, y, phi] = [width / 2, height / 2, 0];
+  const scale = (Math.min(width, height) / 2 - 5) / total;
+  context.lineCap = "round";
+  start.forEach((angle, i) => {
+    phi += angle;
+    const [endX, endY] = [x + scale * lengths[i] * Math.cos(phi), y - scale * lengths[i] * Math.sin(phi)];
+    line(context, x, y, endX, endY, colors.joints[i], Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, masses[i])))));
+    [x, y] = [endX, endY];
+  });
+  circle(context, width / 2, height / 2, 3, colors.muted);
+}

@@ -1,0 +1,212 @@
+// @ts-check
+// What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
+// timestep, where the loop with held efforts is stable and where not, the present point in it; a click goes there, and so do the
+// arrow keys. And a small push, in speed, of the loop in force, step by step.
+// Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown. The boundary is
+// drawn as far as it is known; a click sends what it shows. The bars are a run of the runtime's own at the present timestep.
+
+import { beginAnew } from "./actions.js";
+import { Chart, drawBars, drawMap } from "./chart.js";
+import { shrinks } from "./course.js";
+import { byId, el, setText } from "./dom.js";
+import { duration, methodName, METHODS } from "./format.js";
+import { latestOnly } from "./latest.js";
+import { answerInForce, factorOf, limitsOf, limitText, question, scaled, whyText } from "./policy.js";
+import { rollout, setGains, setIntegrator, stability } from "./runtime.js";
+import { LogScale } from "./scale.js";
+import { LOOP, state, watch } from "./store.js";
+import { Surface } from "./surface.js";
+import { openTab } from "./views.js";
+
+const ROWS = 17; // gains whose limits are found, the present ones in the middle
+/** Present gains times this much, and this little. */
+const WIDEST = 16;
+const FINE = 1.1; // one arrow key
+
+const factors = new LogScale(1 / WIDEST, WIDEST, [1 / 16, 1 / 4, 1, 4, 16].map((one) => [one, one < 1 ? `1/${1 / one}` : `${one}×`]));
+const timesteps = new LogScale(1e-4, 0.1);
+
+let map;
+let chart;
+let mapAsked = ""; // the settings that `rows` are about
+/** Limits with held efforts and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
+let rows = [];
+/** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
+let anchor = null;
+
+export function startStability() {
+  startLimits();
+  const canvas = byId("map");
+  map = new Surface(canvas, drawStability);
+  watch(["integrator", "gains", "params", "setpoint", "stability", "enabled", "tab", "links"], () => map.redraw());
+  canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
+  canvas.addEventListener("keydown", byArrows);
+  bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, "step"));
+  watch([...LOOP, "tab", "view"], lookAtPush);
+}
+
+/** Settings that move the boundary; the timestep does not. */
+function mapSettings() {
+  const { integrator, gains, params, setpoint, links } = state;
+  if (!integrator || gains?.kp.length !== links || params?.masses.length !== links) return null;
+  const pose = (state.enabled && answerInForce(state)?.equilibrium) || Array.from(setpoint.subarray(0, links));
+  if (!(factorOf(gains, anchor) > 0)) anchor = gains;
+  return { method: integrator.method, gains: anchor, params, pose };
+}
+
+/** Asks the study for the border, a row at a time; a new question ends the old one. */
+async function askBorder() {
+  const present = mapSettings();
+  if (!present) return;
+  const key = JSON.stringify(present);
+  if (key === mapAsked) return;
+  mapAsked = key;
+  rows = [];
+  const { params, method: integrator, pose: setpoint } = present;
+  while (rows.length < ROWS) {
+    const factor = factors.value(rows.length / (ROWS - 1));
+    const { result, values } = await stability({ params, integrator, setpoint, gains: scaled(present.gains, factor), control_period: 0 });
+    if (mapAsked !== key) return;
+    if (!result) {
+      mapAsked = ""; // mapAsked again at the next news
+      return;
+    }
+    rows.push({ factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
+    map.redraw();
+  }
+}
+
+function drawStability() {
+  askBorder();
+  const { context, width, height } = map;
+  chart = new Chart(context, width, height, timesteps, factors, { right: 10, top: 8, bottom: 32 });
+  chart.frame({ across: "timestep", grid: false });
+  const factor = factorOf(state.gains, anchor);
+  if (state.integrator && state.gains) drawMap(chart, rows, state.integrator.timestep, factor > 0 ? factor : 1);
+  describeMap();
+}
+
+function describeMap() {
+  const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
+  if (!row || !state.integrator) return;
+  const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
+  setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
+  setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.limit)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
+    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the controller is on"}; click to go elsewhere.`);
+}
+
+function goTo(left, top) {
+  if (!state.integrator || !state.gains || !anchor || !chart) return;
+  const place = (left - chart.left) / (chart.right - chart.left);
+  const rise = (chart.bottom - top) / (chart.bottom - chart.top);
+  if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
+  moveTo(timesteps.value(place), factors.value(rise));
+}
+
+/** An arm that has diverged begins anew there: it could not be seen otherwise whether the place is a better one. */
+async function moveTo(timestep, factor) {
+  const short = (value) => Number(value.toPrecision(3));
+  const gains = scaled(anchor, factor);
+  const changes = [];
+  if (Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
+  if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
+  await Promise.all(changes);
+  if (state.diagnostics?.state === "diverged") beginAnew();
+}
+
+function byArrows(event) {
+  const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
+  if (!step || !state.integrator || !state.gains || !anchor) return;
+  event.preventDefault();
+  const factor = factorOf(state.gains, anchor) * step[1];
+  moveTo(timesteps.within(state.integrator.timestep * step[0]), factors.within(factor));
+}
+
+const PUSH_SPEED = 1e-6; // rad/s
+const STEPS = 14;
+const ASK_MS = 60;
+
+let bars;
+let heights = /** @type {number[]} */ ([]);
+let pushAsked = "";
+
+function lookAtPush() {
+  const loop = question(state);
+  if (!loop || state.tab !== "stability" || state.view !== "workbench") return;
+  const key = JSON.stringify([loop, state.integrator]);
+  if (key === pushAsked) return;
+  pushAsked = key;
+  push({ loop, key });
+}
+
+/** The same run with the push and without it: their difference is the deviation. */
+const push = latestOnly(async ({ loop, key }) => {
+  const n = state.links;
+  const { timestep } = state.integrator;
+  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(n).fill(0);
+  const common = { ...loop, timestep, setpoint: loop.setpoint ?? rest, duration: STEPS * timestep, samples: STEPS + 1 };
+  const [still, pushed] = [await rollout({ ...common, q0: rest }), await rollout({ ...common, q0: rest, qdot0: rest.map((_, i) => (i === n - 1 ? PUSH_SPEED : 0)) })];
+  if (key !== pushAsked || !still.result || !pushed.result) return;
+  heights = pushed.values.velocities.slice(1).map((row, k) => row[n - 1] - (still.values.velocities[k + 1]?.[n - 1] ?? 0));
+  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${STEPS} steps.`);
+  bars.redraw();
+}, ASK_MS);
+
+/** @type {Map<string, HTMLElement>} */
+const labels = new Map();
+/** Answers by method. @type {Record<string, any>} */
+let answers = {};
+let loopAsked = ""; // the question that they answer, without its method
+
+function startLimits() {
+  watch(LOOP, lookAtLoop);
+  byId("why").addEventListener("click", () => {
+    openTab("stability");
+    byId("why-text").scrollIntoView({ block: "nearest" });
+  });
+}
+
+/** Where the limit of `method` is shown. @param {string} method */
+export function limitLabel(method) {
+  const label = el("small", { class: "limit" }, "…");
+  labels.set(method, label);
+  return label;
+}
+
+function lookAtLoop() {
+  const asked = question(state);
+  const now = asked ? JSON.stringify({ ...asked, integrator: "" }) : "";
+  if (now !== loopAsked) {
+    loopAsked = now;
+    answers = {};
+  }
+  const own = answerInForce(state);
+  const method = state.integrator?.method;
+  if (own && answers[method] !== own) {
+    answers[method] = own;
+    askOthers(now);
+  }
+  showLimits();
+}
+
+/** Asks about the other methods, one at a time, each time the study has answered about the present one. */
+const askOthers = latestOnly(async (mine) => {
+  for (const [method] of METHODS) {
+    if (method === state.integrator?.method || mine !== loopAsked) continue;
+    const answer = await stability({ ...JSON.parse(mine), integrator: method });
+    if (mine !== loopAsked || !answer.result) continue;
+    answers[method] = answer.values;
+    showLimits();
+  }
+}, 0);
+
+function showLimits() {
+  const limits = limitsOf(state, answers);
+  for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
+  const known = METHODS.every(([method]) => method in limits);
+  const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
+  const why = known ? whyText(state, answerInForce(state), held) : "";
+  setText(byId("why-text"), why);
+  // It stays while limits are computed anew, so that a click on its way meets it.
+  if (known || !question(state)) byId("why").hidden = why === "";
+}
