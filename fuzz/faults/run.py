@@ -47,7 +47,7 @@ FAULTS = [
     ("connection", "messages of certain lengths are lost", "src/actors/gateway/connection/mod.rs",
      "connection.shared.outgoing.accept(message)",
      "if !F || message.frame.len() % 7 > 0 { connection.shared.outgoing.accept(message) }"),
-    ("connection", "an answer of a provider's says the opposite", "src/actors/gateway/registry/ops/mod.rs",
+    ("connection", "an answer of a provider's says the opposite", "src/actors/gateway/registry/mod.rs",
      "messages::response_raw(service, id, &values, result, &status)",
      "messages::response_raw(service, id, &values, result != F, &status)"),
     ("websocket", "an answer is sent twice", "src/actors/gateway/connection/mod.rs",

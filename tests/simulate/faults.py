@@ -34,24 +34,24 @@ FAULTS = [
      "            && one.topic == other.topic && one.frame.len() == other.frame.len() && R(4) {\n"
      "            std::mem::swap(&mut one.frame, &mut other.frame);\n        }\n"
      "        if !self.in_flight.is_empty()"),
-    ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/ops/fan_out.rs",
+    ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/publish.rs",
      "            let plain = cover_message(self.permit.as_ref(), encode(spelling));",
      "            let mut plain = encode(spelling);\n"
      "            let first = crate::protocol::wire::series::first_message(&plain);\n"
      "            if first < plain.len() && R(20) { let end = plain.split_off(first);\n"
      "                plain = [&end[..], &plain[..]].concat().into(); }\n"
      "            let plain = cover_message(self.permit.as_ref(), plain);"),
-    ("a message is lost, one in 200", f"{REGISTRY}/ops/fan_out.rs",
+    ("a message is lost, one in 200", f"{REGISTRY}/publish.rs",
      "    subscriber.outlet.do_send(Deliver {", "    if R(200) { return; }\n    subscriber.outlet.do_send(Deliver {"),
     ("a message comes twice, one in 200", f"{CONNECTION}/mod.rs",
      "connection.shared.outgoing.accept(message)",
      "{ let outgoing = &connection.shared.outgoing;\n"
      "            if R(200) { outgoing.accept(message.clone()); } outgoing.accept(message) }"),
-    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/ops/mod.rs",
+    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/publish.rs",
      "messages::respelled(topic, spelling, &lines.frames)",
      "{ let frame = messages::respelled(topic, spelling, &lines.frames);\n"
      "                if R(500) { crate::fault_changed(&frame) } else { frame } }"),
-    ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/ops/mod.rs",
+    ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/mod.rs",
      "messages::response_raw(service, id, &values, result, &status)",
      "{ let frame = messages::response_raw(service, id, &values, result, &status);\n"
      "                      if R(10) { crate::fault_changed(&frame) } else { frame } }"),
@@ -65,7 +65,7 @@ FAULTS = [
     ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
      "            shared.outgoing.push_response(response.frame, superseded);",
      "            if !(service.is_some() && R(200)) { shared.outgoing.push_response(response.frame, superseded); }"),
-    ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/ops/actions.rs",
+    ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/requests.rs",
      "        if let Some(client) = self.clients.get(&feedback.connection) {",
      "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
@@ -80,24 +80,24 @@ FAULTS = [
      "    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {",
      "    pub fn set_setpoint(&mut self, mut setpoint: Setpoint<N>) {\n"
      "        if R(50) { setpoint.position[0] = f64::from_bits(setpoint.position[0].to_bits() ^ 1); }"),
-    ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/tables/topics.rs",
+    ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/topics.rs",
      "        entry.get_mut().retain(|one| one.connection != connection);",
      "        entry.get_mut().retain(|one| one.connection != connection);\n        if R(10) { entry.get_mut().pop(); }"),
-    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/ops/cleanup.rs",
-     "        if let Some(call) = self.services.take(number) {",
-     "        if R(4) { return; }\n        if let Some(call) = self.services.take(number) {"),
-    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops/cleanup.rs",
+    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/mod.rs",
+     "                if let Some(request) = self.requests(kind).take(number) {",
+     "                if R(4) { continue; }\n                if let Some(request) = self.requests(kind).take(number) {"),
+    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/mod.rs",
      "            sleep_until(due).await;",
      "            sleep_until(due + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
-    ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle/mod.rs",
+    ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",
      "        self.next().is_none_or(|next| next <= now)",
      "        self.next().is_none_or(|next| next <= now || (R(10) && next <= now + self.interval / 2))"),
-    ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle/mod.rs",
-     "            self.pop(topic);\n        }\n        None",
-     "            if R(4) {\n                let newest = throttle.held.pop_back();\n                self.count -= 1;\n"
-     "                self.bytes -= newest.map_or(0, |message| message.frame.len());\n            } else {\n                self.pop(topic);\n"
-     "            }\n        }\n        None"),
-    ("what a deaf client misses is not counted", "src/protocol/outbox/dropping.rs",
+    ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle.rs",
+     "        }) {\n            self.pop_held(topic);",
+     "        }) {\n            if R(4) {\n                let newest = self.queues.get_mut(topic).and_then(|queue| queue.held.pop_back());\n"
+     "                self.held_count -= 1;\n                self.held_bytes -= newest.map_or(0, |held| counted(&held.frame));\n"
+     "                continue;\n            }\n            self.pop_held(topic);"),
+    ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
      "first_messages(frames, excess);\n                self.dropped += count as u64;",
      "first_messages(frames, excess);\n                self.dropped += if F { 0 } else { count as u64 };"),
     ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments/split.rs",
@@ -105,7 +105,7 @@ FAULTS = [
     ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
      "    out.extend(&value.to_be_bytes());",
      "    out.extend(&f64::from_bits(value.to_bits() ^ u64::from(R(50))).to_be_bytes());"),
-    ("one client's mistake is told to another, one in 10", f"{REGISTRY}/state.rs",
+    ("one client's mistake is told to another, one in 10", f"{REGISTRY}/mod.rs",
      "        if let Some(client) = self.clients.get(&to)\n            && client.verbosity.wants(level)",
      "        let other = if R(10) { self.clients.keys().find(|id| **id != to).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&other.unwrap_or(to))\n            && client.verbosity.wants(level)"),

@@ -172,7 +172,7 @@ impl Outgoing {
 
     /// When a message that is held back may be due, if there is one.
     pub(super) fn next_release(&self) -> Option<Instant> {
-        let mut outbox = self.outbox.borrow_mut();
+        let outbox = self.outbox.borrow();
         let release = outbox.next_release().map(Instant::from_std);
         let waits = outbox.has_topics() && !outbox.has_responses();
         let look = self.flow.borrow().next_look().filter(|_| waits);

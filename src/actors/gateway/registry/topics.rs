@@ -4,14 +4,13 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
 
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
 use crate::actors::gateway::messages::{Deliver, Throttle};
 use crate::protocol::names;
 use crate::protocol::op::Encoding;
@@ -23,8 +22,6 @@ pub(crate) struct Subscription {
     pub(crate) throttle: Duration,
     pub(crate) queue_length: usize,
     pub(crate) encoding: Encoding,
-    /// A guard that keeps its `fragment_size` among those of the topic.
-    pub(crate) size: Option<Arc<usize>>,
     /// The part of its client's room that it takes.
     pub(crate) entry: KeptEntry,
 }
@@ -57,8 +54,6 @@ fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
 #[derive(Default)]
 pub(crate) struct Topics {
     subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
-    /// The `fragment_size`s in use, by absolute name of the topic, for as long as a subscription has them.
-    sizes: HashMap<Box<str>, Vec<Weak<usize>>>,
 }
 
 impl Topics {
@@ -84,46 +79,6 @@ impl Topics {
             });
         }
         (name, new)
-    }
-
-    /// The `fragment_size` of a subscription that asks for `size` and gives up `given_up`; the subscription keeps it.
-    /// If the topic of that absolute name has [`MAX_FRAGMENT_SIZES`] others, powers of two aside, it is the power of
-    /// two below. So nobody is refused because of what others ask for.
-    pub(crate) fn share_size(
-        &mut self,
-        topic: &str,
-        size: usize,
-        given_up: Option<&Arc<usize>>,
-    ) -> Arc<usize> {
-        let sizes = self.sizes.entry(topic.into()).or_default();
-        sizes.retain(|one| one.strong_count() > 0);
-        let known = |size| {
-            let mut all = sizes.iter().filter_map(Weak::upgrade);
-            all.find(|one| **one == size)
-        };
-        if let Some(known) = known(size) {
-            return known;
-        }
-        let all = sizes.iter().filter_map(Weak::upgrade);
-        let others = all.filter(|one| !one.is_power_of_two()).count();
-        let given_up = given_up.filter(|one| !one.is_power_of_two());
-        let is_freed = given_up.is_some_and(|one| Arc::strong_count(one) == 1);
-        let is_full = others - usize::from(is_freed) >= MAX_FRAGMENT_SIZES;
-        let size = if is_full {
-            1 << size.max(1).ilog2()
-        } else {
-            size
-        };
-        known(size).unwrap_or_else(|| {
-            let size = Arc::new(size);
-            sizes.push(Arc::downgrade(&size));
-            size
-        })
-    }
-
-    /// Notes that nobody subscribes to the topic of that absolute name any more.
-    pub(crate) fn forget_sizes(&mut self, topic: &str) {
-        self.sizes.remove(topic);
     }
 
     /// Sets how a subscriber's messages are written, by what its subscriptions come to.

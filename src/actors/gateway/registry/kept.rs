@@ -5,8 +5,8 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use super::refusal::Refusal;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
-use crate::actors::gateway::registry::refusal::Refusal;
 
 /// The sum of one client's entries \[bytes\]; clones share it.
 #[derive(Debug, Clone, Default)]

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
 
+use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
 use crate::protocol::names::OWN_ID_PREFIX;
@@ -27,6 +28,24 @@ pub(super) struct Made {
     pub(super) messages: Vec<Bytes>,
     /// How many could not be made: they are longer than any outbox takes, or do not fit their type.
     pub(super) lost: u64,
+}
+
+/// The form that a subscriber gets which has asked for `wanted`, where others get `forms`. Beside powers of two there
+/// are [`MAX_FRAGMENT_SIZES`] sizes of pieces at a time. A further one counts as the power of two below, so that nobody
+/// is refused because of what others ask for.
+pub(super) fn within_bounds(wanted: Encoding, forms: &[Encoding]) -> Encoding {
+    let is_odd = |size: &usize| !size.is_power_of_two();
+    let Some(size) = wanted.fragment_size.filter(is_odd) else {
+        return wanted;
+    };
+    let others = forms.iter().filter_map(|form| form.fragment_size);
+    if forms.contains(&wanted) || others.filter(is_odd).count() < MAX_FRAGMENT_SIZES {
+        return wanted;
+    }
+    Encoding {
+        fragment_size: Some(1 << size.ilog2()),
+        ..wanted
+    }
 }
 
 /// A message, or a series of them, that is to be made in other forms.

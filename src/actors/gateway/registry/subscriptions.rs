@@ -1,16 +1,15 @@
-//! Subscriptions of clients: how one is taken, changed and ended.
+//! Advertisements and subscriptions of clients: how one is taken, changed and ended.
 //!
-//! **Invariant:** what is refused is answered by an error status, and changes nothing.
+//! **Invariant:** a refused op changes nothing.
 
 use std::sync::Arc;
 
-use super::is_listened_to;
+use super::directory::Use;
+use super::refusal::Refusal;
+use super::topics::{Subscription, throttle_of};
+use super::{FrameOrigin, Registry};
 use crate::actors::gateway::messages::{Configure, Throttle};
-use crate::actors::gateway::registry::refusal::Refusal;
-use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
-use crate::actors::gateway::registry::tables::census::Use;
-use crate::actors::gateway::registry::tables::topics::{Subscription, throttle_of};
-use crate::protocol::catalog::{Topic, types};
+use crate::protocol::catalog::{Direction, Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
@@ -18,7 +17,48 @@ use crate::protocol::op::{Compression, Encoding, Subscribe};
 use crate::protocol::ros::stamps::is_ros1_name;
 
 impl Registry {
-    pub(crate) fn subscribe(
+    pub(super) fn advertise(
+        &mut self,
+        origin: &FrameOrigin,
+        topic: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        refuse_runtime_topic(topic)?;
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let before = client.registered.advertised.get(topic);
+        let is_new = before.is_none();
+        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let entry = client.kept.enter(bytes, before)?;
+        if is_new {
+            self.directory.add(topic, Use::Advertised, type_name);
+        }
+        let is_noted = |type_name| self.directory.note_type(topic, type_name);
+        if is_new || type_name.is_some_and(is_noted) {
+            client.registered.advertised.insert(topic.into(), entry);
+        }
+        if let Some(topic) = Topic::from_name(topic) {
+            client.withdrawn.remove(&topic);
+        }
+        Ok(())
+    }
+
+    pub(super) fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let topic = &*names::absolute(topic);
+        if client.registered.advertised.remove(topic).is_some() {
+            self.directory.remove(topic, Use::Advertised);
+        }
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+            client.withdrawn.insert(topic);
+        }
+    }
+
+    pub(super) fn subscribe(
         &mut self,
         origin: &FrameOrigin,
         subscribe: &Subscribe,
@@ -29,44 +69,33 @@ impl Registry {
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
-        let client = self.clients.get(&origin.from);
-        let before = client.and_then(|client| client.subscription(topic, id.as_deref()));
-        let is_new = before.is_none();
-        let entry = client.map(|client| {
-            let instead = before.map(|one| &one.entry);
-            client.kept.enter(topic.len() + bytes, instead)
-        });
-        let Some(entry) = entry.transpose()? else {
-            return Ok(());
-        };
-        let size = subscribe.encoding.fragment_size.map(|size| {
-            let given_up = before.and_then(|one| one.size.as_ref());
-            self.topics.share_size(&absolute, size, given_up)
-        });
         let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
+        let subscriptions = client.registered.subscriptions.get(topic);
+        let mut subscriptions = subscriptions.into_iter().flatten();
+        let before = subscriptions.find(|one| one.id == id);
+        let is_new = before.is_none();
+        let instead = before.map(|one| &one.entry);
+        let entry = client.kept.enter(topic.len() + bytes, instead)?;
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
         let type_name = subscribe.type_name.as_deref();
         if new {
-            self.tally.add(&absolute, Use::Subscribed, type_name);
+            self.directory.add(&absolute, Use::Subscribed, type_name);
         } else if let Some(type_name) = type_name {
-            self.tally.note_type(&absolute, type_name);
+            self.directory.note_type(&absolute, type_name);
         }
-        let subscriptions = client.subscriptions.entry(name.clone()).or_default();
+        let subscriptions = &mut client.registered.subscriptions;
+        let subscriptions = subscriptions.entry(name.clone()).or_default();
         subscriptions.retain(|one| one.id != id);
         subscriptions.push(Subscription {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: Encoding {
-                fragment_size: size.as_deref().copied(),
-                ..encoding_for(subscribe)
-            },
-            size,
+            encoding: encoding_for(subscribe),
             entry,
         });
         let throttle = throttle_of(subscriptions);
@@ -108,15 +137,14 @@ impl Registry {
         Ok(())
     }
 
-    pub(crate) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
+    pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
-        let Some((name, _)) = client.subscriptions.get_key_value(topic) else {
+        let subscriptions = &mut client.registered.subscriptions;
+        let Some((name, mut left)) = subscriptions.remove_entry(topic) else {
             return;
         };
-        let name = name.clone();
-        let mut left = client.subscriptions.remove(topic).unwrap_or_default();
         match &origin.id {
             None => left.clear(),
             Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
@@ -130,7 +158,7 @@ impl Registry {
             self.drop_subscriber(&name, origin.from);
         } else {
             self.topics.configure(&name, origin.from, &left);
-            client.subscriptions.insert(name, left);
+            subscriptions.insert(name, left);
         }
     }
 }
@@ -145,4 +173,17 @@ fn encoding_for(subscribe: &Subscribe) -> Encoding {
         ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
         ..subscribe.encoding
     }
+}
+
+/// Topics that the runtime alone publishes are not for clients.
+pub(super) fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the runtime itself subscribes to the topic.
+pub(super) fn is_listened_to(topic: Topic) -> bool {
+    topic.direction() == Direction::Subscribed
 }
