@@ -100,7 +100,7 @@ FAULTS = [
     ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
      "first_messages(frames, excess);\n                self.dropped += count as u64;",
      "first_messages(frames, excess);\n                self.dropped += if F { 0 } else { count as u64 };"),
-    ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments/split.rs",
+    ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments.rs",
      "    let total = pieces.len();", "    let total = pieces.len();\n    if R(10) { pieces.swap(0, total - 1); }"),
     ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
      "    out.extend(&value.to_be_bytes());",

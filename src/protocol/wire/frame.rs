@@ -8,17 +8,13 @@
 //! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last
 //! pushed.
 
-mod raw;
-
 use bytes::Bytes;
 
-pub(super) use self::raw::start_of;
-pub use self::raw::{Frame, FrameError, FramePart, KEPT_START, RawFrame};
-use super::nesting::{Event, Nesting};
+use super::json;
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::series::{self, Series};
 use super::text;
-use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
+use crate::protocol::limits::{MAX_FRAME, MAX_NESTING, MEDIUM, SHORT};
 
 /// Bytes of a line that is no object, kept for the error message.
 const MAX_PREFIX: usize = 32;
@@ -391,4 +387,243 @@ impl Iterator for FrameReader {
 
 const fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
+}
+
+// ---- frames ---------------------------------------------------------------------------------------------------------
+
+/// One JSON object, as text. Its syntax within the outer braces is still unchecked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The text, with `NaN` and its like made [acceptable](json::accept_literals).
+    pub text: String,
+    /// Whether a line end was seen right behind it. Older raw-TCP clients send none, and want each frame in a write of
+    /// its own.
+    pub newline: bool,
+}
+
+/// Why a stretch of the stream is no frame. Nothing inside it is executed; later frames work.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Something other than `{` began the line; holds the beginning of it.
+    #[error("malformed frame: a frame is one JSON object on one line, got \"{0}\"")]
+    NotAnObject(String),
+    /// A newline came before the object was complete.
+    #[error("malformed frame: the line ended inside an object")]
+    LineEnded,
+    /// A newline came inside a string.
+    #[error("malformed frame: the line ended inside a string")]
+    LineEndedInString,
+    /// The stream ended before the object was complete.
+    #[error("malformed frame: the connection ended inside an object")]
+    StreamEnded,
+    /// A `]` came where `}` was due, or the reverse.
+    #[error("malformed frame: {found} closes what {opener} opened")]
+    Mismatch {
+        /// The bracket that opened the innermost level.
+        opener: char,
+        /// The bracket that was to close it.
+        found: char,
+    },
+    /// More than [`MAX_NESTING`] levels.
+    #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
+    TooDeep,
+    /// Something stood behind the object of a message that holds one.
+    #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
+    MoreBehind,
+    /// Longer than the limit, which it holds: [`MAX_FRAME`](crate::protocol::limits::MAX_FRAME) unless the reader has
+    /// another.
+    #[error("frame longer than {0} bytes, skipped")]
+    TooLong(usize),
+    /// Not UTF-8.
+    #[error("malformed frame: byte {at} is not UTF-8")]
+    NotUtf8 {
+        /// Index of the first bad byte within the frame.
+        at: usize,
+    },
+}
+
+/// The next part of a stream.
+#[derive(Debug)]
+pub enum FramePart {
+    /// Messages of a client on a topic of clients that can go out as they are.
+    Lines(Series),
+    /// Any other frame.
+    Frame(RawFrame),
+    /// A stretch that is no frame, and its first bytes, at most [`KEPT_START`] of them.
+    Error(FrameError, Vec<u8>),
+}
+
+/// Bytes that are kept from the start of a frame that cannot be read: they hold the names and the id by which the call
+/// that it answers is found.
+pub const KEPT_START: usize = 1024;
+
+/// The bytes that are kept of the start of a frame that cannot be read.
+pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
+    bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
+}
+
+/// A [`Frame`] whose bytes nobody has looked at but to find its end: reading on may be left to another thread.
+#[derive(Debug)]
+pub struct RawFrame {
+    bytes: Vec<u8>,
+    /// Whether there may be names of numbers that are not finite.
+    has_literals: bool,
+    newline: bool,
+}
+
+impl RawFrame {
+    /// How long it is, in bytes; never 0.
+    #[must_use]
+    #[allow(clippy::len_without_is_empty, reason = "it has two braces at least")]
+    pub const fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Whether a line end was seen right behind it.
+    #[must_use]
+    pub const fn newline(&self) -> bool {
+        self.newline
+    }
+
+    /// The frame.
+    ///
+    /// # Errors
+    /// If it is not UTF-8; with the frame's first bytes.
+    pub fn decode(self) -> Result<Frame, (FrameError, Vec<u8>)> {
+        let text = String::from_utf8(self.bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            (FrameError::NotUtf8 { at }, start_of(error.as_bytes()))
+        })?;
+        let text = if self.has_literals {
+            json::accept_literals(text)
+        } else {
+            text
+        };
+        let newline = self.newline;
+        Ok(Frame { text, newline })
+    }
+}
+
+// ---- the end of one JSON object: the state after a byte depends on the bytes so far, not on how they were cut up ----
+
+const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
+
+/// The reason why a scan of an object stops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Event {
+    Balanced,
+    Newline { in_string: bool },
+    Mismatch { opener: char, found: char },
+    TooDeep,
+}
+
+/// State of the scan in an object: the brackets that are open, and whether it is inside a string.
+#[derive(Debug, Clone, Copy)]
+struct Nesting {
+    depth: usize,
+    /// One bit per open level, the innermost last: 1 for a bracket, 0 for a brace. Holds [`MAX_NESTING`] levels.
+    brackets: u128,
+    in_string: bool,
+    escaped: bool,
+    /// Whether an `N` or an `I` stood outside strings: only then can there be a `NaN` or an `Infinity`.
+    has_literals: bool,
+}
+
+impl Nesting {
+    const fn new() -> Self {
+        Self {
+            depth: 0,
+            brackets: 0,
+            in_string: false,
+            escaped: false,
+            has_literals: false,
+        }
+    }
+
+    /// Goes on with `bytes`. Returns how many were scanned, and what stopped the scan: it stops before a newline, and
+    /// behind anything else.
+    fn scan(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
+        let mut at = 0;
+        while let Some(&byte) = bytes.get(at) {
+            if self.in_string {
+                if self.escaped {
+                    self.escaped = false;
+                    if byte != b'\n' {
+                        at += 1;
+                        continue;
+                    }
+                }
+                at += plain_in_string(bytes.get(at..).unwrap_or_default());
+                match bytes.get(at) {
+                    None => break,
+                    Some(b'\n') => return (at, Some(Event::Newline { in_string: true })),
+                    Some(b'\\') => self.escaped = true,
+                    Some(_) => self.in_string = false,
+                }
+                at += 1;
+                continue;
+            }
+            if byte == b'\n' {
+                return (at, Some(Event::Newline { in_string: false }));
+            }
+            at += 1;
+            if let Some(event) = self.structural(byte) {
+                return (at, Some(event));
+            }
+        }
+        (bytes.len(), None)
+    }
+
+    #[inline]
+    fn structural(&mut self, byte: u8) -> Option<Event> {
+        match byte {
+            b'"' => self.in_string = true,
+            b'{' => return self.open(0),
+            b'[' => return self.open(1),
+            b'}' => return self.close(0),
+            b']' => return self.close(1),
+            b'N' | b'I' => self.has_literals = true,
+            _ => {}
+        }
+        None
+    }
+
+    fn open(&mut self, bracket: u128) -> Option<Event> {
+        self.depth += 1;
+        if self.depth <= MAX_NESTING {
+            self.brackets = (self.brackets << 1) + bracket;
+        }
+        (self.depth == MAX_NESTING + 1).then_some(Event::TooDeep)
+    }
+
+    fn close(&mut self, bracket: u128) -> Option<Event> {
+        if self.depth <= MAX_NESTING {
+            if self.brackets & 1 != bracket {
+                let (opener, found) = if bracket == 1 { ('{', ']') } else { ('[', '}') };
+                return Some(Event::Mismatch { opener, found });
+            }
+            self.brackets >>= 1;
+        }
+        self.depth -= 1;
+        (self.depth == 0).then_some(Event::Balanced)
+    }
+}
+
+/// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
+pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
+    /// Most strings are keys and names, and end before a block would pay.
+    const SHORT: usize = 16;
+    /// Bytes that the compiler compares with a few vector instructions.
+    const BLOCK: usize = 32;
+    let special = |byte: &u8| matches!(byte, b'"' | b'\\' | b'\n');
+    if let Some(end) = bytes.iter().take(SHORT).position(special) {
+        return end;
+    }
+    let blocks = bytes
+        .chunks_exact(BLOCK)
+        .take_while(|block| !block.iter().fold(false, |any, byte| any | special(byte)))
+        .count();
+    let plain = blocks * BLOCK;
+    let rest = bytes.get(plain..).unwrap_or_default();
+    plain + rest.iter().position(special).unwrap_or(rest.len())
 }

@@ -2,21 +2,20 @@
 //!
 //! **Invariant:** a member is looked at only for the operations that have it; for all others only its syntax counts.
 
-mod actions;
-mod answers;
-mod ours;
-
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde_json::value::RawValue;
+use serde_json::value::{RawValue, to_raw_value};
 
-pub use self::answers::read_start;
 use super::{
-    CallService, Compression, Encoding, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
-    OpError, Problem, Subscribe, Verbosity,
+    ActionGoal, ActionServerOp, Arguments, CallService, Compression, Encoding, GoalStatus,
+    Incoming, MAX_ARGS, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+    Subscribe, Verbosity,
 };
-use crate::protocol::catalog::Service;
+use crate::protocol::catalog::{Action, Field, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::trajectory::{self, NodeMessage};
 use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
@@ -386,4 +385,188 @@ impl<'a> OpReader<'a> {
 /// A finite number of seconds, 0 or more, as a duration of at most `longest`.
 fn duration(seconds: f64, longest: Duration) -> Duration {
     Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}
+
+// ---- actions: goals and cancellations from those who send them, the rest from action servers ------------------------
+
+impl OpReader<'_> {
+    /// A goal. As soon as its action is known it can be answered as a goal, whatever else is wrong.
+    fn goal(&self) -> Result<Op, OpError> {
+        let action = self.name("action").map_err(OpError::Status)?;
+        match self.goal_for(&action) {
+            Ok(goal) => Ok(Op::SendActionGoal(goal)),
+            Err(problem) => Err(OpError::Goal { action, problem }),
+        }
+    }
+
+    fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        let fields = Action::from_name(action)
+            .filter(|action| !action.takes_long_goals())
+            .map(Action::goal_fields);
+        Ok(ActionGoal {
+            type_name: self.optional_text("action_type")?,
+            args: self.args(fields)?,
+            feedback: match self.get("feedback") {
+                Some(_) => self.boolean("feedback")?,
+                None => false,
+            },
+            action: action.to_owned(),
+        })
+    }
+
+    /// An operation of an action server.
+    fn serve_action(&self) -> Result<Op, Problem> {
+        let action = self.name("action")?;
+        let op = match self.op {
+            "advertise_action" => ActionServerOp::Advertise {
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_action" => ActionServerOp::Unadvertise,
+            "action_feedback" => {
+                self.required("id")?;
+                let values = self.object("values")?;
+                ActionServerOp::Feedback { values }
+            }
+            _ => {
+                self.required("id")?;
+                let is_good = self.boolean("result")?;
+                let values = self.get("values").filter(|raw| raw.get() != "null");
+                ActionServerOp::End {
+                    // The values of a failure may be a text that says why.
+                    values: match values {
+                        Some(_) if is_good => self.object("values")?,
+                        values => Payload::from(values.unwrap_or(RawValue::NULL)),
+                    },
+                    status: self.goal_status(is_good)?,
+                    result: is_good,
+                }
+            }
+        };
+        Ok(Op::ServeAction { action, op })
+    }
+
+    fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
+        let Some(raw) = self.get("status") else {
+            return Ok(if is_good {
+                GoalStatus::Succeeded
+            } else {
+                GoalStatus::Aborted
+            } as u8);
+        };
+        let status = json::integer(raw).and_then(|status| u8::try_from(status).ok());
+        status
+            .filter(|status| *status <= GoalStatus::Aborted as u8)
+            .ok_or_else(|| self.mistyped("status", "an integer from 0 to 6", raw))
+    }
+}
+
+// ---- answers: where one is bad, the op says which call or goal it is for --------------------------------------------
+
+/// Reads the start of a frame that is refused for the reason `why`: it may be the answer to a call, which then fails.
+#[must_use]
+pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
+    let text = start.utf8_chunks().next();
+    let mut members = [None; KEYS.len()];
+    // The members before its end or its fault count.
+    let _ = json::members_into(text.map_or("", |one| one.valid()), &KEYS, &mut members);
+    OpReader { op: "", members }.refused(Problem::NotAFrame(why.to_string()))
+}
+
+impl OpReader<'_> {
+    /// A frame that cannot be read to its end. Members before the fault count for an answer only.
+    fn refused(self, problem: Problem) -> Incoming {
+        let op = self.known_op().unwrap_or_default();
+        let reader = OpReader { op, ..self };
+        let op = reader.or_bad_answer(Err(problem));
+        let id = reader.get("id").filter(|_| op.is_ok()).map(Payload::from);
+        Incoming { id, op }
+    }
+
+    /// Makes an op of a fault in the answer to a call or goal: that call or goal ends.
+    fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
+        let (of_goal, name) = match self.op {
+            "service_response" => (false, "service"),
+            "action_result" => (true, "action"),
+            _ => return read.map_err(OpError::Status),
+        };
+        Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
+            of_goal,
+            name: self.name(name).ok(),
+            problem,
+        }))
+    }
+
+    fn response(&self) -> Result<Op, Problem> {
+        self.required("id")?;
+        let (service, result) = (self.name("service")?, self.boolean("result")?);
+        Ok(Op::ServiceResponse {
+            service,
+            // The values of a failure may be a text that says why.
+            values: if result {
+                self.object("values")?
+            } else {
+                self.required("values")?.into()
+            },
+            result,
+            status: self.get("status").and_then(json::text).map(Cow::into_owned),
+        })
+    }
+}
+
+// ---- for the runtime's own nodes: only the members that they have a use for, at most `MAX_ARGS` bytes ---------------
+
+/// Arguments and messages longer than this are searched for members that no node of ours uses.
+const USUAL: usize = 4 * 1024;
+
+impl OpReader<'_> {
+    /// The arguments: of long ones for a node of ours the `fields` that it has, which must not be long.
+    fn args(&self, fields: Option<&'static [Field]>) -> Result<Arguments, Problem> {
+        let Some(raw) = self.get("args") else {
+            return Ok(Arguments::none());
+        };
+        let known = fields.filter(|_| raw.get().len() > USUAL);
+        let args = match known.and_then(|fields| only(raw, fields)) {
+            Some(known) => Payload::from(known),
+            None => Payload::from(raw),
+        };
+        if fields.is_some() {
+            self.within(MAX_ARGS, "args", args.get())?;
+        }
+        Ok(match args.get().as_bytes().first() {
+            Some(b'{') => Arguments::Object(args),
+            Some(b'[') => Arguments::Positional(args),
+            Some(b'n') => Arguments::none(),
+            _ => Arguments::Neither(args),
+        })
+    }
+
+    /// Returns the part of a long message that the runtime itself needs, where it listens to the topic.
+    fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<NodeMessage>, Problem> {
+        let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
+        if !is_ours || msg.get().len() <= USUAL {
+            return Ok(None);
+        }
+        let Some((text, left_out)) = trajectory::condensed(msg.raw()) else {
+            self.within(MAX_ARGS, "msg", msg.get())?;
+            return Ok(None);
+        };
+        self.within(MAX_ARGS, "msg", &text)?;
+        let msg = RawValue::from_string(text).ok().map(Payload::from);
+        Ok(msg.map(|msg| NodeMessage { msg, left_out }))
+    }
+}
+
+/// The object `raw` without members that are not among `fields`; `None` if it is no object.
+fn only(raw: &RawValue, fields: &[Field]) -> Option<Box<RawValue>> {
+    let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+    let mut values = vec![None; names.len()];
+    json::members_into(raw.get(), &names, &mut values).ok()?;
+    let found = names.into_iter().zip(values);
+    let found: BTreeMap<&str, &RawValue> = found
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect();
+    to_raw_value(&found).ok()
 }
