@@ -44,9 +44,8 @@ FAULTS = [
     ("a message is lost, one in 200", f"{REGISTRY}/publish.rs",
      "    subscriber.outlet.do_send(Deliver {", "    if R(200) { return; }\n    subscriber.outlet.do_send(Deliver {"),
     ("a message comes twice, one in 200", f"{CONNECTION}/mod.rs",
-     "connection.shared.outgoing.accept(message)",
-     "{ let outgoing = &connection.shared.outgoing;\n"
-     "            if R(200) { outgoing.accept(message.clone()); } outgoing.accept(message) }"),
+     "connection.outgoing.accept(message)",
+     "{ if R(200) { connection.outgoing.accept(message.clone()); } connection.outgoing.accept(message) }"),
     ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/publish.rs",
      "messages::respelled(topic, spelling, &lines.frames)",
      "{ let frame = messages::respelled(topic, spelling, &lines.frames);\n"
@@ -61,10 +60,10 @@ FAULTS = [
      "        if let Some(client) = self.clients.get(&to.unwrap_or(respond.connection))\n            && respond"),
     ("a call is answered twice, one in 200", f"{CONNECTION}/mod.rs",
      "            let superseded = service",
-     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let superseded = service"),
+     "            if service.is_some() && R(200) { outgoing.push_response(response.frame.clone(), &[]); }\n            let superseded = service"),
     ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
-     "            shared.outgoing.push_response(response.frame, superseded);",
-     "            if !(service.is_some() && R(200)) { shared.outgoing.push_response(response.frame, superseded); }"),
+     "            outgoing.push_response(response.frame, superseded);",
+     "            if !(service.is_some() && R(200)) { outgoing.push_response(response.frame, superseded); }"),
     ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/requests.rs",
      "        if let Some(client) = self.clients.get(&feedback.connection) {",
      "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"

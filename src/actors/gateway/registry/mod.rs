@@ -430,28 +430,6 @@ impl Registry {
                 self.unsubscribe(&origin, &topic);
                 Ok(())
             }
-            Op::AdvertiseService { service, type_name } => {
-                self.serve(&origin, Served::Service, &service, type_name.as_deref())
-            }
-            Op::UnadvertiseService { service } => {
-                self.stop_serving(&origin, Served::Service, &service)
-            }
-            Op::ServeAction { action, op } => match op {
-                ActionServerOp::Advertise { type_name } => {
-                    self.serve(&origin, Served::Action, &action, type_name.as_deref())
-                }
-                ActionServerOp::Unadvertise => self.stop_serving(&origin, Served::Action, &action),
-                ActionServerOp::Feedback { values } => {
-                    self.pass_feedback(&origin, &action, &values)
-                }
-                ActionServerOp::End {
-                    values,
-                    status,
-                    result,
-                } => self.complete(&origin, Served::Action, &action, |name, id| {
-                    messages::action_result_raw(name, id, &values, status, result)
-                }),
-            },
             Op::SetLevel { verbosity, errors } => {
                 if let Some(client) = self.clients.get_mut(&from) {
                     client.verbosity = verbosity;
@@ -459,9 +437,37 @@ impl Registry {
                 }
                 Ok(())
             }
-            // Pieces have been put together before, and so has a token been checked; where none is asked for, any token
-            // will do.
-            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
+            op => self.perform_as_provider(&origin, op),
+        };
+        if let Err(why) = refusal {
+            self.refuse(&origin, &why);
+        }
+        Handled::at_once()
+    }
+
+    /// Performs an op of a client that serves others: it advertises a service or an action, or answers.
+    fn perform_as_provider(&mut self, origin: &FrameOrigin, op: Op) -> Result<(), Refusal> {
+        match op {
+            Op::AdvertiseService { service, type_name } => {
+                self.serve(origin, Served::Service, &service, type_name.as_deref())
+            }
+            Op::UnadvertiseService { service } => {
+                self.stop_serving(origin, Served::Service, &service)
+            }
+            Op::ServeAction { action, op } => match op {
+                ActionServerOp::Advertise { type_name } => {
+                    self.serve(origin, Served::Action, &action, type_name.as_deref())
+                }
+                ActionServerOp::Unadvertise => self.stop_serving(origin, Served::Action, &action),
+                ActionServerOp::Feedback { values } => self.pass_feedback(origin, &action, &values),
+                ActionServerOp::End {
+                    values,
+                    status,
+                    result,
+                } => self.complete(origin, Served::Action, &action, |name, id| {
+                    messages::action_result_raw(name, id, &values, status, result)
+                }),
+            },
             Op::ServiceResponse {
                 service,
                 values,
@@ -469,7 +475,7 @@ impl Registry {
                 status,
             } => {
                 let status = status.unwrap_or_default();
-                self.complete(&origin, Served::Service, &service, |service, id| {
+                self.complete(origin, Served::Service, &service, |service, id| {
                     messages::response_raw(service, id, &values, result, &status)
                 })
             }
@@ -483,13 +489,12 @@ impl Registry {
                 } else {
                     Served::Service
                 };
-                self.fail_answered(&origin, kind, name.as_deref(), problem)
+                self.fail_answered(origin, kind, name.as_deref(), problem)
             }
-        };
-        if let Err(why) = refusal {
-            self.refuse(&origin, &why);
+            // Pieces have been put together before, and so has a token been checked; where none is asked for, any token
+            // will do.
+            _ => Ok(()),
         }
-        Handled::at_once()
     }
 
     /// Tells the sender of a frame by an error status why nothing came of it.

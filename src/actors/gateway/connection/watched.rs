@@ -2,10 +2,8 @@
 //!
 //! **Invariant:** of a message that has no room nothing more is read than what needs none.
 
-use std::cell::Cell;
 use std::io;
 use std::pin::Pin;
-use std::rc::Rc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -13,7 +11,6 @@ use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
-use crate::actors::gateway::connection::outgoing::Outgoing;
 use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::memory::{Memory, Permit};
 use crate::protocol::limits::MEDIUM;
@@ -39,9 +36,10 @@ pub(super) struct MonitoredStream<S> {
     stream: S,
     /// Bytes that have come before, and are read first.
     behind: Bytes,
-    life: Rc<Cell<Instant>>,
-    /// Hears of every byte that the other side takes.
-    outgoing: Rc<Outgoing>,
+    /// When the other side last gave a sign of life.
+    pub(super) life: Instant,
+    /// When the other side last took a byte.
+    pub(super) taken: Instant,
     /// Whether the last write found no room: the next that does find some is a sign of life.
     is_blocked: bool,
     /// The place in the message that comes.
@@ -57,19 +55,14 @@ pub(super) struct MonitoredStream<S> {
 }
 
 impl<S> MonitoredStream<S> {
-    /// A stream on which `behind` has come so far; `life` is when its other side last gave a sign of life.
-    pub(super) fn new(
-        stream: S,
-        behind: Bytes,
-        life: Rc<Cell<Instant>>,
-        outgoing: Rc<Outgoing>,
-        memory: Memory,
-    ) -> Self {
+    /// A stream on which `behind` has come so far.
+    pub(super) fn new(stream: S, behind: Bytes, memory: Memory) -> Self {
+        let now = Instant::now();
         Self {
             stream,
             behind,
-            life,
-            outgoing,
+            life: now,
+            taken: now,
             is_blocked: false,
             place: FramePlace::default(),
             began: None,
@@ -80,11 +73,9 @@ impl<S> MonitoredStream<S> {
         }
     }
 
-    /// Begins another turn of reading. True if one was over: then whoever reads goes on without being woken.
-    pub(super) const fn begin_turn(&mut self) -> bool {
-        let is_over = self.is_turn_over();
+    /// Begins another turn of reading.
+    pub(super) const fn begin_turn(&mut self) {
         self.turn = TURN;
-        is_over
     }
 
     /// Whether others have a turn now, though there may be more to be read.
@@ -232,7 +223,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
         self.turn = self.turn.saturating_sub(received);
         if received > 0 {
             let now = Instant::now();
-            self.life.set(now);
+            self.life = now;
             if self
                 .place
                 .pass(buffer.filled().get(before..).unwrap_or_default())
@@ -255,11 +246,11 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for MonitoredStream<S> {
     ) -> Poll<io::Result<usize>> {
         let polled = Pin::new(&mut self.stream).poll_write(cx, bytes);
         if polled.is_ready() && self.is_blocked {
-            self.life.set(Instant::now());
+            self.life = Instant::now();
         }
         self.is_blocked = polled.is_pending();
         if matches!(&polled, Poll::Ready(Ok(taken)) if *taken > 0) {
-            self.outgoing.note_taken();
+            self.taken = Instant::now();
         }
         polled
     }
