@@ -10,7 +10,7 @@
 
 use bytes::{Bytes, BytesMut};
 
-use crate::protocol::wire::nesting::plain_in_string;
+use crate::protocol::wire::frame::plain_in_string;
 
 /// A message that becomes a line.
 #[derive(Debug)]

@@ -168,7 +168,7 @@ impl Handled {
 
 /// Asks for the topics and services that clients have. From `rosapi`; there is no answer where there are more of them.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<Arc<Census>>")]
+#[rtype(result = "Option<Census>")]
 pub struct TakeCensus {
     /// The answer may have at most so many of them.
     pub at_most: usize,

@@ -3,7 +3,6 @@
 //! **Invariant:** what is the arm's own is read from the catalog, and whatever a client sends, the others are served.
 
 pub mod connection;
-pub mod encoded;
 mod ends;
 pub mod files;
 pub mod limits;

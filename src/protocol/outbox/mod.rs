@@ -13,20 +13,16 @@
 //! **Invariant:** dropping removes whole messages, never reorders; of topic messages, held back ones included, at most
 //! [`MAX_TOPIC_BYTES`] wait.
 
-mod dropping;
-mod queues;
 mod throttle;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
+use bytes::{Buf, Bytes};
 
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
-use crate::protocol::outbox::queues::{Queues, Timestamp, counted};
-use crate::protocol::outbox::throttle::{HeldMessage, Throttles};
-use crate::protocol::wire::series::{first_message, last_messages, messages};
+use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A longer message than [`MEDIUM`] has room elsewhere, and counts as one of these: no two of them wait.
@@ -40,6 +36,14 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
 pub const MESSAGE_BYTES: usize = 160;
+
+/// Microseconds since the outbox was first used: half the bytes of an [`Instant`].
+type Timestamp = u64;
+
+/// Bytes of a message, or of a series, that count.
+fn counted(frame: &Bytes) -> usize {
+    frame.len().min(MEDIUM)
+}
 
 /// A message that is queued without the series that it is part of, if it is: it keeps none of the others in memory.
 fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
@@ -55,8 +59,8 @@ fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
 pub struct Outbox {
     /// Topic messages in order, by their numbers.
     topics: BTreeMap<u64, QueuedMessage>,
-    /// The topics of these, and how many messages of each may wait.
-    queues: Queues,
+    /// Every topic that has messages here, a bound or a throttle.
+    queues: HashMap<Arc<str>, TopicQueue>,
     /// Messages with lower numbers have been looked at for their age. The messages that are left are the newest
     /// of their topics.
     looked_at: u64,
@@ -70,9 +74,11 @@ pub struct Outbox {
     epoch: Option<Instant>,
     /// Responses and statuses in order, each with its number.
     responses: VecDeque<(u64, Bytes)>,
-    throttles: Throttles,
-    /// The number of the last response.
-    last_response: u64,
+    /// How many topics are throttled.
+    throttled: usize,
+    /// Messages that are held back, and the bytes of them that count.
+    held_count: usize,
+    held_bytes: usize,
     /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
     produced: u64,
     /// Bytes of queued topic messages that count, without those held back.
@@ -95,19 +101,62 @@ struct QueuedMessage {
     since: Timestamp,
 }
 
+/// The messages of one topic, which leave the oldest first.
+#[derive(Debug, Default)]
+struct TopicQueue {
+    /// The number of the newest that is queued.
+    newest: u64,
+    /// How many messages, or series of them, are queued.
+    count: usize,
+    /// How many may be.
+    bound: Option<usize>,
+    /// The numbers of those that came while there was a bound.
+    bounded: VecDeque<u64>,
+    throttle: Option<TopicThrottle>,
+    /// Messages that the throttle holds back.
+    held: VecDeque<HeldMessage>,
+}
+
+/// `throttle_rate` and `queue_length` of one topic.
+#[derive(Debug)]
+struct TopicThrottle {
+    /// Least time between deliveries.
+    interval: Duration,
+    /// How many messages may be held back, 1 or more.
+    queue_length: usize,
+    /// When the last message was let go.
+    last: Option<Instant>,
+}
+
+/// A message that is held back.
+#[derive(Debug)]
+struct HeldMessage {
+    number: u64,
+    /// When it was produced.
+    since: Timestamp,
+    frame: Bytes,
+}
+
+impl TopicQueue {
+    fn is_idle(&self) -> bool {
+        self.count == 0 && self.bound.is_none() && self.throttle.is_none()
+    }
+}
+
 impl Default for Outbox {
     fn default() -> Self {
         Self {
             topics: BTreeMap::new(),
-            queues: Queues::default(),
+            queues: HashMap::new(),
             looked_at: 0,
             is_behind: false,
             room: usize::MAX,
             fresh: MAX_AGE,
             epoch: None,
             responses: VecDeque::new(),
-            throttles: Throttles::default(),
-            last_response: 0,
+            throttled: 0,
+            held_count: 0,
+            held_bytes: 0,
             produced: 0,
             topic_bytes: 0,
             response_bytes: 0,
@@ -144,17 +193,19 @@ impl Outbox {
         if !self.may_fit(&frame) {
             return;
         }
-        if self.throttles.concerns(topic) {
-            self.offer(topic, since, frame, now);
-        } else if self.queues.bound(topic).is_some() {
-            let is_series = first_message(&frame) < frame.len();
-            for frame in messages(frame) {
-                let number = self.number();
-                self.enqueue(number, topic, since, by_itself(frame, is_series));
+        match self.queues.get(topic) {
+            Some(queue) if queue.throttle.is_some() => self.offer(topic, since, frame, now),
+            Some(queue) if queue.bound.is_some() => {
+                let is_series = first_message(&frame) < frame.len();
+                for frame in messages(frame) {
+                    let number = self.number();
+                    self.enqueue(number, topic, since, by_itself(frame, is_series));
+                }
             }
-        } else {
-            let number = self.number();
-            self.enqueue(number, topic, since, frame);
+            _ => {
+                let number = self.number();
+                self.enqueue(number, topic, since, frame);
+            }
         }
         self.keep_bounded();
     }
@@ -180,44 +231,32 @@ impl Outbox {
 
     /// Whether a topic is throttled.
     #[must_use]
-    pub fn is_throttled(&self) -> bool {
-        !self.throttles.is_empty()
+    pub const fn is_throttled(&self) -> bool {
+        self.throttled > 0
     }
 
     /// Adds a response or a status. Messages of the topics in `supersedes` that throttling holds back are older, and
     /// are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
-            self.throttles.discard(topic);
+            self.take_held(topic);
         }
         self.response_bytes += frame.len();
         if frame.len() <= SHORT {
             self.short_bytes += frame.len();
         }
-        self.last_response = self.number();
-        self.responses.push_back((self.last_response, frame));
-    }
-
-    /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
-    /// (`None`, or no time at all). Messages held back then count as produced now.
-    pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
-        match throttle.filter(|(interval, _)| !interval.is_zero()) {
-            Some((interval, queue_length)) => {
-                self.throttles.set(topic, interval, queue_length);
-            }
-            None => {
-                for held in self.throttles.forget(topic) {
-                    let number = self.number();
-                    self.enqueue(number, topic, held.since, held.frame);
-                }
-            }
-        }
+        let number = self.number();
+        self.responses.push_back((number, frame));
     }
 
     /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
     /// kept; `None` for any number.
     pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
-        self.queues.set_bound(topic, queue_length);
+        if queue_length.is_none() {
+            return self.forget_bound(topic);
+        }
+        let queue = self.queues.entry(Arc::clone(topic)).or_default();
+        queue.bound = queue_length;
     }
 
     /// Sets how many bytes of topic messages may be taken from now on. Messages ahead of a response are taken all
@@ -229,8 +268,26 @@ impl Outbox {
 
     /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
     pub fn forget(&mut self, topic: &str) {
-        self.throttles.forget(topic);
-        self.queues.forget_bound(topic);
+        self.lift_throttle(topic);
+        self.forget_bound(topic);
+    }
+
+    fn forget_bound(&mut self, topic: &str) {
+        if let Some(queue) = self.queues.get_mut(topic) {
+            queue.bound = None;
+            queue.bounded = VecDeque::new();
+            self.tidy(topic);
+        }
+    }
+
+    /// Forgets a topic that has neither messages nor a bound or a throttle.
+    fn tidy(&mut self, topic: &str) {
+        if self.queues.get(topic).is_some_and(TopicQueue::is_idle) {
+            self.queues.remove(topic);
+            if self.queues.capacity() > 4 * self.queues.len() + 32 {
+                self.queues.shrink_to(2 * self.queues.len());
+            }
+        }
     }
 
     /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
@@ -349,8 +406,9 @@ impl Outbox {
     }
 
     /// When the next held back message is due, if any is held back: the time to take frames again.
-    pub fn next_release(&mut self) -> Option<Instant> {
-        self.throttles.next_release()
+    #[must_use]
+    pub fn next_release(&self) -> Option<Instant> {
+        self.next_due().map(|(due, _)| due)
     }
 
     /// Whether there is nothing to be taken now (held back messages that are not due do not count).
@@ -380,13 +438,13 @@ impl Outbox {
     /// How many topic messages, or series of them, wait, those held back included.
     #[must_use]
     pub fn topic_count(&self) -> usize {
-        self.topics.len() + self.throttles.count()
+        self.topics.len() + self.held_count
     }
 
     /// Bytes of topic messages that wait, as they count, those held back included.
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
-        self.topic_bytes + self.throttles.bytes()
+        self.topic_bytes + self.held_bytes
     }
 
     /// Topic messages dropped so far for want of room. A message that throttling replaces by a newer one is not
@@ -413,50 +471,14 @@ impl Outbox {
         Timestamp::try_from(since).unwrap_or(Timestamp::MAX)
     }
 
-    /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
-    /// newest would be left.
-    fn offer(&mut self, topic: &Arc<str>, since: Timestamp, mut frames: Bytes, now: Instant) {
-        let is_series = first_message(&frames) < frames.len();
-        while !frames.is_empty() {
-            let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
-            if !self.offer_one(topic, since, frame, now) {
-                let left = self.throttles.queue_length(topic);
-                for frame in messages(last_messages(frames, left)) {
-                    self.offer_one(topic, since, by_itself(frame, true), now);
-                }
-                return;
-            }
-        }
-    }
-
-    /// Gives the throttle a message; false if it is held back.
-    fn offer_one(
-        &mut self,
-        topic: &Arc<str>,
-        since: Timestamp,
-        frame: Bytes,
-        now: Instant,
-    ) -> bool {
-        if self.throttles.holds_for_long(topic, &frame, now) {
-            self.dropped += 1;
-            return false;
-        }
-        let number = self.number();
-        let held = HeldMessage {
-            number,
-            since,
-            frame,
-        };
-        let given_back = self.throttles.offer(topic, held, now);
-        let goes = given_back.is_some();
-        if let Some(message) = given_back {
-            self.enqueue(number, topic, since, message.frame);
-        }
-        goes
-    }
-
     fn enqueue(&mut self, number: u64, topic: &Arc<str>, since: Timestamp, frame: Bytes) {
-        let before = self.queues.enter(topic, number);
+        let queue = self.queues.entry(Arc::clone(topic)).or_default();
+        let before = (queue.count > 0).then_some(queue.newest);
+        queue.newest = number;
+        queue.count += 1;
+        if queue.bound.is_some() {
+            queue.bounded.push_back(number);
+        }
         if before.is_some_and(|before| before < self.looked_at) {
             // It was too old, and is the newest no more.
             self.drop_message(before);
@@ -469,22 +491,151 @@ impl Outbox {
         };
         self.topics.insert(number, message);
         if !self.in_flight.is_empty() || self.room == 0 {
-            while let Some(surplus) = self.queues.surplus(topic) {
+            while let Some(surplus) = self.surplus(topic) {
                 self.drop_message(Some(surplus));
             }
         }
     }
 
-    /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
-    /// now.
-    fn release(&mut self, now: Instant) {
-        if !self.is_throttled() {
-            return;
+    /// The oldest message of a topic, if more wait than may.
+    fn surplus(&self, topic: &str) -> Option<u64> {
+        let TopicQueue { bound, bounded, .. } = self.queues.get(topic)?;
+        (bounded.len() > (*bound)?).then(|| bounded.front().copied())?
+    }
+}
+
+// ---- dropping: the oldest messages go first, whole -------------------------------------------------------------------
+
+impl Outbox {
+    /// Whether there is room for a message once all else has gone; if not, it counts as dropped.
+    fn may_fit(&mut self, frame: &Bytes) -> bool {
+        let fits = frame.len() <= MAX_MESSAGE;
+        self.dropped += u64::from(!fits);
+        fits
+    }
+
+    /// Drops the messages that have waited for too long, except the newest of each topic.
+    fn drop_old(&mut self, now: Instant) {
+        loop {
+            let age = if self.is_behind {
+                MAX_AGE_BEHIND
+            } else {
+                MAX_AGE
+            };
+            let oldest = self.oldest_at(now, age);
+            let next = self.topics.range(self.looked_at..).next();
+            let Some((&number, _)) = next.filter(|(_, message)| message.since < oldest) else {
+                return;
+            };
+            self.looked_at = number + 1;
+            let dropped = self.dropped;
+            self.drop_but_newest(number);
+            self.is_behind |= self.dropped > dropped;
         }
-        let since = self.timestamp(now);
-        while let Some((topic, held)) = self.throttles.release(now) {
-            let number = self.number();
-            self.enqueue(number, &topic, since, held.frame);
+    }
+
+    /// Drops the first topic message if it is too old to be taken only because a response is behind it; false if it is
+    /// not.
+    fn drop_stale(&mut self, now: Instant) -> bool {
+        let oldest = self.oldest_at(now, self.fresh);
+        let first = self.topics.first_key_value();
+        let Some((&number, _)) = first.filter(|(_, message)| message.since < oldest) else {
+            return false;
+        };
+        self.drop_but_newest(number)
+    }
+
+    /// Drops a message, or all of a series, except the newest of the topic; true if nothing is left.
+    fn drop_but_newest(&mut self, number: u64) -> bool {
+        let Some(message) = self.topics.get_mut(&number) else {
+            return true;
+        };
+        let queue = message
+            .topic
+            .as_ref()
+            .and_then(|topic| self.queues.get(topic));
+        if queue.is_none_or(|queue| queue.newest != number) {
+            self.drop_message(Some(number));
+            return true;
+        }
+        if first_message(&message.frame) == message.frame.len() {
+            // The pieces of a message stay together.
+            return false;
+        }
+        let newest = by_itself(last_messages(message.frame.clone(), 1), true);
+        let older = message.frame.len() - newest.len();
+        self.dropped += messages(message.frame.slice(..older)).count() as u64;
+        self.topic_bytes -= counted(&message.frame);
+        self.topic_bytes += counted(&newest);
+        message.frame = newest;
+        false
+    }
+
+    /// Drops a message, or all of a series, if there is one with that number.
+    fn drop_message(&mut self, number: Option<u64>) {
+        let message = number.and_then(|number| self.take_out(number));
+        if let Some(frame) = message {
+            self.dropped += messages(frame.clone()).count() as u64;
+        }
+    }
+
+    /// Takes the first topic message out of the queue.
+    fn take_out_first(&mut self) -> Option<Bytes> {
+        let number = *self.topics.first_key_value()?.0;
+        self.take_out(number)
+    }
+
+    fn take_out(&mut self, number: u64) -> Option<Bytes> {
+        let QueuedMessage { frame, topic, .. } = self.topics.remove(&number)?;
+        self.topic_bytes -= counted(&frame);
+        if let Some(topic) = topic
+            && let Some(queue) = self.queues.get_mut(&topic)
+        {
+            queue.count -= 1;
+            if queue.bounded.front() == Some(&number) {
+                queue.bounded.pop_front();
+            }
+            self.tidy(&topic);
+        }
+        Some(frame)
+    }
+
+    /// The least time of a message that is not older than `age`.
+    fn oldest_at(&mut self, now: Instant, age: Duration) -> Timestamp {
+        let age = Timestamp::try_from(age.as_micros()).unwrap_or(Timestamp::MAX);
+        self.timestamp(now).saturating_sub(age)
+    }
+
+    /// Drops topic messages, the oldest first, until what is left takes at most [`MAX_TOPIC_BYTES`]. The oldest is the
+    /// queue's first or the one that was held back first. A series loses as many messages at once as have to go.
+    fn keep_bounded(&mut self) {
+        loop {
+            let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;
+            let excess = cost.saturating_sub(MAX_TOPIC_BYTES);
+            if excess == 0 {
+                return;
+            }
+            let first = self.topics.first_key_value();
+            let queued = first.map_or(u64::MAX, |(number, _)| *number);
+            let held = self.oldest_held().filter(|(held, _)| *held < queued);
+            if let Some((_, topic)) = held {
+                self.pop_held(&topic);
+                self.dropped += 1;
+            } else if let Some(mut first) = self.topics.first_entry() {
+                let frames = &mut first.get_mut().frame;
+                let (bytes, count) = first_messages(frames, excess);
+                self.dropped += count as u64;
+                if bytes < frames.len() {
+                    self.topic_bytes -= counted(frames);
+                    frames.advance(bytes);
+                    self.topic_bytes += counted(frames);
+                } else {
+                    self.take_out_first();
+                }
+            } else {
+                debug_assert!(false, "bytes are counted that no message has");
+                return;
+            }
         }
     }
 }

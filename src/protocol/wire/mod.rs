@@ -5,9 +5,7 @@
 pub mod fragments;
 pub mod frame;
 pub mod json;
-pub(crate) mod nesting;
 pub mod opening;
-mod parts;
 pub mod payload;
 pub mod series;
 pub mod streamed;

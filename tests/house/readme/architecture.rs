@@ -113,6 +113,49 @@ fn every_function_on_the_way_of_a_frame_exists() {
     }
 }
 
+/// The files that a table of `header` names and the names in each; how many files, and their lines.
+fn walk(header: &str) -> (usize, usize) {
+    let rows = table(&text("ARCHITECTURE.md"), header);
+    let mut lines = 0;
+    for row in &rows {
+        let path = codes(&row[0])[0];
+        let source = text(path);
+        lines += source.lines().count();
+        let names = codes(&row[1]);
+        assert!(!names.is_empty(), "{path}: no name");
+        for name in names {
+            let is_defined = ["fn", "struct", "enum", "trait"].iter().any(|kind| {
+                ["(", "<", " ", ":"]
+                    .iter()
+                    .any(|next| source.contains(&format!("{kind} {name}{next}")))
+            });
+            let is_named = source.contains(name);
+            assert!(
+                is_defined || (name != codes(&row[1])[0] && is_named),
+                "{path}: no {name}"
+            );
+        }
+    }
+    let paths: BTreeSet<&str> = rows.iter().map(|row| codes(&row[0])[0]).collect();
+    assert_eq!(paths.len(), rows.len(), "a file stands twice");
+    (rows.len(), lines)
+}
+
+/// The bounds are what has been reached: neither walk becomes longer unnoticed.
+#[test]
+fn the_walks_name_what_is_there_and_become_no_longer() {
+    let (files, lines) = walk("a message passes");
+    assert!(
+        files <= 20 && lines <= 6_600,
+        "a message passes {files} files, {lines} lines"
+    );
+    let (files, lines) = walk("a call passes");
+    assert!(
+        files <= 27 && lines <= 7_950,
+        "a call passes {files} files, {lines} lines"
+    );
+}
+
 /// In the drawings: paths by their slash, actors and messages by their capitals.
 #[test]
 fn whatever_the_architectures_drawings_name_exists() {

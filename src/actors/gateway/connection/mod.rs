@@ -1,9 +1,8 @@
 //! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
 //!
-//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`. The
-//! reading task hands one op at a time to the registry and waits until it has taken effect. The actor's handlers put
-//! messages into the outbox. The writer, which the same actor polls behind its handlers, drains it. A client that
-//! reads slowly fills its own outbox and nothing else.
+//! A session judges the client by its first bytes. From then on the actor has two tasks, both with access to its state.
+//! The reader hands one op at a time to the registry and waits until it has taken effect. The writer drains the outbox,
+//! which the actor's handlers fill. A client that reads slowly fills its own outbox and nothing else.
 //!
 //! The connection is generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
 //!
@@ -11,45 +10,74 @@
 
 pub mod admission;
 mod computations;
-mod conversation;
+#[cfg(feature = "web")]
+mod http;
 mod outgoing;
+mod perform;
+mod plain;
+mod reader;
 mod session;
-mod shared;
+mod timer;
 mod transport;
 mod unfinished;
 mod unread;
 #[cfg(feature = "web")]
+mod watched;
+#[cfg(feature = "web")]
 mod websocket;
+mod writer;
 
-use std::future::poll_fn;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use actix::prelude::*;
+use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::Notify;
+use tokio::time::Instant;
 
 use self::admission::Admission;
-use self::session::ClientSession;
-use self::shared::Shared;
+use self::computations::Computations;
+use self::outgoing::Outgoing;
+use self::session::{ClientSession, Place};
+use self::transport::Transport;
 pub use self::unread::UnreadSource;
 pub use super::ends::Ends;
-use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
+use super::limits::MAX_RESPONSES_WAITING;
+use super::messages::{Configure, Deliver, Finish, Outlets, Request, Response};
 use super::registry::Registry;
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::Memory;
 use crate::protocol::catalog::Service;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The actor of one client.
 pub struct Connection<S> {
-    /// The stream, until the session takes it.
-    stream: Option<S>,
-    shared: Rc<Shared>,
-    /// The conditions that the client has to meet first.
-    admission: Arc<Admission>,
-    ends: Ends,
+    /// The stream and the conditions that the client has to meet, until the session takes them.
+    newcomer: Option<(S, Arc<Admission>, Ends)>,
+    registry: Addr<Registry>,
+    /// Where long frames find their room.
+    memory: Memory,
+    /// The stream, once the client is spoken with.
+    transport: Option<Transport<S>>,
+    /// Its place among the clients.
+    place: Option<Place>,
+    outgoing: Outgoing,
+    computations: Computations,
+    /// When something was last written or computed, while the reader waited for that.
+    room_since: Instant,
+    /// Set while the client is told why a call failed in `values` too.
+    wants_text: Arc<AtomicBool>,
+    /// Nothing more is read; queued messages are still sent.
+    is_finishing: bool,
+    /// Tells the session so.
+    finish: Arc<Notify>,
+    /// The client speaks something else, or has broken a rule: it is told so, and its input is swallowed.
+    is_refused: bool,
+    /// The reader has ended.
+    is_read_to_its_end: bool,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
@@ -81,10 +109,19 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
         Self {
-            stream: Some(stream),
-            shared: Rc::new(Shared::new(registry, gauges, unread)),
-            admission,
-            ends,
+            newcomer: Some((stream, admission, ends)),
+            registry,
+            memory: gauges.memory().clone(),
+            transport: None,
+            place: None,
+            outgoing: Outgoing::new(gauges, unread),
+            computations: Computations::default(),
+            room_since: Instant::now(),
+            wants_text: Arc::default(),
+            is_finishing: false,
+            finish: Arc::default(),
+            is_refused: false,
+            is_read_to_its_end: false,
         }
         .start()
     }
@@ -95,24 +132,38 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
     type Context = Context<Self>;
 
+    /// Judges the client, and speaks with it or says why not.
     fn started(&mut self, ctx: &mut Context<Self>) {
+        let Some((stream, admission, ends)) = self.newcomer.take() else {
+            return;
+        };
         let address = ctx.address();
         let outlets = Outlets {
             deliver: address.clone().recipient(),
             respond: address.clone().recipient(),
             configure: address.clone().recipient(),
             finish: address.recipient(),
-            wants_text: Arc::clone(&self.shared.wants_text),
+            wants_text: Arc::clone(&self.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: self.shared.outgoing.backlog(),
+            backlog: self.outgoing.backlog(),
         };
-        self.begin(outlets, ctx);
-    }
-
-    fn stopped(&mut self, _: &mut Context<Self>) {
-        if let Some(id) = self.shared.id.take() {
-            self.shared.registry.do_send(Disconnect(id));
-        }
+        let session = ClientSession {
+            registry: self.registry.clone(),
+            #[cfg(feature = "web")]
+            memory: self.memory.clone(),
+            finish: Arc::clone(&self.finish),
+            admission,
+            ends,
+        };
+        let opened = contained(session.run(stream, outlets)).into_actor(self);
+        ctx.spawn(opened.map(|opened, connection, ctx| match opened {
+            Ok(Some(opened)) => connection.converse(opened, ctx),
+            Ok(None) => ctx.stop(),
+            Err(panic) => {
+                tracing::error!(%panic, "a client's session failed; its connection ends");
+                ctx.stop();
+            }
+        }));
     }
 }
 
@@ -122,7 +173,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connectio
     type Result = ();
 
     fn handle(&mut self, message: Deliver, ctx: &mut Context<Self>) {
-        self.contain(ctx, |connection| connection.shared.outgoing.accept(message));
+        self.contain(ctx, |connection| connection.outgoing.accept(message));
     }
 }
 
@@ -131,12 +182,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connecti
 
     fn handle(&mut self, response: Response, ctx: &mut Context<Self>) {
         self.contain(ctx, |connection| {
-            let shared = &connection.shared;
+            let outgoing = &mut connection.outgoing;
             let service = response.service;
             let superseded = service.map_or(&[][..], Service::supersedes);
-            shared.outgoing.push_response(response.frame, superseded);
+            outgoing.push_response(response.frame, superseded);
             if service.is_some_and(Service::is_computation) {
-                shared.end_computation();
+                connection.computations.end();
+                connection.room_since = Instant::now();
+                connection.start_computation();
             }
         });
     }
@@ -147,7 +200,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Configure> for Connect
 
     fn handle(&mut self, configure: Configure, ctx: &mut Context<Self>) {
         self.contain(ctx, |connection| {
-            let outgoing = &connection.shared.outgoing;
+            let outgoing = &mut connection.outgoing;
             outgoing.configure(&configure.topic, configure.throttle);
         });
     }
@@ -157,44 +210,84 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Finish> for Connection
     type Result = ();
 
     fn handle(&mut self, _: Finish, _: &mut Context<Self>) {
-        self.shared.finish();
+        self.finish();
     }
 }
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Serves the client, or says why not, behind the handlers of this actor, and ends with it.
-    fn begin(&mut self, outlets: Outlets, ctx: &mut Context<Self>) {
-        let Some(stream) = self.stream.take() else {
-            return;
-        };
-        let session = ClientSession {
-            shared: Rc::clone(&self.shared),
-            finish: ctx.address().recipient(),
-            admission: Arc::clone(&self.admission),
-            ends: self.ends,
-        };
-        let outgoing = Rc::clone(&self.shared.outgoing);
-        let mut session = Box::pin(contained(session.run(stream, outlets)));
-        let served = poll_fn(move |cx| {
-            let polled = session.as_mut().poll(cx);
-            outgoing.write(cx);
-            polled
-        });
-        ctx.spawn(served.into_actor(self).map(|served, _, ctx| {
-            if let Err(panic) = served {
-                tracing::error!(%panic, "a client's task failed; its connection ends");
-            }
-            ctx.stop();
-        }));
-    }
-
     /// Does `work`; its panic ends this client and nothing else.
     fn contain(&mut self, ctx: &mut Context<Self>, work: impl FnOnce(&mut Self)) {
         if let Err(panic) = contain(|| work(self)) {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
             ctx.stop();
         }
+    }
+}
+
+impl<S> Connection<S> {
+    /// Refuses the client: it gets this status, and nothing that it sends is looked at any more.
+    fn refuse(&mut self, status: Bytes) {
+        self.is_refused = true;
+        self.outgoing.push_response(status, &[]);
+    }
+
+    /// Ends reading; queued messages are still sent.
+    fn finish(&mut self) {
+        self.is_finishing = true;
+        self.finish.notify_one();
+    }
+
+    /// The client may be read: neither its responses nor its computations pile up.
+    fn may_read(&self) -> bool {
+        self.may_compute() && !self.computations.are_too_many()
+    }
+
+    /// Another computation may start: its response would not come on top of too many.
+    const fn may_compute(&self) -> bool {
+        self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
+    }
+
+    /// This many bytes are on their way to the client. Whether it may be read now, and could not be before.
+    fn note_written(&mut self, bytes: usize) -> bool {
+        let may_read = self.may_read();
+        self.outgoing.written(bytes);
+        if !may_read {
+            self.room_since = Instant::now();
+        }
+        self.start_computation();
+        !may_read && self.may_read()
+    }
+
+    /// Queues a heavy call behind the connection's others.
+    fn enqueue_computation(&mut self, request: Request, length: usize) {
+        self.computations.push(request, length);
+        self.start_computation();
+    }
+
+    /// Starts the next computation if none runs and its response would find room.
+    fn start_computation(&mut self) {
+        if self.computations.can_start()
+            && self.may_compute()
+            && let Some(request) = self.computations.start()
+        {
+            self.registry.do_send(request);
+        }
+    }
+
+    /// Whether a computation runs or waits.
+    fn is_computing(&self) -> bool {
+        !self.computations.is_empty()
+    }
+
+    /// Gives up the computations: nobody waits for them any more.
+    fn abandon_computations(&mut self) {
+        self.computations = Computations::default();
+    }
+
+    /// Whether nothing more is read or computed.
+    fn is_done(&self) -> bool {
+        self.is_finishing && !self.is_computing()
     }
 }

@@ -3,7 +3,6 @@
 //! **Invariant:** nothing of what a client sends is read as JSON before its opening is decided, and what has been
 //! read by then is not lost.
 
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,33 +11,65 @@ use bytes::BytesMut;
 #[cfg(feature = "web")]
 use hyper::StatusCode;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::admission::Admission;
 use super::admission::authentication::{AuthError, authenticate, opens_as_command};
 use super::admission::slots::HeldSlot;
-use super::shared::Shared;
-use super::transport::{CHUNK, Plain, discard};
+use super::plain::{CHUNK, discard};
+use super::transport::Transport;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;
 use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME};
-use crate::actors::gateway::messages::{
-    Connect, CountRefusal, Disconnect, Finish, Outlets, Refused,
-};
+use crate::actors::gateway::messages::{Connect, CountRefusal, Disconnect, Outlets, Refused};
+use crate::actors::gateway::registry::Registry;
+#[cfg(feature = "web")]
+use crate::actors::resources::memory::Memory;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
-use crate::protocol::wire::frame::{FrameReader, Opening, opening};
+use crate::protocol::wire::frame::{Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
-/// One client, from its first bytes to its last.
+/// A client whose first bytes are judged.
 pub(super) struct ClientSession {
-    pub(super) shared: Rc<Shared>,
-    pub(super) finish: Recipient<Finish>,
+    pub(super) registry: Addr<Registry>,
+    /// Where long messages find their room.
+    #[cfg(feature = "web")]
+    pub(super) memory: Memory,
+    /// Notified when the runtime ends the connection first.
+    pub(super) finish: Arc<Notify>,
     pub(super) admission: Arc<Admission>,
     pub(super) ends: Ends,
+}
+
+/// A client that is spoken with from now on.
+pub(super) struct Opened<S> {
+    pub(super) place: Place,
+    pub(super) transport: Transport<S>,
+    /// Bytes that have been read.
+    pub(super) first: BytesMut,
+}
+
+/// The place of a client that the registry knows; whoever drops it gives it back.
+pub(super) struct Place {
+    id: ConnectionId,
+    registry: Addr<Registry>,
+}
+
+impl Place {
+    pub(super) const fn id(&self) -> ConnectionId {
+        self.id
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.registry.do_send(Disconnect(self.id));
+    }
 }
 
 /// The protocol that a client speaks, by its first bytes.
@@ -102,8 +133,8 @@ impl Examination<'_> {
 }
 
 impl ClientSession {
-    /// Serves a client, or tells it why not; returns when nothing can be sent any more.
-    pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets)
+    /// Judges a client. Returns it if it is spoken with; any other has been answered, or told why not.
+    pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
@@ -121,10 +152,10 @@ impl ClientSession {
                             slot,
                             refused: None,
                         };
-                        return self.serve_http(stream, first, due, Some(newcomer)).await;
+                        return self.serve_http(stream, first, due, Ok(newcomer)).await;
                     }
                     Some(how) => how,
-                    None => return,
+                    None => return None,
                 }
             }
         };
@@ -148,7 +179,7 @@ impl ClientSession {
                         slot,
                         refused: place.err(),
                     };
-                    return self.serve_http(stream, first, due, Some(newcomer)).await;
+                    return self.serve_http(stream, first, due, Ok(newcomer)).await;
                 }
                 HowServed::Command => self.wait_for_place(&outlets, &slot, due).await,
                 _ => self.connect(&outlets, false).await,
@@ -156,15 +187,18 @@ impl ClientSession {
         }
         drop(outlets);
         match place {
-            Ok(id) => {
+            Ok(place) => {
                 if matches!(how, HowServed::Undecided) {
                     how = self
                         .examine(&mut stream, &mut first, Examination::Served)
                         .await;
                 }
-                self.serve(stream, id, first, how).await;
+                self.serve(stream, place, first, how).await
             }
-            Err(why) => self.turn_away(&mut stream, how, why).await,
+            Err(why) => {
+                self.turn_away(&mut stream, how, why).await;
+                None
+            }
         }
     }
 
@@ -174,7 +208,7 @@ impl ClientSession {
         outlets: &Outlets,
         slot: &HeldSlot<'_>,
         due: Instant,
-    ) -> Result<ConnectionId, Refused> {
+    ) -> Result<Place, Refused> {
         loop {
             let place = self.connect(outlets, true).await;
             let is_full = matches!(place, Err(Refused::Full { .. }));
@@ -191,7 +225,7 @@ impl ClientSession {
     /// Counts a client that is turned away, if no place was free.
     pub(super) fn count_refusal(&self, why: Refused) {
         if matches!(why, Refused::Full { .. }) {
-            self.shared.registry.do_send(CountRefusal);
+            self.registry.do_send(CountRefusal);
         }
     }
 
@@ -274,20 +308,16 @@ impl ClientSession {
     }
 
     /// Makes the client known.
-    async fn connect(
-        &self,
-        outlets: &Outlets,
-        may_use_kept: bool,
-    ) -> Result<ConnectionId, Refused> {
+    async fn connect(&self, outlets: &Outlets, may_use_kept: bool) -> Result<Place, Refused> {
         let connect = Connect {
             outlets: outlets.clone(),
             from: self.ends.peer.ip().to_canonical(),
             may_use_kept,
         };
-        let answer = self.shared.registry.send(connect).await;
+        let answer = self.registry.send(connect).await;
         let id = answer.unwrap_or(Err(Refused::Closed))?;
-        self.shared.id.set(Some(id));
-        Ok(id)
+        let registry = self.registry.clone();
+        Ok(Place { id, registry })
     }
 
     /// Reads until it is clear what is to be done about the client.
@@ -335,32 +365,31 @@ impl ClientSession {
     }
 
     /// Does what is to be done about a client that the registry knows.
-    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: BytesMut, verdict: HowServed)
+    async fn serve<S>(
+        &self,
+        mut stream: S,
+        place: Place,
+        first: BytesMut,
+        verdict: HowServed,
+    ) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         match verdict {
-            HowServed::Json | HowServed::Command | HowServed::Undecided => {
-                self.serve_json(stream, id, first).await;
-            }
+            HowServed::Json | HowServed::Command | HowServed::Undecided => Some(Opened {
+                place,
+                transport: Transport::Plain(stream),
+                first,
+            }),
             #[cfg(feature = "web")]
-            HowServed::Http(due) => self.serve_http(stream, first, due, None).await,
+            HowServed::Http(due) => self.serve_http(stream, first, due, Err(place)).await,
             HowServed::Refused { why, .. } => {
-                let _ = self.shared.registry.send(Disconnect(id)).await;
+                let _ = self.registry.send(Disconnect(place.id)).await;
                 self.refuse(&mut stream, &why).await;
+                None
             }
-            HowServed::Gone => {}
+            HowServed::Gone => None,
         }
-    }
-
-    /// Speaks JSON over the plain stream.
-    async fn serve_json<S>(&self, stream: S, id: ConnectionId, first: BytesMut)
-    where
-        S: AsyncRead + AsyncWrite + Unpin + 'static,
-    {
-        let (input, output) = tokio::io::split(stream);
-        let reader = self.reader(id, FrameReader::new());
-        self.talk(reader, Plain(input), Plain(output), first).await;
     }
 
     /// Reads until the first bytes tell what the client speaks. A client that ends before that counts as one that
@@ -399,7 +428,7 @@ impl ClientSession {
             }
             let read = tokio::select! {
                 biased;
-                () = self.shared.finished() => return DetectedProtocol::Finished,
+                () = self.finish.notified() => return DetectedProtocol::Finished,
                 // A few bytes decide, and there is room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
@@ -430,7 +459,7 @@ impl ClientSession {
             stream.shutdown().await
         };
         if let Ok(Ok(())) = timeout(LINGER, tell).await {
-            discard(Plain(stream)).await;
+            discard(stream).await;
         }
     }
 }

@@ -1,126 +1,132 @@
-//! Transports carry frames between a client and its connection: as plain bytes, or with another protocol around them.
+//! The transport of a client's frames: plain bytes, or a WebSocket around them.
 //!
 //! **Invariant:** the reader sees a stream of bytes in which every frame ends where its braces close or with its line.
-//! The writer hands over whole frames that end in a newline. Both hold for every transport.
+//! The writer hands over whole frames that end in a newline. Both hold for either.
 
-use std::future::Future;
-use std::io::{self, IoSlice};
-use std::time::Duration;
+use std::io;
+use std::pin::Pin;
+use std::task::{Context, Poll};
 
 use bytes::{Bytes, BytesMut};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::time::timeout;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::Instant;
 
-use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
+use super::plain::{self, ClientLost};
+#[cfg(feature = "web")]
+use super::websocket::WebSocket;
 use crate::actors::resources::memory::Permit;
 
-/// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
-pub(super) const CHUNK: usize = 32 * 1024;
+/// The stream of a client that is served, and the protocol on it.
+pub(super) enum Transport<S> {
+    Plain(S),
+    #[cfg(feature = "web")]
+    WebSocket(Box<WebSocket<S>>),
+}
 
-/// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
-/// a socket with unread input resets it.
-const DISCARD_TIME: Duration = Duration::from_secs(1);
-const DISCARD_BYTES: usize = 16 * 1024 * 1024;
+impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
+    /// Whether its frames are messages, which may be binary. Its end is answered by the other side.
+    pub(super) const fn has_messages(&self) -> bool {
+        match self {
+            Self::Plain(_) => false,
+            #[cfg(feature = "web")]
+            Self::WebSocket(_) => true,
+        }
+    }
 
-/// The receiving half.
-pub(super) trait Inbound {
-    /// Appends what is there; 0 at the end of the stream, after which the client may still be reading. Where it
-    /// fails, the client is gone.
-    fn read(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>>;
+    /// Begins another turn of reading: a bounded number of bytes are read in each.
+    pub(super) fn begin_turn(&mut self) {
+        match self {
+            Self::Plain(_) => {}
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.begin_turn(),
+        }
+    }
+
+    /// Appends what is there; 0 at the end of the stream, after which the client may still be reading.
+    pub(super) fn poll_read(
+        &mut self,
+        cx: &mut Context<'_>,
+        chunk: &mut BytesMut,
+    ) -> Poll<Result<usize, ClientLost>> {
+        match self {
+            Self::Plain(stream) => {
+                plain::poll_read(stream, cx, chunk).map(|read| read.map_err(|_| ClientLost::Gone))
+            }
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.poll_read(cx, chunk),
+        }
+    }
+
+    /// Reads from a client that was refused: nothing that comes is looked at.
+    pub(super) fn poll_swallow(
+        &mut self,
+        cx: &mut Context<'_>,
+        chunk: &mut BytesMut,
+    ) -> Poll<io::Result<usize>> {
+        match self {
+            Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
+        }
+    }
 
     /// The room that a long message has taken while it came, if this reads messages.
-    fn take_permit(&mut self) -> Option<Permit> {
-        None
+    pub(super) fn take_permit(&mut self) -> Option<Permit> {
+        match self {
+            Self::Plain(_) => None,
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.take_permit(),
+        }
     }
 
-    /// Reads as [`Inbound::read`] does, from a client that was refused: nothing that comes is looked at.
-    fn swallow(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>> {
-        self.read(chunk)
+    /// Sends some of `frames`, in order, and gives the number of bytes. The rest of a frame comes first in the next
+    /// call; until one is ready, `frames` stay the same.
+    pub(super) fn poll_write(
+        &mut self,
+        cx: &mut Context<'_>,
+        frames: &[Bytes],
+    ) -> Poll<io::Result<usize>> {
+        match self {
+            Self::Plain(stream) => plain::poll_write(stream, cx, frames),
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.poll_write(cx, frames),
+        }
     }
-}
 
-/// The sending half.
-pub(super) trait Outbound {
-    /// Whether the other side answers the end: reading goes on until it has.
-    const END_IS_ANSWERED: bool;
+    /// Sends what the transport itself has to say, if anything. It is called when there is nothing else to send.
+    pub(super) fn send_due_ping(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match self {
+            Self::Plain(_) => {
+                let _ = cx;
+                Poll::Ready(Ok(()))
+            }
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.send_due_ping(cx),
+        }
+    }
 
-    /// Sends some of `frames`, in order, and gives the number of bytes; `None` if the client is gone. The rest of a
-    /// frame comes first in the next call.
-    fn write(&mut self, frames: &[Bytes]) -> impl Future<Output = Option<usize>>;
-
-    /// Sends what the transport itself has to say, if anything; `None` if the client is gone. Called whenever there is
-    /// nothing else to send.
-    fn send_due_ping(&mut self) -> impl Future<Output = Option<()>>;
+    /// When the client last took a byte of a write that goes on. Over TCP a write is over then.
+    pub(super) fn last_taken(&self) -> Option<Instant> {
+        match self {
+            Self::Plain(_) => None,
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.last_taken(),
+        }
+    }
 
     /// Ends the stream in order.
-    fn end(&mut self) -> impl Future<Output = io::Result<()>>;
-}
-
-/// A stream of bytes that carries frames and nothing else.
-pub(super) struct Plain<T>(pub(super) T);
-
-impl<R: AsyncRead + Unpin> Inbound for Plain<R> {
-    async fn read(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
-        read_some(&mut self.0, chunk).await
-    }
-}
-
-impl<W: AsyncWrite + Unpin> Outbound for Plain<W> {
-    const END_IS_ANSWERED: bool = false;
-
-    async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
-        if let [frame] = frames {
-            let offered = frame.get(..WRITE_BYTES).unwrap_or(frame);
-            let written = self.0.write(offered).await;
-            return written.ok().filter(|&written| written > 0);
-        }
-        let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
-        let mut room = WRITE_BYTES;
-        let mut count = 0;
-        for (slice, frame) in slices.iter_mut().zip(frames) {
-            let offered = frame.len().min(room);
-            *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
-            count += 1;
-            room -= offered;
-            if room == 0 {
-                break;
+    pub(super) fn poll_end(
+        &mut self,
+        cx: &mut Context<'_>,
+        is_refused: bool,
+    ) -> Poll<io::Result<()>> {
+        match self {
+            Self::Plain(stream) => {
+                let _ = is_refused;
+                Pin::new(stream).poll_shutdown(cx)
             }
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.poll_end(cx, is_refused),
         }
-        let offered = slices.get(..count).unwrap_or_default();
-        let written = self.0.write_vectored(offered).await;
-        written.ok().filter(|&written| written > 0)
     }
-
-    async fn send_due_ping(&mut self) -> Option<()> {
-        Some(())
-    }
-
-    async fn end(&mut self) -> io::Result<()> {
-        self.0.shutdown().await
-    }
-}
-
-/// Reads what is there; 0 at the end of the stream.
-pub(super) async fn read_some<R: AsyncRead + Unpin>(
-    input: &mut R,
-    chunk: &mut BytesMut,
-) -> io::Result<usize> {
-    chunk.reserve(CHUNK);
-    input.read_buf(chunk).await
-}
-
-/// Swallows a refused client's input for a bounded time.
-pub(super) async fn discard<I: Inbound>(mut input: I) {
-    let mut chunk = BytesMut::new();
-    let swallow = async {
-        let mut swallowed = 0;
-        while swallowed < DISCARD_BYTES {
-            chunk.clear();
-            match input.swallow(&mut chunk).await {
-                Ok(0) | Err(_) => break,
-                Ok(read) => swallowed += read,
-            }
-        }
-    };
-    let _ = timeout(DISCARD_TIME, swallow).await;
 }

@@ -1,30 +1,214 @@
 //! The registry: it knows every client, topic and service, fans messages out to subscribers, and routes calls.
-//! `state.rs` has its state, which is made of `tables/`; `ops/` are the methods that change it.
 //!
-//! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
+//! Here are its state and its handlers. `publish.rs`, `subscriptions.rs` and `requests.rs` have the rosbridge ops, and
+//! the other files its tables, which send nothing.
+//!
+//! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any. A
+//! refused op changes nothing. It is answered by an error status or by the call's one response.
 
-mod nodes;
-mod ops;
+mod directory;
+mod forms;
+mod forwarded;
+mod kept;
 mod places;
+mod publish;
 mod refusal;
-mod state;
-mod tables;
+mod requests;
+mod subscriptions;
+mod topics;
+
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use actix::prelude::*;
+use bytes::Bytes;
 use tokio::sync::oneshot;
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep_until};
 
-pub use self::nodes::{Attach, Nodes};
+use self::directory::{Directory, Served, Use};
+use self::forwarded::Requests;
+use self::kept::{Kept, KeptEntry};
+use self::places::Places;
 use self::refusal::Refusal;
-use self::state::Client;
-pub use self::state::Registry;
+use self::topics::{Subscription, Topics};
 use super::messages::{
-    Connect, CountRefusal, Disconnect, Finish, FinishAll, Handled, RefuseCalls, Refused, Request,
-    Retire, SetTap, TakeCensus, Tapped,
+    Connect, CountRefusal, Disconnect, Finish, FinishAll, Handled, Outlets, RefuseCalls, Refused,
+    Request, Response, Retire, SetTap, TakeCensus, Tap, Tapped,
 };
 use crate::actors::ConnectionId;
-use crate::actors::node::{Publish, Respond};
-use crate::protocol::catalog::Topic;
+use crate::actors::node::{Interest, Respond};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::memory::{Permit, cover};
+pub use crate::actors::wire::Nodes;
+use crate::options::DEFAULT_CLIENTS;
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::{self, ErrorForm, Level};
+use crate::protocol::names;
+use crate::protocol::op::{ActionServerOp, Op, Verbosity};
+use crate::protocol::wire::payload::Payload;
+
+/// Calls, goals and registrations that are ended in a row, which takes a third of a millisecond.
+const ENDED_IN_A_ROW: usize = 128;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The runtime's nodes. From the runtime, once, before any client is accepted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Attach(pub Nodes);
+
+/// The registry actor.
+pub struct Registry {
+    clients: HashMap<ConnectionId, Client>,
+    topics: Topics,
+    directory: Directory,
+    /// Calls and goals that wait for the clients that serve them.
+    calls: Requests,
+    goals: Requests,
+    leftovers: VecDeque<Leftovers>,
+    /// When the next cleanup is, and the task that waits for it.
+    next_cleanup: Option<(Instant, SpawnHandle)>,
+    nodes: Nodes,
+    /// The last message of each latched topic that has subscribers.
+    latched: HashMap<Topic, Bytes>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    fragmented: Arc<AtomicU64>,
+    gauges: Arc<Gauges>,
+    places: Places,
+    connections_made: u64,
+    /// Copies what passes to the recorder, while it records.
+    tap: Option<Tap>,
+    /// Why no call is taken any more, once the runtime is ending.
+    closed: Option<&'static str>,
+    /// The room that the frame takes whose op is being performed, if it is a long one.
+    permit: Option<Permit>,
+}
+
+/// One client, as the registry knows it.
+struct Client {
+    outlets: Outlets,
+    /// Its address.
+    from: IpAddr,
+    /// The room of all that it has registered, and of calls and goals that wait for other clients.
+    kept: Kept,
+    registered: Registrations,
+    /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
+    /// dropped until it advertises again.
+    withdrawn: HashSet<Topic>,
+    /// Statuses that it wants.
+    verbosity: Verbosity,
+    /// Ends with the client.
+    present: Arc<()>,
+    /// Ends with the client, and when it unsubscribes from the feedback of goals that it has published.
+    listening: Arc<()>,
+    /// A guard that is dropped once no call of this client waits, if it has stopped sending.
+    answered: Option<oneshot::Sender<()>>,
+}
+
+/// All that one client has registered, in order of the names: owners of topics hear of its going in that order.
+#[derive(Default)]
+struct Registrations {
+    advertised: BTreeMap<Box<str>, KeptEntry>,
+    /// Its subscriptions, by its spelling of the topic.
+    subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
+    services: BTreeMap<Box<str>, KeptEntry>,
+    actions: BTreeMap<Box<str>, KeptEntry>,
+}
+
+/// What is left of a client that has gone: calls and goals that it has not answered, and its registrations.
+struct Leftovers {
+    client: ConnectionId,
+    requests: VecDeque<(Served, u64)>,
+    registered: Registrations,
+}
+
+/// The sender of the frame that is being performed, and the frame's `id`.
+struct FrameOrigin {
+    from: ConnectionId,
+    id: Option<Payload>,
+}
+
+impl Registry {
+    /// A registry without nodes; they come with [`Attach`].
+    #[must_use]
+    pub fn new(gauges: Arc<Gauges>) -> Self {
+        Self {
+            clients: HashMap::new(),
+            topics: Topics::default(),
+            directory: Directory::default(),
+            calls: Requests::default(),
+            goals: Requests::default(),
+            leftovers: VecDeque::new(),
+            next_cleanup: None,
+            nodes: Nodes::default(),
+            latched: HashMap::new(),
+            fragmented: Arc::default(),
+            gauges,
+            places: Places::of(DEFAULT_CLIENTS),
+            connections_made: 0,
+            tap: None,
+            closed: None,
+            permit: None,
+        }
+    }
+
+    /// A registry without nodes, for at most so many clients at once.
+    #[must_use]
+    pub fn serving_at_most(self, clients: usize) -> Self {
+        let places = Places::of(clients);
+        Self { places, ..self }
+    }
+}
+
+impl Client {
+    fn new(outlets: Outlets, from: IpAddr) -> Self {
+        Self {
+            outlets,
+            from,
+            kept: Kept::default(),
+            registered: Registrations::default(),
+            withdrawn: HashSet::new(),
+            verbosity: Verbosity::ALL,
+            present: Arc::default(),
+            listening: Arc::default(),
+            answered: None,
+        }
+    }
+
+    /// Sends a status, a forwarded call or another client's response.
+    fn send(&self, frame: Bytes) {
+        self.respond(frame, None);
+    }
+
+    /// Sends a response, of one of the runtime's own services if there is one given.
+    fn respond(&self, frame: Bytes, service: Option<Service>) {
+        self.outlets.respond.do_send(Response { frame, service });
+    }
+
+    /// Sets the form in which the client is told why a call failed, if one is given.
+    fn set_error_form(&self, form: Option<ErrorForm>) {
+        if let Some(form) = form {
+            let wants_text = form == ErrorForm::Text;
+            self.outlets.wants_text.store(wants_text, Ordering::Relaxed);
+        }
+    }
+
+    /// Bytes of responses that it has not taken yet.
+    fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
+    }
+}
+
+impl Registrations {
+    fn served(&mut self, kind: Served) -> &mut BTreeMap<Box<str>, KeptEntry> {
+        match kind {
+            Served::Service => &mut self.services,
+            Served::Action => &mut self.actions,
+        }
+    }
+}
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
@@ -69,7 +253,11 @@ impl Handler<CountRefusal> for Registry {
         let Some(refused) = self.places.count_refusal(Instant::now()) else {
             return;
         };
-        if let Some((most_from, held)) = self.most_places() {
+        let mut held: BTreeMap<IpAddr, usize> = BTreeMap::new();
+        for client in self.clients.values() {
+            *held.entry(client.from).or_default() += 1;
+        }
+        if let Some((most_from, held)) = held.into_iter().max_by_key(|(_, held)| *held) {
             let (places, taken) = (self.places.clients(), self.clients.len());
             tracing::warn!(
                 places,
@@ -89,7 +277,7 @@ impl Handler<Retire> for Registry {
     fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
         self.schedule_cleanup(ctx);
-        if self.services.waiting_for(id) == 0 {
+        if self.calls.waiting_for(id) == 0 {
             return Handled::at_once();
         }
         let (answered, all_answered) = oneshot::channel();
@@ -104,7 +292,13 @@ impl Handler<Disconnect> for Registry {
     type Result = ();
 
     fn handle(&mut self, Disconnect(id): Disconnect, ctx: &mut Context<Self>) {
-        self.forget(id);
+        self.withdraw(id);
+        self.calls.forget_caller(id);
+        self.goals.forget_caller(id);
+        if let Some(client) = self.clients.remove(&id) {
+            client.outlets.gone.store(true, Ordering::Relaxed);
+            self.gauges.set_connections(self.clients.len() as u64);
+        }
         self.schedule_cleanup(ctx);
     }
 }
@@ -123,14 +317,6 @@ impl Handler<Request> for Registry {
     }
 }
 
-impl Handler<Publish> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, publish: Publish, ctx: &mut Context<Self>) {
-        self.publish_own(publish, ctx);
-    }
-}
-
 impl Handler<Respond> for Registry {
     type Result = ();
 
@@ -141,8 +327,8 @@ impl Handler<Respond> for Registry {
                 .is_none_or(|level| client.verbosity.wants(level))
         {
             let frame = respond.frame.write();
-            if let Some(service) = respond.service {
-                self.tap.pass(Tapped::Answered {
+            if let (Some(tap), Some(service)) = (&mut self.tap, respond.service) {
+                tap(Tapped::Answered {
                     to: respond.connection,
                     service,
                     frame: &frame,
@@ -157,7 +343,7 @@ impl Handler<TakeCensus> for Registry {
     type Result = MessageResult<TakeCensus>;
 
     fn handle(&mut self, take: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.tally.census(take.at_most))
+        MessageResult(self.directory.census(take.at_most))
     }
 }
 
@@ -170,18 +356,20 @@ impl Handler<SetTap> for Registry {
             .into_iter()
             .filter(|topic| !self.topics.has_subscribers(topic))
             .collect();
-        let was_set = self.tap.is_set();
-        self.tap.set(tap);
+        let was_set = self.tap.is_some();
+        self.tap = tap;
         for topic in unwanted {
-            match (was_set, self.tap.is_set()) {
+            match (was_set, self.tap.is_some()) {
                 (_, true) => self.tell_owner(topic, true),
                 (true, false) => self.note_unwanted(topic),
                 (false, false) => {}
             }
         }
         for (topic, frame) in &self.latched {
-            if self.topics.has_subscribers(topic.name()) {
-                self.tap.pass(Tapped::Published(*topic, frame));
+            if let Some(tap) = &mut self.tap
+                && self.topics.has_subscribers(topic.name())
+            {
+                tap(Tapped::Published(*topic, frame));
             }
         }
     }
@@ -192,11 +380,10 @@ impl Handler<RefuseCalls> for Registry {
 
     fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
         self.closed = Some(why);
-        for call in self.services.take_all() {
-            self.answer_forwarded(&call, &Refusal::Closed(why));
-        }
-        for goal in self.action_servers.take_all() {
-            self.abort(&goal, &Refusal::Closed(why));
+        for kind in [Served::Service, Served::Action] {
+            for request in self.requests(kind).take_all() {
+                self.fail(&request, &Refusal::Closed(why));
+            }
         }
     }
 }
@@ -210,6 +397,250 @@ impl Handler<FinishAll> for Registry {
         clients.sort_unstable_by_key(|(id, _)| **id);
         for (_, client) in clients {
             client.outlets.finish.do_send(Finish);
+        }
+    }
+}
+
+// ---- ops ------------------------------------------------------------------------------------------------------------
+
+impl Registry {
+    /// Performs one op of a client that is known.
+    fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        let Request { from, id, op, .. } = request;
+        let origin = FrameOrigin { from, id };
+        let refusal = match op {
+            Op::Publish { topic, msg, heard } => {
+                return self.publish(origin, &topic, &msg, heard, ctx);
+            }
+            Op::PublishLines(lines) => return self.publish_lines(from, &lines, ctx),
+            Op::CallService(call) => return self.call(origin, call, ctx),
+            Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal, ctx),
+            Op::CancelActionGoal { action } => {
+                return self.cancel_action_goal(origin, &action, ctx);
+            }
+            Op::Advertise { topic, type_name } => {
+                self.advertise(&origin, &topic, type_name.as_deref())
+            }
+            Op::Unadvertise { topic } => {
+                self.unadvertise(&origin, &topic);
+                Ok(())
+            }
+            Op::Subscribe(subscribe) => self.subscribe(&origin, &subscribe),
+            Op::Unsubscribe { topic } => {
+                self.unsubscribe(&origin, &topic);
+                Ok(())
+            }
+            Op::SetLevel { verbosity, errors } => {
+                if let Some(client) = self.clients.get_mut(&from) {
+                    client.verbosity = verbosity;
+                    client.set_error_form(errors);
+                }
+                Ok(())
+            }
+            op => self.perform_as_provider(&origin, op),
+        };
+        if let Err(why) = refusal {
+            self.refuse(&origin, &why);
+        }
+        Handled::at_once()
+    }
+
+    /// Performs an op of a client that serves others: it advertises a service or an action, or answers.
+    fn perform_as_provider(&mut self, origin: &FrameOrigin, op: Op) -> Result<(), Refusal> {
+        match op {
+            Op::AdvertiseService { service, type_name } => {
+                self.serve(origin, Served::Service, &service, type_name.as_deref())
+            }
+            Op::UnadvertiseService { service } => {
+                self.stop_serving(origin, Served::Service, &service)
+            }
+            Op::ServeAction { action, op } => match op {
+                ActionServerOp::Advertise { type_name } => {
+                    self.serve(origin, Served::Action, &action, type_name.as_deref())
+                }
+                ActionServerOp::Unadvertise => self.stop_serving(origin, Served::Action, &action),
+                ActionServerOp::Feedback { values } => self.pass_feedback(origin, &action, &values),
+                ActionServerOp::End {
+                    values,
+                    status,
+                    result,
+                } => self.complete(origin, Served::Action, &action, |name, id| {
+                    messages::action_result_raw(name, id, &values, status, result)
+                }),
+            },
+            Op::ServiceResponse {
+                service,
+                values,
+                result,
+                status,
+            } => {
+                let status = status.unwrap_or_default();
+                self.complete(origin, Served::Service, &service, |service, id| {
+                    messages::response_raw(service, id, &values, result, &status)
+                })
+            }
+            Op::BadAnswer {
+                of_goal,
+                name,
+                problem,
+            } => {
+                let kind = if of_goal {
+                    Served::Action
+                } else {
+                    Served::Service
+                };
+                self.fail_answered(origin, kind, name.as_deref(), problem)
+            }
+            // Pieces have been put together before, and so has a token been checked; where none is asked for, any token
+            // will do.
+            _ => Ok(()),
+        }
+    }
+
+    /// Tells the sender of a frame by an error status why nothing came of it.
+    fn refuse(&self, origin: &FrameOrigin, why: &Refusal) {
+        self.send_status(
+            origin.from,
+            Level::Error,
+            &why.to_string(),
+            origin.id.as_ref(),
+        );
+    }
+
+    fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) {
+        if level == Level::Error {
+            tracing::debug!(connection = to.0, why = msg, "refused");
+        }
+        if let Some(client) = self.clients.get(&to)
+            && client.verbosity.wants(level)
+        {
+            client.send(messages::status(level, msg, id));
+        }
+    }
+
+    /// The frame, with the room that the long frame takes which it has come of.
+    fn covered(&self, frame: Bytes) -> Bytes {
+        cover(self.permit.as_ref(), frame)
+    }
+
+    fn requests(&mut self, kind: Served) -> &mut Requests {
+        match kind {
+            Served::Service => &mut self.calls,
+            Served::Action => &mut self.goals,
+        }
+    }
+
+    /// Whether messages on the topic of that absolute name are to be made.
+    fn is_wanted(&self, topic: &str) -> bool {
+        self.tap.is_some() || self.topics.has_subscribers(topic)
+    }
+
+    /// Notes that nobody wants messages on that topic any more.
+    fn note_unwanted(&mut self, topic: &str) {
+        if let Some(topic) = Topic::from_name(topic) {
+            self.latched.remove(&topic);
+        }
+        self.tell_owner(topic, false);
+    }
+
+    fn tell_owner(&self, topic: &str, wanted: bool) {
+        if let Some(topic) = Topic::from_name(topic)
+            && let Some(owner) = self.nodes.publishers.get(&topic)
+        {
+            owner.do_send(Interest { topic, wanted });
+        }
+    }
+}
+
+// ---- cleanup: however many end at one instant, all others have a turn after every few of them -----------------------
+
+impl Registry {
+    /// Leaves all that a client has registered to the cleanup, with the calls and goals that wait for its answer.
+    fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        let registered = std::mem::take(&mut client.registered);
+        let goals = self.goals.take_numbers(id).into_iter();
+        let calls = self.calls.take_numbers(id).into_iter();
+        self.leftovers.push_back(Leftovers {
+            client: id,
+            requests: goals
+                .map(|number| (Served::Action, number))
+                .chain(calls.map(|number| (Served::Service, number)))
+                .collect(),
+            registered,
+        });
+    }
+
+    /// Schedules the next cleanup: at once if there are leftovers, else when the first call's time is over.
+    fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
+        let left = (!self.leftovers.is_empty()).then(Instant::now);
+        let Some(due) = left.or_else(|| self.calls.next_deadline()) else {
+            return;
+        };
+        if let Some((at, waiting)) = self.next_cleanup {
+            if at <= due {
+                return;
+            }
+            ctx.cancel_future(waiting);
+        }
+        let wait = async move {
+            tokio::task::yield_now().await;
+            sleep_until(due).await;
+        };
+        let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
+            registry.next_cleanup = None;
+            registry.clean_up_some();
+            registry.schedule_cleanup(ctx);
+        }));
+        self.next_cleanup = Some((due, waiting));
+    }
+
+    /// Ends some of what is to be ended: calls whose time is over first.
+    fn clean_up_some(&mut self) {
+        let now = Instant::now();
+        for _ in 0..ENDED_IN_A_ROW {
+            if let Some(call) = self.calls.take_due(now) {
+                self.fail(&call, &Refusal::TimedOut(call.name.to_string()));
+                continue;
+            }
+            let Some(left) = self.leftovers.front_mut() else {
+                return;
+            };
+            let client = left.client;
+            if let Some((kind, number)) = left.requests.pop_front() {
+                // It may have ended otherwise.
+                if let Some(request) = self.requests(kind).take(number) {
+                    self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
+                }
+            } else if let Some((topic, _entry)) = left.registered.advertised.pop_first() {
+                self.directory.remove(&topic, Use::Advertised);
+            } else if let Some((topic, _entries)) = left.registered.subscriptions.pop_first() {
+                self.drop_subscriber(&topic, client);
+            } else if let Some((service, _entry)) = left.registered.services.pop_first() {
+                self.directory.withdraw(Served::Service, &service, client);
+            } else if let Some((action, _entry)) = left.registered.actions.pop_first() {
+                self.directory.withdraw(Served::Action, &action, client);
+            } else {
+                self.leftovers.pop_front();
+            }
+        }
+    }
+
+    /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
+    fn drop_subscriber(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+        let name = names::absolute(topic);
+        self.topics.remove(topic, connection);
+        self.directory.remove(&name, Use::Subscribed);
+        if let Some(client) = self.clients.get_mut(&connection)
+            && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
+            && !names::spellings(&name).any(|one| client.registered.subscriptions.contains_key(one))
+        {
+            client.listening = Arc::default();
+        }
+        if !self.is_wanted(&name) {
+            self.note_unwanted(&name);
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** every sentence begins with the field it is about, or names the service.
 
+use super::directory::Served;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
 use crate::protocol::op::Problem;
 use crate::services::NoService;
@@ -22,20 +23,20 @@ pub(crate) enum Refusal {
     UnknownType,
     #[error("id: a subscription's id has at most {0} bytes")]
     LongSubscriptionId(usize),
-    #[error("service: {0} is provided by the runtime itself")]
-    RuntimeService(String),
-    #[error("service: this connection does not provide {0}")]
-    NotProvider(String),
+    #[error("{noun}: {1} is {verb}d by the runtime itself", noun = .0.noun(), verb = .0.verb())]
+    OfRuntime(Served, String),
+    #[error("{noun}: this connection does not {verb} {1}", noun = .0.noun(), verb = .0.verb())]
+    NotServed(Served, String),
+    #[error("{noun}: the {request} with this id is of {1}", noun = .0.noun(), request = .0.request())]
+    OfAnother(Served, String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
+    #[error("id: this connection carries out no goal of {0} with this id")]
+    StaleGoal(String),
     #[error("{0}")]
     Unreadable(Problem),
     #[error("the answer of {0} was discarded: {1}")]
     BadAnswer(String, Box<Self>),
-    #[error("service: the call with this id is of {0}")]
-    OtherService(String),
-    #[error("action: the goal with this id is of {0}")]
-    OtherAction(String),
     #[error("args must be an object or an array")]
     BadArguments,
     #[error(transparent)]
@@ -50,12 +51,6 @@ pub(crate) enum Refusal {
         "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
     )]
     CallerBusy(String),
-    #[error("action: {0} is served by the runtime itself")]
-    RuntimeAction(String),
-    #[error("action: this connection does not serve {0}")]
-    NotActionServer(String),
-    #[error("id: this connection carries out no goal of {0} with this id")]
-    StaleGoal(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]
     NoGoal(String),
     #[error("action: no action is called {0}")]

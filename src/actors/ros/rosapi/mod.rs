@@ -8,7 +8,6 @@
 
 mod services;
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -140,7 +139,7 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
 }
 
 /// Answers with what was asked about a census.
-fn list(reply: &mut Reply<Listing>, look: Look, census: Arc<Census>) {
+fn list(reply: &mut Reply<Listing>, look: Look, census: Census) {
     let mut pieces = reply.answer_in_pieces(Listing { look, census });
     while !pieces.advance() {}
 }

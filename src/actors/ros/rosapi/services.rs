@@ -4,7 +4,6 @@
 //! exist gets as far as the node, which says so.
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
 use bytes::Bytes;
 use serde_json::value::RawValue;
@@ -37,7 +36,7 @@ pub struct Listing {
     /// The question.
     pub look: Look,
     /// Topics and services of clients.
-    pub census: Arc<Census>,
+    pub census: Census,
 }
 
 impl Ask for Look {

@@ -7,7 +7,7 @@ use tokio::io::AsyncRead;
 use tokio::time::{Instant, timeout_at};
 
 use super::MAX_AUTH_BYTES;
-use crate::actors::gateway::connection::transport::read_some;
+use crate::actors::gateway::connection::plain::read_some;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
 use crate::protocol::op::{self, Op};

@@ -1,0 +1,337 @@
+//! From a frame to its effect: a piece cut off the stream becomes an op, which the registry performs.
+//!
+//! **Invariant:** every frame becomes one op or one complaint, and an op has taken effect when its frame is done with.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::time::Instant;
+
+use crate::actors::ConnectionId;
+use crate::actors::gateway::messages::{Request, Respond, form_of};
+use crate::actors::gateway::registry::Registry;
+use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::awake::stay_awake;
+use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
+use crate::protocol::catalog::Service;
+use crate::protocol::limits::MEDIUM;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::op::{
+    self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
+};
+use crate::protocol::wire::fragments::Fragments;
+use crate::protocol::wire::frame::{
+    Foreign, FrameError, FramePart, FrameReader, RawFrame, is_host_line,
+};
+use crate::protocol::wire::payload::Payload;
+
+/// The error for a client that asks for binary frames over raw TCP.
+const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; \
+                         over raw TCP every frame is a line of JSON";
+const NESTED_FRAGMENT: &str = "fragment: the pieces make a fragment again";
+const UNREADABLE: &str = "a frame could not be read";
+
+/// What is left to do once a part of the stream has been performed.
+pub(super) enum OpOutcome {
+    /// Nothing.
+    Done,
+    /// The computation runs when its turn comes. It came in a frame of that length.
+    Computation(Request, usize),
+    /// The client is refused, and gets this status: it has not done what it has to, or speaks another protocol.
+    Refused(Bytes),
+}
+
+/// Performs the ops of one client, one at a time. It goes into the future of an op and comes back with its end.
+pub(super) struct Performer {
+    id: ConnectionId,
+    registry: Addr<Registry>,
+    /// Where long frames find their room.
+    memory: Memory,
+    /// Set while the client is told why a call failed in `values` too.
+    wants_text: Arc<AtomicBool>,
+    /// Whether frames may be binary: over raw TCP they are lines of text.
+    takes_binary: bool,
+    /// Frames that come in pieces.
+    pub(super) fragments: Fragments,
+    /// The room for those pieces, once they are long together.
+    pieces: Option<Permit>,
+    /// The room for the long frame that is coming.
+    pub(super) coming: Option<Permit>,
+    /// The room for the long frame that has come, until its client may be read again: then the answers to it have been
+    /// written.
+    performed: Option<Permit>,
+    /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
+    speaks_json: bool,
+}
+
+impl Performer {
+    pub(super) fn new(
+        id: ConnectionId,
+        registry: Addr<Registry>,
+        memory: Memory,
+        wants_text: Arc<AtomicBool>,
+        takes_binary: bool,
+    ) -> Self {
+        Self {
+            id,
+            registry,
+            memory,
+            wants_text,
+            takes_binary,
+            fragments: Fragments::default(),
+            pieces: None,
+            coming: None,
+            performed: None,
+            speaks_json: false,
+        }
+    }
+
+    /// The room for a long frame: the client has some for pieces, or it is waited for. Nobody waits who has room: that
+    /// might be what others wait for.
+    pub(super) fn room(&self) -> impl Future<Output = Permit> + 'static {
+        let (pieces, memory) = (self.pieces.clone(), self.memory.clone());
+        async move {
+            match pieces {
+                Some(permit) => permit,
+                None => memory.long_frame().await,
+            }
+        }
+    }
+
+    async fn permit(&mut self) -> Permit {
+        match self.coming.take() {
+            Some(permit) => permit,
+            None => self.room().await,
+        }
+    }
+
+    /// The client may be read again: the room for its last frame is given back.
+    pub(super) fn give_back(&mut self) {
+        self.performed = None;
+        if self.fragments.allocated() == 0 {
+            self.pieces = None;
+        }
+    }
+
+    /// Pieces of messages that have not come in time are forgotten, and their room is given back.
+    pub(super) fn forget_old_pieces(&mut self) {
+        self.fragments.forget_old(Instant::now().into_std());
+        if self.fragments.allocated() == 0 {
+            self.pieces = None;
+        }
+    }
+
+    /// Performs what has been cut off the stream, to its end.
+    pub(super) async fn take(mut self, cut: FramePart) -> (Self, OpOutcome) {
+        let outcome = self.perform_part(cut).await;
+        self.coming = None;
+        (self, outcome)
+    }
+
+    /// Tells the client what is wrong with the end of its stream.
+    pub(super) async fn take_end(self, error: FrameError) -> (Self, OpOutcome) {
+        let outcome = self.complain(&error.to_string(), None).await;
+        (self, outcome)
+    }
+
+    async fn perform_part(&mut self, cut: FramePart) -> OpOutcome {
+        let frame = match cut {
+            FramePart::Frame(frame) => frame,
+            FramePart::Lines(lines) => {
+                self.speaks_json = true;
+                return self.perform(None, Op::PublishLines(lines), 0).await;
+            }
+            FramePart::Error(FrameError::NotAnObject(start), _)
+                if !self.speaks_json && !self.takes_binary && is_host_line(&start) =>
+            {
+                return OpOutcome::Refused(refusal(Foreign::Http.explanation()));
+            }
+            FramePart::Error(error, start) => {
+                return self.act_on(op::read_start(&start, &error), 0).await;
+            }
+        };
+        self.speaks_json = true;
+        let length = frame.len();
+        if length > MEDIUM {
+            self.performed = Some(self.permit().await);
+        }
+        let Some(incoming) = read_frame(length, move || read(frame)).await else {
+            return OpOutcome::Refused(refusal(UNREADABLE));
+        };
+        let is_published = matches!(incoming.op, Ok(Op::Publish { .. } | Op::Fragment(_)));
+        if length > SHORT && !is_published && self.performed.is_none() {
+            self.performed = Some(self.permit().await);
+        }
+        match self.assemble(incoming, length).await {
+            Ok((incoming, length)) => self.act_on(incoming, length).await,
+            Err(outcome) => outcome,
+        }
+    }
+
+    /// Acts on a frame that was read.
+    async fn act_on(&self, incoming: Incoming, length: usize) -> OpOutcome {
+        let Incoming { id, op } = incoming;
+        match op {
+            Ok(Op::Subscribe(Subscribe { encoding, .. }))
+                if encoding.compression != Compression::None && !self.takes_binary =>
+            {
+                self.complain(NO_BINARY, id.as_ref()).await
+            }
+            Ok(op) => self.perform(id, op, length).await,
+            Err(OpError::Call { service, problem }) => {
+                let why = problem.to_string();
+                let form = form_of(&self.wants_text);
+                self.say(messages::failure(&service, id.as_ref(), &why, form), None)
+                    .await
+            }
+            Err(OpError::Goal { action, problem }) => {
+                let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
+                // Over WebSocket only a client that has asked for statuses is sent any.
+                self.complain(&why, id).await;
+                let result = messages::action_result(&action, id, &why, status as u8, false);
+                self.say(result, None).await
+            }
+            Err(OpError::Status(problem)) => self.complain(&problem.to_string(), id.as_ref()).await,
+        }
+    }
+
+    /// Returns `incoming` unless it is a fragment. For a fragment, returns the whole frame once the last piece is
+    /// there. With it comes the length of the frame.
+    async fn assemble(
+        &mut self,
+        incoming: Incoming,
+        length: usize,
+    ) -> Result<(Incoming, usize), OpOutcome> {
+        let Ok(Op::Fragment(piece)) = incoming.op else {
+            return Ok((incoming, length));
+        };
+        let id = incoming.id;
+        if self.pieces.is_none() && self.fragments.allocated() + length > SHORT {
+            self.pieces = Some(match self.performed.take() {
+                Some(permit) => permit,
+                None => self.permit().await,
+            });
+        }
+        let whole = match self.fragments.take(piece, Instant::now().into_std()) {
+            Ok(whole) => whole.ok_or(OpOutcome::Done)?,
+            Err(why) => {
+                let refused = op::read_start(&self.fragments.take_refused(), &why);
+                return Ok((under_id(refused, id), 0));
+            }
+        };
+        let length = whole.bytes();
+        if self.fragments.allocated() == 0 {
+            self.performed = self.pieces.take();
+        } else {
+            self.performed.clone_from(&self.pieces);
+        }
+        let whole = match read_frame(length, move || read_whole(&whole.text())).await {
+            Some(Some(whole)) => whole,
+            Some(None) => return Err(OpOutcome::Done),
+            None => return Err(OpOutcome::Refused(refusal(UNREADABLE))),
+        };
+        let whole = match whole.op {
+            Ok(Op::Fragment(_)) => Incoming {
+                id,
+                op: Err(OpError::Status(Problem::NotAFrame(
+                    NESTED_FRAGMENT.to_owned(),
+                ))),
+            },
+            Err(OpError::Status(Problem::NotAFrame(_))) => under_id(whole, id),
+            _ => whole,
+        };
+        Ok((whole, length))
+    }
+
+    /// Sends the client an error status.
+    async fn complain(&self, why: &str, id: Option<&Payload>) -> OpOutcome {
+        tracing::debug!(connection = self.id.0, why, "refused");
+        self.say(messages::status(Level::Error, why, id), Some(Level::Error))
+            .await
+    }
+
+    /// Sends a frame to the client by way of the registry: a response to an earlier frame may still be in its mailbox,
+    /// and must not be overtaken.
+    async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
+        let respond = Respond {
+            connection: self.id,
+            frame: cover(self.performed.as_ref(), frame).into(),
+            service: None,
+            status,
+            done: None,
+        };
+        let _ = self.registry.send(respond).await;
+        OpOutcome::Done
+    }
+
+    /// Has the registry perform an op, which came in a frame of that length.
+    async fn perform(&self, id: Option<Payload>, op: Op, length: usize) -> OpOutcome {
+        let is_computation = matches!(&op, Op::CallService(CallService { service, .. })
+            if Service::from_name(service).is_some_and(Service::is_computation));
+        let from = self.id;
+        let permit = self.performed.clone();
+        let request = Request {
+            from,
+            id,
+            op,
+            permit,
+        };
+        if is_computation {
+            return OpOutcome::Computation(request, length);
+        }
+        if let Ok(handled) = self.registry.send(request).await {
+            if handled.is_with_a_node() {
+                stay_awake();
+            }
+            handled.effect().await;
+        }
+        OpOutcome::Done
+    }
+}
+
+/// The status for a client that is refused for that reason.
+pub(super) fn refusal(why: &str) -> Bytes {
+    messages::status(Level::Error, why, None)
+}
+
+/// Reads a frame of `length` bytes: a long one on another thread, while the other clients are served. `None` if that
+/// failed.
+async fn read_frame<T: Send + 'static>(
+    length: usize,
+    read: impl FnOnce() -> T + Send + 'static,
+) -> Option<T> {
+    if length <= SHORT {
+        return Some(read());
+    }
+    aside(WorkKind::reading(length), read).await
+}
+
+/// An error that is told under the id of the pieces, unless it ends a call.
+fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
+    match incoming.op {
+        Err(_) => Incoming { id, ..incoming },
+        Ok(_) => incoming,
+    }
+}
+
+fn read(frame: RawFrame) -> Incoming {
+    match frame.decode() {
+        Ok(frame) => op::read(&frame.text),
+        Err((error, start)) => op::read_start(&start, &error),
+    }
+}
+
+/// Reads a frame that came in pieces, under the same bounds and with the same leniency as any other. `None` if there is
+/// nothing but white space. Nothing is done of a text with more than one frame.
+fn read_whole(text: &str) -> Option<Incoming> {
+    let mut frames = FrameReader::new();
+    frames.push(text.as_bytes());
+    frames.push(b"\n");
+    Some(match (frames.next_raw()?, frames.next_raw()) {
+        (Ok(_), Some(_)) => op::read_start(text.as_bytes(), &FrameError::MoreBehind),
+        (Ok(frame), None) => read(frame),
+        (Err(error), _) => op::read_start(text.as_bytes(), &error),
+    })
+}

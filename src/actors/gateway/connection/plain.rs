@@ -1,0 +1,104 @@
+//! A stream of bytes that carries frames and nothing else.
+//!
+//! **Invariant:** one poll reads and writes a bounded number of bytes.
+
+use std::io::{self, IoSlice};
+use std::pin::{Pin, pin};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use bytes::{Bytes, BytesMut};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
+use tokio::time::timeout;
+
+use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
+
+/// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
+pub(super) const CHUNK: usize = 32 * 1024;
+
+/// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
+/// a socket with unread input resets it.
+pub(super) const DISCARD_TIME: Duration = Duration::from_secs(1);
+pub(super) const DISCARD_BYTES: usize = 16 * 1024 * 1024;
+
+/// Why a client can't be read any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ClientLost {
+    /// It is gone.
+    Gone,
+    /// It has broken a rule, and hears so at the end.
+    #[cfg(feature = "web")]
+    Refused,
+}
+
+/// Has the task polled again once other tasks and sockets have had a turn. To wake it at once would put it before them.
+pub(super) fn yield_turn(cx: &mut Context<'_>) {
+    // The wake-up comes though the future is dropped.
+    let _ = pin!(tokio::task::yield_now()).poll(cx);
+}
+
+/// Appends what is there to `chunk`; 0 at the end of the stream.
+pub(super) fn poll_read<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    cx: &mut Context<'_>,
+    chunk: &mut BytesMut,
+) -> Poll<io::Result<usize>> {
+    pin!(read_some(stream, chunk)).poll(cx)
+}
+
+/// The same for a task of its own.
+pub(super) async fn read_some<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    chunk: &mut BytesMut,
+) -> io::Result<usize> {
+    chunk.reserve(CHUNK);
+    stream.read_buf(chunk).await
+}
+
+/// Writes some of `frames`, in order, and gives the number of bytes.
+pub(super) fn poll_write<S: AsyncWrite + Unpin>(
+    stream: &mut S,
+    cx: &mut Context<'_>,
+    frames: &[Bytes],
+) -> Poll<io::Result<usize>> {
+    let stream = Pin::new(stream);
+    let written = if let [frame] = frames {
+        let offered = frame.get(..WRITE_BYTES).unwrap_or(frame);
+        ready!(stream.poll_write(cx, offered))?
+    } else {
+        let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
+        let mut room = WRITE_BYTES;
+        let mut count = 0;
+        for (slice, frame) in slices.iter_mut().zip(frames) {
+            let offered = frame.len().min(room);
+            *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
+            count += 1;
+            room -= offered;
+            if room == 0 {
+                break;
+            }
+        }
+        let offered = slices.get(..count).unwrap_or_default();
+        ready!(stream.poll_write_vectored(cx, offered))?
+    };
+    Poll::Ready(match written {
+        0 => Err(io::ErrorKind::WriteZero.into()),
+        written => Ok(written),
+    })
+}
+
+/// Swallows a refused client's input for a bounded time.
+pub(super) async fn discard<S: AsyncRead + Unpin>(stream: &mut S) {
+    let mut chunk = BytesMut::new();
+    let swallow = async {
+        let mut swallowed = 0;
+        while swallowed < DISCARD_BYTES {
+            chunk.clear();
+            match read_some(stream, &mut chunk).await {
+                Ok(0) | Err(_) => break,
+                Ok(read) => swallowed += read,
+            }
+        }
+    };
+    let _ = timeout(DISCARD_TIME, swallow).await;
+}

@@ -1,0 +1,146 @@
+//! Writing to one client: drains the outbox, several frames at a time. Nothing else writes to the socket of a client
+//! that is served.
+//!
+//! The writer is polled after each message that the actor has handled, so the contents of the outbox are offered to the
+//! socket in the same turn.
+//!
+//! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever. One
+//! poll writes a bounded number of bytes.
+
+use std::pin::Pin;
+use std::task::{self, Poll, ready};
+
+use actix::prelude::*;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::Instant;
+
+use super::Connection;
+use super::plain::yield_turn;
+use super::timer::Timer;
+use super::transport::Transport;
+use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
+use crate::actors::panics::contain;
+
+/// The writing half of a connection: it ends the connection.
+#[derive(Default)]
+pub(super) struct Writing {
+    timer: Timer,
+    /// By when the end of the stream has to be out.
+    end_due: Option<Instant>,
+    /// All has been written; the reader may go on.
+    is_all_written: bool,
+    /// Until when it may, if the other side answers the end.
+    answer_due: Option<Instant>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for Writing {
+    type Output = ();
+
+    fn poll(
+        self: Pin<&mut Self>,
+        connection: &mut Connection<S>,
+        ctx: &mut Context<Connection<S>>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        let this = self.get_mut();
+        let polled = contain(|| this.poll_to_the_end(connection, cx));
+        connection.outgoing.end_turn();
+        match polled {
+            Ok(Poll::Pending) => return Poll::Pending,
+            Ok(Poll::Ready(())) => {}
+            Err(panic) => tracing::error!(%panic, "a client's writer failed; its connection ends"),
+        }
+        ctx.stop();
+        Poll::Ready(())
+    }
+}
+
+impl Writing {
+    /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+    fn poll_to_the_end<S: AsyncRead + AsyncWrite + Unpin + 'static>(
+        &mut self,
+        connection: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
+        if !self.is_all_written {
+            let is_all_written = ready!(self.poll_write(connection, cx));
+            let transport = connection.transport.as_ref();
+            let is_answered = transport.is_some_and(Transport::has_messages);
+            if !is_all_written || !(connection.is_refused || is_answered) {
+                return Poll::Ready(());
+            }
+            self.is_all_written = true;
+            if !connection.is_refused {
+                self.answer_due = Some(Instant::now() + LINGER);
+            }
+        }
+        if connection.is_read_to_its_end {
+            return Poll::Ready(());
+        }
+        self.timer.poll(self.answer_due, cx)
+    }
+
+    /// Writes what there is. Ready at the end: whether all that was queued has been written.
+    fn poll_write<S: AsyncRead + AsyncWrite + Unpin + 'static>(
+        &mut self,
+        connection: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<bool> {
+        let mut written = 0;
+        loop {
+            let (is_finishing, is_done) = (connection.is_finishing, connection.is_done());
+            let Some(transport) = &mut connection.transport else {
+                return Poll::Ready(false);
+            };
+            let frames = connection.outgoing.frames(is_finishing);
+            let (patience, release) = if !frames.is_empty() {
+                match transport.poll_write(cx, frames) {
+                    Poll::Ready(Ok(bytes)) => {
+                        // The reader may go on, and where much was written other connections have a turn.
+                        let may_read = connection.note_written(bytes);
+                        written += bytes;
+                        if written >= WRITE_BYTES / 2 {
+                            yield_turn(cx);
+                            return Poll::Pending;
+                        }
+                        if may_read {
+                            cx.waker().wake_by_ref();
+                        }
+                        continue;
+                    }
+                    Poll::Ready(Err(_)) => return Poll::Ready(false),
+                    Poll::Pending => {}
+                }
+                let taken = transport.last_taken();
+                (connection.outgoing.patience(taken, is_finishing), None)
+            } else if is_done {
+                return self.poll_end(connection, cx);
+            } else {
+                let is_gone = matches!(transport.send_due_ping(cx), Poll::Ready(Err(_)));
+                if is_gone || connection.outgoing.is_stuck() {
+                    return Poll::Ready(false);
+                }
+                (None, connection.outgoing.next_release())
+            };
+            ready!(self.timer.poll(patience.or(release), cx));
+            if patience.is_some() {
+                return Poll::Ready(false);
+            }
+        }
+    }
+
+    fn poll_end<S: AsyncRead + AsyncWrite + Unpin + 'static>(
+        &mut self,
+        connection: &mut Connection<S>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<bool> {
+        let is_refused = connection.is_refused;
+        if let Some(transport) = &mut connection.transport
+            && let Poll::Ready(ended) = transport.poll_end(cx, is_refused)
+        {
+            return Poll::Ready(ended.is_ok());
+        }
+        let due = *self.end_due.get_or_insert_with(|| Instant::now() + LINGER);
+        self.timer.poll(Some(due), cx).map(|()| false)
+    }
+}

@@ -1,0 +1,163 @@
+//! Topic messages in the forms that some of their subscribers have asked for.
+//!
+//! **Invariant:** a form is made once for all clients. A form that takes long is made on another thread, and
+//! its publisher waits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytes::Bytes;
+
+use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
+use crate::actors::resources::memory::{Permit, cover_message};
+use crate::protocol::messages;
+use crate::protocol::names::OWN_ID_PREFIX;
+use crate::protocol::op::{Compression, Encoding};
+use crate::protocol::outbox::MAX_MESSAGE;
+use crate::protocol::ros::tree::MessageTree;
+use crate::protocol::ros::{cbor, stamps};
+use crate::protocol::wire::{fragments, series};
+
+/// Longest message, or series of them, whose forms are made where it is heard, which takes some tenth of a millisecond
+/// each.
+const ENCODED_HERE: usize = 16 * 1024;
+
+/// The messages in one form.
+#[derive(Default)]
+pub(super) struct Made {
+    pub(super) messages: Vec<Bytes>,
+    /// How many could not be made: they are longer than any outbox takes, or do not fit their type.
+    pub(super) lost: u64,
+}
+
+/// The form that a subscriber gets which has asked for `wanted`, where others get `forms`. Beside powers of two there
+/// are [`MAX_FRAGMENT_SIZES`] sizes of pieces at a time. A further one counts as the power of two below, so that nobody
+/// is refused because of what others ask for.
+pub(super) fn within_bounds(wanted: Encoding, forms: &[Encoding]) -> Encoding {
+    let is_odd = |size: &usize| !size.is_power_of_two();
+    let Some(size) = wanted.fragment_size.filter(is_odd) else {
+        return wanted;
+    };
+    let others = forms.iter().filter_map(|form| form.fragment_size);
+    if forms.contains(&wanted) || others.filter(is_odd).count() < MAX_FRAGMENT_SIZES {
+        return wanted;
+    }
+    Encoding {
+        fragment_size: Some(1 << size.ilog2()),
+        ..wanted
+    }
+}
+
+/// A message, or a series of them, that is to be made in other forms.
+pub(super) struct ToEncode {
+    /// The topic, as the subscribers spell it.
+    pub(super) spelling: Arc<str>,
+    pub(super) plain: Bytes,
+    /// The forms.
+    pub(super) encodings: Vec<Encoding>,
+    /// The type of the topic's messages, if it is known.
+    pub(super) type_name: Option<Box<str>>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    pub(super) fragmented: Arc<AtomicU64>,
+    /// The room that a long message takes, in any form.
+    pub(super) permit: Option<Permit>,
+}
+
+impl ToEncode {
+    /// Whether it is so long that another thread has to do it.
+    pub(super) fn is_long(&self) -> bool {
+        self.plain.len() > ENCODED_HERE
+    }
+
+    /// Makes every form.
+    pub(super) fn make(&self) -> Vec<(Encoding, Made)> {
+        let encodings = self.encodings.iter();
+        encodings.map(|one| (*one, self.make_in(*one))).collect()
+    }
+
+    fn make_in(&self, encoding: Encoding) -> Made {
+        let all = self.plain.len();
+        let mut made = Made::default();
+        for message in series::messages(self.plain.clone()) {
+            let is_alone = message.len() == all;
+            let message = match self.encode(&message, encoding) {
+                Some(Some(encoded)) => cover_message(self.permit.as_ref(), encoded),
+                Some(None) if is_alone => message,
+                // Each message lies by itself, so that to keep one keeps no other in memory.
+                Some(None) => Bytes::copy_from_slice(&message),
+                None => {
+                    made.lost += 1;
+                    continue;
+                }
+            };
+            made.messages.push(message);
+        }
+        made
+    }
+
+    /// One message: `None` where it can't be written so, `Some(None)` where it stays as it is.
+    #[allow(clippy::option_option, reason = "one is dropped, the other is not")]
+    fn encode(&self, plain: &Bytes, encoding: Encoding) -> Option<Option<Bytes>> {
+        let spelling = &*self.spelling;
+        let type_name = self.type_name.as_deref();
+        let renamed = (encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
+        let plain = renamed.as_ref().unwrap_or(plain);
+        if encoding.compression == Compression::None {
+            let size = encoding.fragment_size;
+            let Some(size) = size.filter(|size| plain.len() > *size) else {
+                return Some(renamed);
+            };
+            let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
+            let id = format!("{OWN_ID_PREFIX}{number}");
+            return fragments::split(plain, size, &id, MAX_MESSAGE).map(Some);
+        }
+        let msg = messages::message_text(spelling, plain);
+        let tree = MessageTree::read(msg).ok()?;
+        let msg = tree.root();
+        let bytes = match encoding.compression {
+            Compression::CborRaw => cbor::publish_raw(spelling, type_name?, msg, MAX_MESSAGE)?,
+            _ => cbor::publish(spelling, type_name, msg, MAX_MESSAGE)?,
+        };
+        Some(Some(Bytes::from(bytes)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: usize = 1024 * 1024;
+
+    /// A message in another form.
+    fn encoded(msg: &str, compression: Compression, type_name: Option<&str>) -> Made {
+        let plain = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
+        let encoding = Encoding {
+            compression,
+            fragment_size: Some(64).filter(|_| compression == Compression::None),
+            ros1_stamps: false,
+        };
+        let message = ToEncode {
+            spelling: "/t".into(),
+            plain: plain.into(),
+            encodings: vec![encoding],
+            type_name: type_name.map(Into::into),
+            fragmented: Arc::default(),
+            permit: None,
+        };
+        message.make_in(encoding)
+    }
+
+    #[test]
+    fn what_no_outbox_takes_is_not_made_and_counts_as_lost() {
+        let times = format!("{{\"transforms\":[{}{{}}]}}", "{},".repeat(200_000));
+        let quotes = format!("\"{}\"", "\\\"".repeat(MIB));
+        for (msg, compression) in [
+            (times.as_str(), Compression::CborRaw),
+            (&quotes, Compression::None),
+            ("1e999", Compression::Cbor),
+        ] {
+            let made = encoded(msg, compression, Some("tf2_msgs/msg/TFMessage"));
+            assert_eq!((made.messages.len(), made.lost), (0, 1), "{compression:?}");
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Calls and goals that were forwarded to the clients that serve them, and have not ended.
+//!
+//! **Invariant:** each ends once: by the answer of its own provider, by its deadline, or with that client. A goal
+//! outlives its sender, but then nobody hears of it any more.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use tokio::time::Instant;
+
+use super::kept::KeptEntry;
+use crate::actors::ConnectionId;
+use crate::protocol::names::{self, OWN_ID_PREFIX};
+use crate::protocol::wire::payload::Payload;
+
+/// Longest spelling of such an id in JSON: the prefix, twenty digits, quotes, every character escaped as `\u0070`.
+const LONGEST_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
+
+/// A call or a goal.
+pub(crate) struct Forwarded {
+    pub(crate) caller: ConnectionId,
+    /// The caller's id for it.
+    pub(crate) id: Option<Payload>,
+    pub(crate) provider: ConnectionId,
+    /// The name of the service or action, as the caller spells it.
+    pub(crate) name: Box<str>,
+    pub(crate) terms: Terms,
+    /// The part of its caller's room that it takes.
+    pub(crate) _entry: KeptEntry,
+}
+
+/// What sets calls and goals apart.
+pub(crate) enum Terms {
+    /// A call ends when its caller's patience does. The registry may look later, if the process has stood still.
+    Call { deadline: Instant },
+    /// A goal goes on, and may be cancelled under the name that its server knows.
+    Goal {
+        spelling: Box<str>,
+        wants_feedback: bool,
+    },
+}
+
+impl Forwarded {
+    fn deadline(&self) -> Option<Instant> {
+        match self.terms {
+            Terms::Call { deadline } => Some(deadline),
+            Terms::Goal { .. } => None,
+        }
+    }
+}
+
+/// Requests of one kind, by their numbers.
+#[derive(Default)]
+pub(crate) struct Requests {
+    outstanding: BTreeMap<u64, Forwarded>,
+    by_caller: NumbersByClient,
+    by_provider: NumbersByClient,
+    by_deadline: BTreeSet<(Instant, u64)>,
+    made: u64,
+}
+
+/// The numbers of the requests that concern a client.
+type NumbersByClient = HashMap<ConnectionId, BTreeSet<u64>>;
+
+fn remove(numbers: &mut NumbersByClient, client: ConnectionId, number: u64) {
+    if let Some(of_client) = numbers.get_mut(&client) {
+        of_client.remove(&number);
+        if of_client.is_empty() {
+            numbers.remove(&client);
+        }
+    }
+}
+
+/// The id under which request `number` goes to its provider.
+fn own_id(number: u64) -> String {
+    format!("{OWN_ID_PREFIX}{number}")
+}
+
+/// The number of the request that has this id.
+fn number_of(id: &Payload) -> Option<u64> {
+    let id = Some(id).filter(|id| id.get().len() <= LONGEST_ID)?;
+    let id: String = serde_json::from_str(id.get()).ok()?;
+    let number: u64 = id.strip_prefix(OWN_ID_PREFIX)?.parse().ok()?;
+    // Each request has one id, though `+1` and `01` are numbers too.
+    (id == own_id(number)).then_some(number)
+}
+
+impl Requests {
+    /// Adds a request. Returns the id under which it goes to its provider.
+    pub(crate) fn add(&mut self, request: Forwarded) -> String {
+        self.made += 1;
+        let number = self.made;
+        let (caller, provider) = (request.caller, request.provider);
+        self.by_caller.entry(caller).or_default().insert(number);
+        self.by_provider.entry(provider).or_default().insert(number);
+        let deadline = request.deadline().map(|deadline| (deadline, number));
+        self.by_deadline.extend(deadline);
+        self.outstanding.insert(number, request);
+        own_id(number)
+    }
+
+    /// Requests of `caller` that have not ended.
+    pub(crate) fn waiting_for(&self, caller: ConnectionId) -> usize {
+        self.by_caller.get(&caller).map_or(0, BTreeSet::len)
+    }
+
+    /// The number of the request that `provider` means by `id`, if it is that provider's. Without an id, it is the only
+    /// one that waits for `provider`, if it is of `name`.
+    pub(crate) fn meant(
+        &self,
+        id: Option<&Payload>,
+        name: Option<&str>,
+        provider: ConnectionId,
+    ) -> Option<u64> {
+        let number = match id {
+            Some(id) => number_of(id)?,
+            None => {
+                let numbers = self.by_provider.get(&provider)?;
+                *numbers.first().filter(|_| numbers.len() == 1)?
+            }
+        };
+        let request = self.outstanding.get(&number)?;
+        let is_late = request
+            .deadline()
+            .is_some_and(|deadline| Instant::now() > deadline);
+        let is_meant = id.is_some() || name.is_none_or(|name| names::are_same(&request.name, name));
+        (request.provider == provider && is_meant && !is_late).then_some(number)
+    }
+
+    /// The newest request that `caller` has made under `id`, and the id that its provider knows.
+    pub(crate) fn made_under(
+        &self,
+        id: Option<&Payload>,
+        name: &str,
+        caller: ConnectionId,
+    ) -> Option<(String, &Forwarded)> {
+        let numbers = self.by_caller.get(&caller)?.iter().rev();
+        let mut requests = numbers.filter_map(|number| Some((*number, self.get(*number)?)));
+        let (number, request) =
+            requests.find(|(_, one)| one.id.as_ref() == id && names::are_same(&one.name, name))?;
+        Some((own_id(number), request))
+    }
+
+    pub(crate) fn get(&self, number: u64) -> Option<&Forwarded> {
+        self.outstanding.get(&number)
+    }
+
+    /// Takes a request that ends.
+    pub(crate) fn take(&mut self, number: u64) -> Option<Forwarded> {
+        let request = self.outstanding.remove(&number)?;
+        remove(&mut self.by_caller, request.caller, number);
+        remove(&mut self.by_provider, request.provider, number);
+        if let Some(deadline) = request.deadline() {
+            self.by_deadline.remove(&(deadline, number));
+        }
+        Some(request)
+    }
+
+    /// Takes every request, oldest first.
+    pub(crate) fn take_all(&mut self) -> Vec<Forwarded> {
+        let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
+        let requests = numbers.into_iter().map(|number| self.take(number));
+        requests.flatten().collect()
+    }
+
+    /// When the first request's time will be over.
+    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+        self.by_deadline.first().map(|(deadline, _)| *deadline)
+    }
+
+    /// Takes the request whose time has been over for longest, if there is one.
+    pub(crate) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
+        let (_, number) = *self.by_deadline.first().filter(|(due, _)| *due <= now)?;
+        self.take(number)
+    }
+
+    /// Takes the numbers of the requests that wait for `provider`, which will not answer them.
+    pub(crate) fn take_numbers(&mut self, provider: ConnectionId) -> BTreeSet<u64> {
+        self.by_provider.remove(&provider).unwrap_or_default()
+    }
+
+    /// Forgets the requests that `caller` has made.
+    pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
+        for number in self.by_caller.remove(&caller).unwrap_or_default() {
+            self.take(number);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::value::RawValue;
+
+    use super::*;
+
+    #[test]
+    fn a_calls_id_is_known_however_its_provider_spells_it() {
+        let payload = |json: String| Payload::from(RawValue::from_string(json).unwrap());
+        let id = own_id(u64::MAX);
+        let escaped: String = id.bytes().map(|byte| format!("\\u{byte:04x}")).collect();
+        for spelling in [format!("\"{id}\""), format!("\"{escaped}\"")] {
+            assert_eq!(number_of(&payload(spelling)), Some(u64::MAX));
+        }
+        let another = format!("\"{OWN_ID_PREFIX}01\"");
+        assert_eq!(number_of(&payload(another)), None);
+    }
+}

@@ -1,0 +1,71 @@
+//! The registry's entries of one client: registrations, and calls and goals that wait for other clients.
+//!
+//! **Invariant:** it is at most [`MAX_KEPT`] bytes, and given back by whoever drops it.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use super::refusal::Refusal;
+use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
+
+/// The sum of one client's entries \[bytes\]; clones share it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Kept(Rc<Cell<usize>>);
+
+/// One entry.
+#[derive(Debug)]
+pub(crate) struct KeptEntry {
+    sum: Kept,
+    bytes: usize,
+}
+
+impl Kept {
+    /// Makes room for an entry whose names have so many bytes; `instead` of another one that is dropped next, if there
+    /// is one.
+    pub(crate) fn enter(
+        &self,
+        names: usize,
+        instead: Option<&KeptEntry>,
+    ) -> Result<KeptEntry, Refusal> {
+        let bytes = ENTRY_BYTES.saturating_add(names.saturating_mul(3));
+        let freed = instead.map_or(0, |entry| entry.bytes);
+        let sum = self.0.get().saturating_add(bytes);
+        if sum - freed > MAX_KEPT {
+            return Err(Refusal::TooMuchKept);
+        }
+        self.0.set(sum);
+        let sum = self.clone();
+        Ok(KeptEntry { sum, bytes })
+    }
+}
+
+impl Drop for KeptEntry {
+    fn drop(&mut self) {
+        self.sum.0.set(self.sum.0.get() - self.bytes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_room_for_so_many_entries_and_again_once_one_is_gone() {
+        let kept = Kept::default();
+        let mut entries = Vec::new();
+        let full = loop {
+            match kept.enter(10, None) {
+                Ok(entry) => entries.push(entry),
+                Err(why) => break why,
+            }
+        };
+        assert_eq!(full, Refusal::TooMuchKept);
+        assert_eq!(entries.len(), MAX_KEPT / (ENTRY_BYTES + 30));
+        assert!(kept.enter(10, entries.first()).is_ok());
+        entries.pop();
+        assert!(kept.enter(10, None).is_ok());
+        assert!(kept.enter(usize::MAX, None).is_err());
+        drop(entries);
+        assert_eq!(kept.0.get(), 0);
+    }
+}

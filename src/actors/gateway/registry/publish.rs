@@ -1,0 +1,283 @@
+//! Published messages: who may publish, and the fan-out. A message is encoded once for each spelling of its topic and
+//! each encoding asked for, and goes to every subscriber.
+//!
+//! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
+//! bytes. A message that takes long to encode holds up its publisher alone.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::sync::oneshot;
+
+use super::forms::{Made, ToEncode, within_bounds};
+use super::subscriptions::{is_listened_to, refuse_runtime_topic};
+use super::topics::Subscriber;
+use super::{FrameOrigin, Registry};
+use crate::actors::ConnectionId;
+use crate::actors::gateway::messages::{Deliver, DeliveryGuard, Handled, Publish, Tapped};
+use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::memory::cover_message;
+use crate::actors::wire::TopicMessage;
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages;
+use crate::protocol::messages::trajectory::NodeMessage;
+use crate::protocol::names;
+use crate::protocol::op::{Compression, Encoding};
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::series::Series;
+
+/// Holds a publisher back until its message has been offered to the socket of every subscriber.
+#[derive(Default)]
+pub(super) struct Backpressure {
+    underway: Option<(DeliveryGuard, oneshot::Receiver<()>)>,
+}
+
+impl Backpressure {
+    /// Makes the guard that goes with the message to a subscriber.
+    fn underway(&mut self) -> DeliveryGuard {
+        let (underway, _) = self.underway.get_or_insert_with(|| {
+            let (underway, end) = oneshot::channel();
+            (Arc::new(underway), end)
+        });
+        Arc::clone(underway)
+    }
+
+    /// Has the message's publisher wait for `handled`, and until every subscriber has the message.
+    fn and(self, handled: Handled) -> Handled {
+        let end = self.underway.map(|(_, end)| end);
+        handled.and_by_subscribers(end)
+    }
+}
+
+impl Registry {
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
+    pub(super) fn publish(
+        &mut self,
+        origin: FrameOrigin,
+        topic: &str,
+        msg: &Payload,
+        heard: Option<NodeMessage>,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        if let Err(why) = refuse_runtime_topic(topic) {
+            self.refuse(&origin, &why);
+            return Handled::at_once();
+        }
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let listener = Topic::from_name(topic)
+            .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
+            .and_then(|topic| Some((topic, self.nodes.listeners.get(&topic)?)));
+        if listener.is_none() && !client.registered.advertised.contains_key(topic) {
+            return Handled::at_once();
+        }
+        let mut pace = Backpressure::default();
+        let encode = |spelling: &str| messages::publish_raw(spelling, msg);
+        self.fan_out(topic, Some(&mut pace), encode, ctx);
+        let Some((topic, listener)) = listener else {
+            return pace.and(Handled::at_once());
+        };
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::NodeMessage(topic, msg));
+        }
+        let (done, ended) = oneshot::channel();
+        listener(TopicMessage {
+            heard: heard.unwrap_or_else(|| msg.clone().into()),
+            respond: ctx.address().recipient(),
+            connection: origin.from,
+            present: Arc::downgrade(&client.present),
+            listening: Arc::downgrade(&client.listening),
+            id: origin.id,
+            done,
+        });
+        pace.and(Handled::by_node(ended))
+    }
+
+    /// Delivers messages of a client as they are, if it advertises the topic.
+    pub(super) fn publish_lines(
+        &self,
+        from: ConnectionId,
+        lines: &Series,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let topic = &*lines.topic;
+        let mut pace = Backpressure::default();
+        let client = self.clients.get(&from);
+        if client.is_some_and(|client| client.registered.advertised.contains_key(topic)) {
+            let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
+            self.fan_out(topic, Some(&mut pace), encode, ctx);
+        }
+        pace.and(Handled::at_once())
+    }
+
+    /// Delivers a message, or a series of them, to every subscriber of `topic`, an absolute name, whatever its
+    /// spelling. `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait; a live arm can't.
+    fn fan_out(
+        &self,
+        topic: &str,
+        mut pace: Option<&mut Backpressure>,
+        encode: impl Fn(&str) -> Bytes,
+        ctx: &mut Context<Self>,
+    ) {
+        for spelling in names::spellings(topic) {
+            let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
+                continue;
+            };
+            let plain = cover_message(self.permit.as_ref(), encode(spelling));
+            let mut encodings = Vec::new();
+            for subscriber in subscribers {
+                if is_sent_plain(subscriber.encoding, plain.len()) {
+                    let underway = pace.as_deref_mut().map(Backpressure::underway);
+                    deliver(subscriber, name, plain.clone(), underway);
+                    continue;
+                }
+                let encoding = within_bounds(subscriber.encoding, &encodings);
+                if !encodings.contains(&encoding) {
+                    encodings.push(encoding);
+                }
+            }
+            if !encodings.is_empty() {
+                let message = self.to_encode(name, plain, encodings);
+                let underway = pace.as_deref_mut().map(Backpressure::underway);
+                self.deliver_encoded(message, underway, ctx);
+            }
+        }
+    }
+
+    /// Delivers a message in other forms, where it takes long once another thread has made them.
+    fn deliver_encoded(
+        &self,
+        message: ToEncode,
+        underway: Option<DeliveryGuard>,
+        ctx: &mut Context<Self>,
+    ) {
+        let (spelling, length) = (Arc::clone(&message.spelling), message.plain.len());
+        // A node does not wait, and none of its messages is long.
+        if underway.is_none() || !message.is_long() {
+            return self.deliver_made(&spelling, length, &message.make(), underway.as_ref());
+        }
+        let made = aside(WorkKind::writing(length), move || message.make());
+        ctx.spawn(made.into_actor(self).map(move |made, registry, _| {
+            let made = made.unwrap_or_default();
+            registry.deliver_made(&spelling, length, &made, underway.as_ref());
+        }));
+    }
+
+    fn deliver_made(
+        &self,
+        spelling: &str,
+        length: usize,
+        made: &[(Encoding, Made)],
+        underway: Option<&DeliveryGuard>,
+    ) {
+        let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
+            return;
+        };
+        let forms: Vec<Encoding> = made.iter().map(|(form, _)| *form).collect();
+        let is_sent = |one: &&Subscriber| !is_sent_plain(one.encoding, length);
+        for subscriber in subscribers.iter().filter(is_sent) {
+            let encoding = within_bounds(subscriber.encoding, &forms);
+            let of_form = made.iter().find(|(form, _)| *form == encoding);
+            if let Some((_, made)) = of_form {
+                self.deliver_form(subscriber, name, made, underway);
+            }
+        }
+    }
+
+    /// Delivers the forms that could be made of a message. The others count as dropped.
+    fn deliver_form(
+        &self,
+        subscriber: &Subscriber,
+        name: &Arc<str>,
+        made: &Made,
+        underway: Option<&DeliveryGuard>,
+    ) {
+        self.gauges.add_dropped(made.lost);
+        for frame in &made.messages {
+            deliver(subscriber, name, frame.clone(), underway.cloned());
+        }
+    }
+
+    /// Delivers a latched topic's last message for a subscription that came after it.
+    pub(super) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
+        let latched =
+            Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
+        let subscriber = self
+            .topics
+            .subscribers(spelling)
+            .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
+        if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
+            let plain = messages::respelled(topic.name(), spelling, frame);
+            if is_sent_plain(subscriber.encoding, plain.len()) {
+                return deliver(subscriber, spelling, plain, None);
+            }
+            let message = self.to_encode(spelling, plain, vec![subscriber.encoding]);
+            for (_, made) in message.make() {
+                self.deliver_form(subscriber, spelling, &made, None);
+            }
+        }
+    }
+
+    /// The type of a topic's messages, if anybody has said it and it is known.
+    pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
+        match Topic::from_name(topic) {
+            Some(topic) => Some(topic.type_name()),
+            None => Some(self.directory.known_type(&names::absolute(topic))?.name),
+        }
+    }
+
+    /// A JSON frame, or a series of them, that is to be made in other forms.
+    fn to_encode(&self, spelling: &Arc<str>, plain: Bytes, encodings: Vec<Encoding>) -> ToEncode {
+        ToEncode {
+            spelling: Arc::clone(spelling),
+            plain,
+            encodings,
+            type_name: self.known_type(spelling).map(Into::into),
+            fragmented: Arc::clone(&self.fragmented),
+            permit: self.permit.clone(),
+        }
+    }
+}
+
+impl Handler<Publish> for Registry {
+    type Result = ();
+
+    /// Delivers a message of a node, and keeps it if its topic is latched.
+    fn handle(&mut self, Publish { topic, frame }: Publish, ctx: &mut Context<Self>) {
+        let name = topic.name();
+        if !self.is_wanted(name) {
+            return;
+        }
+        let frame = frame.write();
+        if let Some(tap) = &mut self.tap {
+            tap(Tapped::Published(topic, &frame));
+        }
+        let encode = |spelling: &str| messages::respelled(name, spelling, &frame);
+        self.fan_out(name, None, encode, ctx);
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
+    }
+}
+
+/// Whether frames of so many bytes are sent as they are to a subscriber that has asked for `encoding`.
+fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
+    let is_short = encoding.fragment_size.is_none_or(|size| length <= size);
+    encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
+}
+
+fn deliver(
+    subscriber: &Subscriber,
+    topic: &Arc<str>,
+    frame: Bytes,
+    underway: Option<DeliveryGuard>,
+) {
+    subscriber.outlet.do_send(Deliver {
+        topic: Some(Arc::clone(topic)),
+        frame,
+        underway,
+    });
+}

@@ -1,0 +1,468 @@
+//! Calls and goals: to the node or the client that serves them, and the answers of clients back to those who asked.
+//!
+//! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender goes first.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::sync::oneshot;
+use tokio::time::Instant;
+
+use super::directory::Served;
+use super::forwarded::{Forwarded, Terms};
+use super::refusal::Refusal;
+use super::{FrameOrigin, Registry};
+use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
+use crate::actors::gateway::messages::{Deliver, Handled, Tapped};
+use crate::actors::node::Feedback;
+use crate::actors::resources::memory::cover_message;
+use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller, SentGoal};
+use crate::actors::wire::{Caller, Route, ServiceCall};
+use crate::protocol::catalog::{Action, Service};
+use crate::protocol::messages::{self, Level};
+use crate::protocol::names;
+use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem};
+use crate::protocol::wire::payload::Payload;
+use crate::services::NoService;
+
+// ---- to the runtime's own nodes -------------------------------------------------------------------------------------
+
+impl Registry {
+    /// Sends a call to the node or the client that serves it. A failure is the call's one response.
+    pub(super) fn call(
+        &mut self,
+        origin: FrameOrigin,
+        call: CallService,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let refusal = if let Some(why) = self.closed {
+            Err(Refusal::Closed(why))
+        } else if let Some(service) = Service::from_name(&call.service) {
+            match self.nodes.services.get(&service) {
+                Some(node) => {
+                    if let Some(tap) = &mut self.tap {
+                        tap(Tapped::Called {
+                            from: origin.from,
+                            service,
+                            id: origin.id.as_ref(),
+                            args: call.args.payload(),
+                        });
+                    }
+                    let (caller, ended) = Caller::new(
+                        ctx.address().recipient(),
+                        origin.from,
+                        service,
+                        call.service.into_boxed_str(),
+                        origin.id,
+                        Arc::clone(&client.outlets.gone),
+                    );
+                    node(ServiceCall {
+                        service,
+                        arguments: call.args,
+                        caller: caller
+                            .within(self.gauges.memory().clone(), self.permit.clone())
+                            .with_errors(client.outlets.error_form()),
+                    });
+                    return Handled::by_node(ended);
+                }
+                None => Err(NoService::NotServed(call.service.clone()).into()),
+            }
+        } else {
+            let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
+            let terms = |_: &str| Terms::Call { deadline };
+            let encode =
+                |spelling: &str, id: &str| messages::call(spelling, id, call.args.payload());
+            self.forward(
+                &origin,
+                Served::Service,
+                (&call.service, &call.args),
+                terms,
+                encode,
+            )
+        };
+        self.schedule_cleanup(ctx);
+        if let Err(why) = refusal {
+            self.refuse_call(&origin, &call.service, &why);
+        }
+        Handled::at_once()
+    }
+
+    /// Sends a goal to the node, or the client, that serves its action.
+    pub(super) fn send_action_goal(
+        &mut self,
+        origin: FrameOrigin,
+        goal: ActionGoal,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let route = if let Some(why) = self.closed {
+            Err(Refusal::Closed(why))
+        } else if Action::from_name(&goal.action).is_some() {
+            self.action_route(&goal)
+        } else {
+            let terms = |spelling: &str| Terms::Goal {
+                spelling: spelling.into(),
+                wants_feedback: goal.feedback,
+            };
+            let type_name = goal.type_name.as_deref();
+            let args = goal.args.payload();
+            let encode = |spelling: &str, id: &str| {
+                messages::action_goal(spelling, id, type_name, args, goal.feedback)
+            };
+            match self.forward(
+                &origin,
+                Served::Action,
+                (&goal.action, &goal.args),
+                terms,
+                encode,
+            ) {
+                Ok(()) => return Handled::at_once(),
+                Err(why) => Err(why),
+            }
+        };
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let action_client = ActionClient {
+            respond: ctx.address().recipient(),
+            feedback: ctx.address().recipient(),
+            connection: origin.from,
+            action: Arc::from(goal.action.as_str()),
+            id: origin.id,
+            wants_feedback: goal.feedback,
+            gone: Arc::clone(&client.outlets.gone),
+        };
+        match route {
+            Ok(node) => {
+                let (done, ended) = oneshot::channel();
+                node(ActionRequest::Goal {
+                    arguments: goal.args,
+                    client: action_client,
+                    done,
+                });
+                Handled::by_node(ended)
+            }
+            Err(why) => {
+                action_client.refuse(&why.to_string());
+                Handled::at_once()
+            }
+        }
+    }
+
+    fn action_route(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
+        let unknown = || Refusal::NoAction(goal.action.clone());
+        let action = Action::from_name(&goal.action).ok_or_else(unknown)?;
+        match &goal.type_name {
+            Some(name) if !names::same_type(name, action.type_name()) => {
+                Err(Refusal::ActionType(action.type_name()))
+            }
+            _ => self.nodes.actions.get(&action).ok_or_else(unknown),
+        }
+    }
+
+    /// Ends a goal of the same client.
+    pub(super) fn cancel_action_goal(
+        &mut self,
+        origin: FrameOrigin,
+        action: &str,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
+        let Some(node) = node else {
+            if let Err(why) = self.forward_cancellation(&origin, action) {
+                self.refuse(&origin, &why);
+            }
+            return Handled::at_once();
+        };
+        let (done, ended) = oneshot::channel();
+        node(ActionRequest::Cancel {
+            from: Canceller {
+                respond: ctx.address().recipient(),
+                goal: SentGoal {
+                    connection: origin.from,
+                    id: origin.id,
+                },
+            },
+            done,
+        });
+        Handled::by_node(ended)
+    }
+}
+
+impl Handler<Feedback> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
+        if let Some(client) = self.clients.get(&feedback.connection) {
+            client.outlets.deliver.do_send(Deliver {
+                topic: None,
+                frame: feedback.frame.write(),
+                underway: None,
+            });
+        }
+    }
+}
+
+// ---- to clients that serve ------------------------------------------------------------------------------------------
+
+impl Registry {
+    /// Makes a client the provider of a service, or the server of an action.
+    pub(super) fn serve(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        spelling: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        let is_own = match kind {
+            Served::Service => Service::from_name(spelling).is_some(),
+            Served::Action => Action::from_name(spelling).is_some(),
+        };
+        if is_own {
+            return Err(Refusal::OfRuntime(kind, spelling.to_owned()));
+        }
+        let name = &*names::absolute(spelling);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let bytes = spelling.len() + type_name.map_or(0, str::len);
+        let served = client.registered.served(kind);
+        let entry = client.kept.enter(bytes, served.get(name))?;
+        served.insert(name.into(), entry);
+        let provider = (origin.from, spelling);
+        let before = self.directory.provide(kind, name, provider, type_name);
+        if let Some(before) = before.filter(|one| *one != origin.from)
+            && let Some(before) = self.clients.get_mut(&before)
+        {
+            before.registered.served(kind).remove(name);
+        }
+        let msg = format!("advertised {} {spelling}", kind.noun());
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
+        Ok(())
+    }
+
+    /// Calls and goals that are on their way stay with the client.
+    pub(super) fn stop_serving(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        spelling: &str,
+    ) -> Result<(), Refusal> {
+        let name = &*names::absolute(spelling);
+        if !self.directory.withdraw(kind, name, origin.from) {
+            return Err(Refusal::NotServed(kind, spelling.to_owned()));
+        }
+        if let Some(client) = self.clients.get_mut(&origin.from) {
+            client.registered.served(kind).remove(name);
+        }
+        Ok(())
+    }
+
+    /// Passes a call or a goal on to the client that serves it. `encode` makes the frame, with the name as that client
+    /// spells it and an id of the runtime's own.
+    fn forward(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        (name, args): (&str, &Arguments),
+        terms: impl FnOnce(&str) -> Terms,
+        encode: impl FnOnce(&str, &str) -> Bytes,
+    ) -> Result<(), Refusal> {
+        let absolute = &*names::absolute(name);
+        let provider = self.directory.provider(kind, absolute).cloned();
+        let client = provider.and_then(|provider| {
+            let client = self.clients.get_mut(&provider.connection)?;
+            // A client that has stopped sending serves nothing, though the name may not be withdrawn yet.
+            let is_served = client.registered.served(kind).contains_key(absolute);
+            is_served.then(|| (client.backlog(), provider))
+        });
+        let Some((backlog, provider)) = client else {
+            return Err(match kind {
+                Served::Service => NoService::NoProvider(name.to_owned()).into(),
+                Served::Action => Refusal::NoAction(name.to_owned()),
+            });
+        };
+        if matches!(args, Arguments::Neither(_)) {
+            return Err(Refusal::BadArguments);
+        }
+        if backlog > MAX_BACKLOG {
+            return Err(Refusal::ProviderBusy(name.to_owned()));
+        }
+        let Some(caller) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        let terms = terms(&provider.spelling);
+        let spelling = match &terms {
+            Terms::Call { .. } => 0,
+            Terms::Goal { spelling, .. } => spelling.len(),
+        };
+        let id = origin.id.as_ref().map_or(0, Payload::allocated);
+        let entry = caller.kept.enter(id + name.len() + spelling, None)?;
+        let known_as = self.requests(kind).add(Forwarded {
+            caller: origin.from,
+            id: origin.id.clone(),
+            provider: provider.connection,
+            name: name.into(),
+            terms,
+            _entry: entry,
+        });
+        if let Some(client) = self.clients.get(&provider.connection) {
+            client.send(self.covered(encode(&provider.spelling, &known_as)));
+        }
+        Ok(())
+    }
+
+    /// Asks the action server of a goal of this client to end it.
+    fn forward_cancellation(&self, origin: &FrameOrigin, action: &str) -> Result<(), Refusal> {
+        let goal = self
+            .goals
+            .made_under(origin.id.as_ref(), action, origin.from);
+        let Some((id, goal)) = goal else {
+            let name = names::absolute(action);
+            return Err(match self.directory.provider(Served::Action, &name) {
+                Some(_) => Refusal::NoGoal(action.to_owned()),
+                None => Refusal::NoAction(action.to_owned()),
+            });
+        };
+        if let (Some(server), Terms::Goal { spelling, .. }) =
+            (self.clients.get(&goal.provider), &goal.terms)
+        {
+            if server.backlog() > MAX_BACKLOG {
+                return Err(Refusal::ProviderBusy(action.to_owned()));
+            }
+            server.send(messages::cancellation(spelling, &id));
+        }
+        Ok(())
+    }
+
+    /// Progress goes to who sent the goal, if it was asked for; a slow client may miss some.
+    pub(super) fn pass_feedback(
+        &self,
+        origin: &FrameOrigin,
+        action: &str,
+        values: &Payload,
+    ) -> Result<(), Refusal> {
+        let meant = self.goals.meant(origin.id.as_ref(), None, origin.from);
+        let goal = meant.and_then(|number| self.goals.get(number));
+        let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
+        if !names::are_same(&goal.name, action) {
+            return Err(Refusal::OfAnother(Served::Action, goal.name.to_string()));
+        }
+        let is_wanted = matches!(goal.terms, Terms::Goal { wants_feedback, .. } if wants_feedback);
+        if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
+            let frame = messages::action_feedback_raw(&goal.name, goal.id.as_ref(), values);
+            sender.outlets.deliver.do_send(Deliver {
+                topic: None,
+                frame: cover_message(self.permit.as_ref(), frame),
+                underway: None,
+            });
+        }
+        Ok(())
+    }
+
+    /// The answer of the client that serves a call or a goal goes back under the caller's own id.
+    pub(super) fn complete(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: &str,
+        encode: impl FnOnce(&str, Option<&Payload>) -> Bytes,
+    ) -> Result<(), Refusal> {
+        let request = self.take_answered(origin, kind, None);
+        let request = request.ok_or_else(|| match kind {
+            Served::Service => Refusal::StaleCall(name.to_owned()),
+            Served::Action => Refusal::StaleGoal(name.to_owned()),
+        })?;
+        if !names::are_same(&request.name, name) {
+            return self.discard(&request, Refusal::OfAnother(kind, request.name.to_string()));
+        }
+        let Some(caller) = self.clients.get(&request.caller) else {
+            return Ok(());
+        };
+        if caller.backlog() > MAX_BACKLOG {
+            self.fail(&request, &Refusal::CallerBusy(request.name.to_string()));
+            return Ok(());
+        }
+        caller.send(self.covered(encode(&request.name, request.id.as_ref())));
+        self.note_answered(&request);
+        Ok(())
+    }
+
+    /// Ends the call or goal that a bad answer is for, if there is one.
+    pub(super) fn fail_answered(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: Option<&str>,
+        problem: Problem,
+    ) -> Result<(), Refusal> {
+        let why = Refusal::Unreadable(problem);
+        match self.take_answered(origin, kind, name) {
+            Some(request) => self.discard(&request, why),
+            None => Err(why),
+        }
+    }
+
+    fn take_answered(
+        &mut self,
+        origin: &FrameOrigin,
+        kind: Served,
+        name: Option<&str>,
+    ) -> Option<Forwarded> {
+        let requests = self.requests(kind);
+        let number = requests.meant(origin.id.as_ref(), name, origin.from)?;
+        requests.take(number)
+    }
+
+    /// The caller is told why the answer is discarded, and so is the client that gave it.
+    fn discard(&mut self, request: &Forwarded, why: Refusal) -> Result<(), Refusal> {
+        let name = request.name.to_string();
+        self.fail(request, &Refusal::BadAnswer(name, Box::new(why.clone())));
+        Err(why)
+    }
+
+    /// Tells who made a request why it has ended without an answer.
+    pub(super) fn fail(&mut self, request: &Forwarded, why: &Refusal) {
+        let Forwarded {
+            caller, id, name, ..
+        } = request;
+        match request.terms {
+            Terms::Call { .. } => {
+                let origin = FrameOrigin {
+                    from: *caller,
+                    id: id.clone(),
+                };
+                self.refuse_call(&origin, name, why);
+            }
+            Terms::Goal { .. } => {
+                if let Some(sender) = self.clients.get(caller) {
+                    let (id, why) = (id.as_ref(), why.to_string());
+                    let status = GoalStatus::Aborted as u8;
+                    sender.send(messages::action_result(name, id, &why, status, false));
+                }
+            }
+        }
+        self.note_answered(request);
+    }
+
+    /// If this was the last call that its caller waited for, a client that has stopped sending may go.
+    fn note_answered(&mut self, request: &Forwarded) {
+        if self.calls.waiting_for(request.caller) == 0
+            && let Some(client) = self.clients.get_mut(&request.caller)
+        {
+            client.answered = None;
+        }
+    }
+
+    /// Answers a call with `result: false`, and why.
+    fn refuse_call(&self, origin: &FrameOrigin, service: &str, why: &Refusal) {
+        if let Some(client) = self.clients.get(&origin.from) {
+            let (id, form) = (origin.id.as_ref(), client.outlets.error_form());
+            let frame = messages::failure(service, id, &why.to_string(), form);
+            client.respond(frame, Service::from_name(service));
+        }
+    }
+}

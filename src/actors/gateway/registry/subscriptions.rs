@@ -1,0 +1,189 @@
+//! Advertisements and subscriptions of clients: how one is taken, changed and ended.
+//!
+//! **Invariant:** a refused op changes nothing.
+
+use std::sync::Arc;
+
+use super::directory::Use;
+use super::refusal::Refusal;
+use super::topics::{Subscription, throttle_of};
+use super::{FrameOrigin, Registry};
+use crate::actors::gateway::messages::{Configure, Throttle};
+use crate::protocol::catalog::{Direction, Topic, types};
+use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::Level;
+use crate::protocol::names;
+use crate::protocol::op::{Compression, Encoding, Subscribe};
+use crate::protocol::ros::stamps::is_ros1_name;
+
+impl Registry {
+    pub(super) fn advertise(
+        &mut self,
+        origin: &FrameOrigin,
+        topic: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        refuse_runtime_topic(topic)?;
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let before = client.registered.advertised.get(topic);
+        let is_new = before.is_none();
+        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let entry = client.kept.enter(bytes, before)?;
+        if is_new {
+            self.directory.add(topic, Use::Advertised, type_name);
+        }
+        let is_noted = |type_name| self.directory.note_type(topic, type_name);
+        if is_new || type_name.is_some_and(is_noted) {
+            client.registered.advertised.insert(topic.into(), entry);
+        }
+        if let Some(topic) = Topic::from_name(topic) {
+            client.withdrawn.remove(&topic);
+        }
+        Ok(())
+    }
+
+    pub(super) fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let topic = &*names::absolute(topic);
+        if client.registered.advertised.remove(topic).is_some() {
+            self.directory.remove(topic, Use::Advertised);
+        }
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+            client.withdrawn.insert(topic);
+        }
+    }
+
+    pub(super) fn subscribe(
+        &mut self,
+        origin: &FrameOrigin,
+        subscribe: &Subscribe,
+    ) -> Result<(), Refusal> {
+        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
+        self.may_subscribe(id.as_deref(), subscribe)?;
+        let topic = subscribe.topic.as_str();
+        let absolute = names::absolute(topic);
+        let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
+        let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
+        let first = !self.is_wanted(&absolute);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let subscriptions = client.registered.subscriptions.get(topic);
+        let mut subscriptions = subscriptions.into_iter().flatten();
+        let before = subscriptions.find(|one| one.id == id);
+        let is_new = before.is_none();
+        let instead = before.map(|one| &one.entry);
+        let entry = client.kept.enter(topic.len() + bytes, instead)?;
+        let (name, new) = self
+            .topics
+            .add(topic, origin.from, client.outlets.deliver.clone());
+        let type_name = subscribe.type_name.as_deref();
+        if new {
+            self.directory.add(&absolute, Use::Subscribed, type_name);
+        } else if let Some(type_name) = type_name {
+            self.directory.note_type(&absolute, type_name);
+        }
+        let subscriptions = &mut client.registered.subscriptions;
+        let subscriptions = subscriptions.entry(name.clone()).or_default();
+        subscriptions.retain(|one| one.id != id);
+        subscriptions.push(Subscription {
+            id,
+            throttle: subscribe.throttle,
+            queue_length: subscribe.queue_length,
+            encoding: encoding_for(subscribe),
+            entry,
+        });
+        let throttle = throttle_of(subscriptions);
+        self.topics.configure(&name, origin.from, subscriptions);
+        let shared = Arc::clone(&name);
+        if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
+            // The throttle of an earlier subscription must not hold back the latched message of this one.
+            client.outlets.configure.do_send(Configure {
+                topic: Arc::clone(&name),
+                throttle: Some(Throttle::NONE),
+            });
+        }
+        client.outlets.configure.do_send(Configure {
+            topic: name,
+            throttle,
+        });
+        // The status leaves before the first message: the topic's owner hears of the subscriber after it.
+        let msg = format!("subscribed to {topic}");
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
+        if first {
+            self.tell_owner(topic, true);
+        } else if is_new {
+            self.deliver_latched(&shared, origin.from);
+        }
+        Ok(())
+    }
+
+    fn may_subscribe(&self, id: Option<&str>, subscribe: &Subscribe) -> Result<(), Refusal> {
+        if id.is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let topic = subscribe.topic.as_str();
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let own = || subscribe.type_name.as_deref().and_then(types::find);
+            if self.known_type(topic).is_none() && own().is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let subscriptions = &mut client.registered.subscriptions;
+        let Some((name, mut left)) = subscriptions.remove_entry(topic) else {
+            return;
+        };
+        match &origin.id {
+            None => left.clear(),
+            Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
+        }
+        let throttle = throttle_of(&left);
+        client.outlets.configure.do_send(Configure {
+            topic: name.clone(),
+            throttle,
+        });
+        if left.is_empty() {
+            self.drop_subscriber(&name, origin.from);
+        } else {
+            self.topics.configure(&name, origin.from, &left);
+            subscriptions.insert(name, left);
+        }
+    }
+}
+
+/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
+/// is asked for by its type of ROS 1. CDR has no names.
+fn encoding_for(subscribe: &Subscribe) -> Encoding {
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
+    let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
+    Encoding {
+        ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
+        ..subscribe.encoding
+    }
+}
+
+/// Topics that the runtime alone publishes are not for clients.
+pub(super) fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the runtime itself subscribes to the topic.
+pub(super) fn is_listened_to(topic: Topic) -> bool {
+    topic.direction() == Direction::Subscribed
+}

@@ -1,0 +1,572 @@
+//! Reads an operation from a frame.
+//!
+//! **Invariant:** a member is looked at only for the operations that have it; for all others only its syntax counts.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::value::{RawValue, to_raw_value};
+
+use super::{
+    ActionGoal, ActionServerOp, Arguments, CallService, Compression, Encoding, GoalStatus,
+    Incoming, MAX_ARGS, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+    Subscribe, Verbosity,
+};
+use crate::protocol::catalog::{Action, Field, Service, Topic};
+use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::trajectory::{self, NodeMessage};
+use crate::protocol::messages::{ErrorForm, Level};
+use crate::protocol::wire::fragments::Piece;
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::{json, text};
+
+/// Characters of the JSON parser's complaint that go into a message: it may quote the client.
+const MAX_COMPLAINT: usize = 160;
+
+/// The members of a frame that mean something to us.
+const KEYS: [&str; 25] = [
+    "op",
+    "id",
+    "topic",
+    "type",
+    "msg",
+    "throttle_rate",
+    "queue_length",
+    "service",
+    "args",
+    "timeout",
+    "values",
+    "result",
+    "status",
+    "level",
+    "errors",
+    "token",
+    "command",
+    "compression",
+    "fragment_size",
+    "data",
+    "num",
+    "total",
+    "action",
+    "action_type",
+    "feedback",
+];
+
+/// The operations that we know, by their names on the wire.
+pub const OPS: [&str; 18] = [
+    "advertise",
+    "unadvertise",
+    "publish",
+    "subscribe",
+    "unsubscribe",
+    "advertise_service",
+    "unadvertise_service",
+    "call_service",
+    "service_response",
+    "set_level",
+    "auth",
+    "fragment",
+    "send_action_goal",
+    "cancel_action_goal",
+    "advertise_action",
+    "unadvertise_action",
+    "action_feedback",
+    "action_result",
+];
+
+/// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
+#[must_use]
+pub fn read(frame: &str) -> Incoming {
+    let mut members = [None; KEYS.len()];
+    let read = json::members_into(frame, &KEYS, &mut members);
+    let reader = OpReader { op: "", members };
+    if let Err(error) = read {
+        let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
+        return reader.refused(Problem::NotJson(complaint));
+    }
+    let id = reader.get("id").map(Payload::from);
+    let op = match reader.known_op() {
+        Ok(op @ "call_service") => OpReader { op, ..reader }.call(),
+        Ok(op @ "send_action_goal") => OpReader { op, ..reader }.goal(),
+        Ok(op) => {
+            let reader = OpReader { op, ..reader };
+            reader.or_bad_answer(reader.other())
+        }
+        Err(problem) => Err(OpError::Status(problem)),
+    };
+    Incoming { id, op }
+}
+
+/// Reads the members of one frame.
+struct OpReader<'a> {
+    op: &'static str,
+    members: [Option<&'a RawValue>; KEYS.len()],
+}
+
+impl<'a> OpReader<'a> {
+    fn known_op(&self) -> Result<&'static str, Problem> {
+        let raw = self.get("op").ok_or(Problem::NoOp)?;
+        let op = json::text(raw).ok_or_else(|| Problem::OpNotText(text::found(raw)))?;
+        OPS.into_iter()
+            .find(|known| *known == op)
+            .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
+    }
+
+    /// A call. As soon as its service is known it can be answered as a call, whatever else is wrong.
+    fn call(&self) -> Result<Op, OpError> {
+        let service = self.name("service").map_err(OpError::Status)?;
+        let fields = Service::from_name(&service)
+            .filter(|service| !service.is_computation())
+            .map(Service::fields);
+        match self
+            .timeout()
+            .and_then(|timeout| Ok((timeout, self.args(fields)?)))
+        {
+            Ok((timeout, args)) => Ok(Op::CallService(CallService {
+                service,
+                args,
+                timeout,
+            })),
+            Err(problem) => Err(OpError::Call { service, problem }),
+        }
+    }
+
+    /// Any other operation.
+    fn other(&self) -> Result<Op, Problem> {
+        Ok(match self.op {
+            "advertise" => Op::Advertise {
+                topic: self.name("topic")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise" => Op::Unadvertise {
+                topic: self.name("topic")?,
+            },
+            "publish" => {
+                let (topic, msg) = (self.name("topic")?, self.object("msg")?);
+                let heard = self.heard(&topic, &msg)?;
+                Op::Publish { topic, msg, heard }
+            }
+            "subscribe" => Op::Subscribe(self.subscription()?),
+            "unsubscribe" => Op::Unsubscribe {
+                topic: self.name("topic")?,
+            },
+            "advertise_service" => Op::AdvertiseService {
+                service: self.name("service")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_service" => Op::UnadvertiseService {
+                service: self.name("service")?,
+            },
+            "cancel_action_goal" => Op::CancelActionGoal {
+                action: self.name("action")?,
+            },
+            "fragment" => Op::Fragment(self.piece()?),
+            "set_level" => Op::SetLevel {
+                verbosity: self.verbosity()?,
+                errors: self.error_form()?,
+            },
+            "auth" => self.auth()?,
+            "service_response" => self.response()?,
+            _ => self.serve_action()?,
+        })
+    }
+
+    fn subscription(&self) -> Result<Subscribe, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        Ok(Subscribe {
+            topic: self.name("topic")?,
+            type_name: self.optional_text("type")?,
+            throttle: self.throttle()?,
+            queue_length: self.queue_length()?,
+            // Merging it with the default drops the fragment size of a binary encoding, which is not cut up.
+            encoding: Encoding::default().merged(Encoding {
+                compression: self.compression()?,
+                fragment_size: self.fragment_size()?,
+                ros1_stamps: false,
+            }),
+        })
+    }
+
+    fn compression(&self) -> Result<Compression, Problem> {
+        let Some(raw) = self.get("compression") else {
+            return Ok(Compression::None);
+        };
+        match json::text(raw).as_deref() {
+            Some("none" | "png") => Ok(Compression::None),
+            Some("cbor") => Ok(Compression::Cbor),
+            Some("cbor-raw") => Ok(Compression::CborRaw),
+            _ => Err(self.mistyped("compression", "none, png, cbor or cbor-raw", raw)),
+        }
+    }
+
+    fn fragment_size(&self) -> Result<Option<usize>, Problem> {
+        let Some(raw) = self.get("fragment_size").filter(|raw| raw.get() != "null") else {
+            return Ok(None);
+        };
+        let size = json::integer(raw)
+            .filter(|size| *size > 0)
+            .ok_or_else(|| self.mistyped("fragment_size", "an integer, at least 1", raw))?;
+        Ok(usize::try_from(size).ok())
+    }
+
+    fn piece(&self) -> Result<Piece, Problem> {
+        let id = self.required("id")?;
+        self.short("id", id.get())?;
+        let raw = self.required("data")?;
+        let data = json::text(raw).ok_or_else(|| self.mistyped("data", "a string", raw))?;
+        Ok(Piece {
+            id: id.get().to_owned(),
+            data: data.into_owned(),
+            num: self.index("num")?,
+            total: self.index("total")?,
+        })
+    }
+
+    /// A count. One that does not fit is refused as too large a little later.
+    fn index(&self, field: &'static str) -> Result<usize, Problem> {
+        let raw = self.required(field)?;
+        let number = json::integer(raw)
+            .ok_or_else(|| self.mistyped(field, "an integer, at least 0", raw))?;
+        Ok(usize::try_from(number).unwrap_or(usize::MAX))
+    }
+
+    fn verbosity(&self) -> Result<Verbosity, Problem> {
+        let raw = self.required("level")?;
+        let name = json::text(raw);
+        let level = Level::ALL
+            .into_iter()
+            .find(|level| name.as_deref() == Some(level.name()));
+        match level {
+            None if name.as_deref() != Some("none") => {
+                Err(self.mistyped("level", "info, warning, error or none", raw))
+            }
+            level => Ok(Verbosity(level)),
+        }
+    }
+
+    fn error_form(&self) -> Result<Option<ErrorForm>, Problem> {
+        let Some(raw) = self.get("errors") else {
+            return Ok(None);
+        };
+        let name = json::text(raw);
+        let form = ErrorForm::ALL
+            .into_iter()
+            .find(|form| name.as_deref() == Some(form.name()));
+        match form {
+            Some(form) => Ok(Some(form)),
+            None => Err(self.mistyped("errors", "object or text", raw)),
+        }
+    }
+
+    /// Reads the token that a client shows. A complaint about it does not repeat it.
+    /// A command of this program says that it is one, and has a token only if one was given to it.
+    fn auth(&self) -> Result<Op, Problem> {
+        let is_command = self.get("command").is_some() && self.boolean("command")?;
+        let has_none = is_command && self.get("token").is_none();
+        let token = if has_none { None } else { Some(self.secret()?) };
+        Ok(Op::Auth { token, is_command })
+    }
+
+    fn secret(&self) -> Result<String, Problem> {
+        let raw = self.required("token")?;
+        let token = json::text(raw).ok_or(Problem::Mistyped {
+            op: self.op,
+            field: "token",
+            expected: "a string",
+            found: "something else".to_owned(),
+        })?;
+        self.short("token", &token)?;
+        Ok(token.into_owned())
+    }
+
+    /// The member of that name; it is one of [`KEYS`].
+    fn get(&self, field: &'static str) -> Option<&'a RawValue> {
+        let index = KEYS.iter().position(|key| *key == field)?;
+        self.members.get(index).copied().flatten()
+    }
+
+    fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
+        self.get(field)
+            .ok_or(Problem::Missing { op: self.op, field })
+    }
+
+    fn mistyped(&self, field: &'static str, expected: &'static str, raw: &RawValue) -> Problem {
+        Problem::Mistyped {
+            op: self.op,
+            field,
+            expected,
+            found: text::found(raw),
+        }
+    }
+
+    /// A topic or service name.
+    fn name(&self, field: &'static str) -> Result<String, Problem> {
+        let raw = self.required(field)?;
+        let name = json::text(raw).filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| self.mistyped(field, "a non-empty string", raw))?;
+        self.short(field, &name)?;
+        Ok(name.into_owned())
+    }
+
+    fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
+        self.within(MAX_NAME, field, text)
+    }
+
+    fn within(&self, limit: usize, field: &'static str, text: &str) -> Result<(), Problem> {
+        if text.len() <= limit {
+            return Ok(());
+        }
+        Err(Problem::TooLong {
+            op: self.op,
+            field,
+            limit,
+            length: text.len(),
+        })
+    }
+
+    fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
+        let Some(raw) = self.get(field) else {
+            return Ok(None);
+        };
+        let text = json::text(raw).ok_or_else(|| self.mistyped(field, "a string", raw))?;
+        self.short(field, &text)?;
+        Ok(Some(text.into_owned()))
+    }
+
+    fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
+        let raw = self.required(field)?;
+        json::boolean(raw).ok_or_else(|| self.mistyped(field, "true or false", raw))
+    }
+
+    /// A ROS message, which is an object.
+    fn object(&self, field: &'static str) -> Result<Payload, Problem> {
+        let raw = self.required(field)?;
+        if raw.get().starts_with('{') {
+            return Ok(raw.into());
+        }
+        Err(self.mistyped(field, "an object", raw))
+    }
+
+    fn throttle(&self) -> Result<Duration, Problem> {
+        let Some(raw) = self.get("throttle_rate") else {
+            return Ok(Duration::ZERO);
+        };
+        let throttle_ms = json::number(raw)
+            .filter(|rate| rate.is_finite() && *rate >= 0.0)
+            .ok_or_else(|| self.mistyped("throttle_rate", "a number of ms, at least 0", raw))?;
+        Ok(duration(throttle_ms / 1000.0, MAX_THROTTLE))
+    }
+
+    fn queue_length(&self) -> Result<usize, Problem> {
+        let Some(raw) = self.get("queue_length") else {
+            return Ok(0);
+        };
+        let length = json::integer(raw)
+            .ok_or_else(|| self.mistyped("queue_length", "an integer, at least 0", raw))?;
+        Ok(usize::try_from(length)
+            .unwrap_or(MAX_QUEUE_LENGTH)
+            .min(MAX_QUEUE_LENGTH))
+    }
+
+    fn timeout(&self) -> Result<Option<Duration>, Problem> {
+        let Some(raw) = self.get("timeout") else {
+            return Ok(None);
+        };
+        let timeout = json::number(raw)
+            .filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+            .ok_or_else(|| self.mistyped("timeout", "a number of seconds greater than 0", raw))?;
+        Ok(Some(duration(timeout, MAX_TIMEOUT)))
+    }
+}
+
+/// A finite number of seconds, 0 or more, as a duration of at most `longest`.
+fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}
+
+// ---- actions: goals and cancellations from those who send them, the rest from action servers ------------------------
+
+impl OpReader<'_> {
+    /// A goal. As soon as its action is known it can be answered as a goal, whatever else is wrong.
+    fn goal(&self) -> Result<Op, OpError> {
+        let action = self.name("action").map_err(OpError::Status)?;
+        match self.goal_for(&action) {
+            Ok(goal) => Ok(Op::SendActionGoal(goal)),
+            Err(problem) => Err(OpError::Goal { action, problem }),
+        }
+    }
+
+    fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        let fields = Action::from_name(action)
+            .filter(|action| !action.takes_long_goals())
+            .map(Action::goal_fields);
+        Ok(ActionGoal {
+            type_name: self.optional_text("action_type")?,
+            args: self.args(fields)?,
+            feedback: match self.get("feedback") {
+                Some(_) => self.boolean("feedback")?,
+                None => false,
+            },
+            action: action.to_owned(),
+        })
+    }
+
+    /// An operation of an action server.
+    fn serve_action(&self) -> Result<Op, Problem> {
+        let action = self.name("action")?;
+        let op = match self.op {
+            "advertise_action" => ActionServerOp::Advertise {
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_action" => ActionServerOp::Unadvertise,
+            "action_feedback" => {
+                self.required("id")?;
+                let values = self.object("values")?;
+                ActionServerOp::Feedback { values }
+            }
+            _ => {
+                self.required("id")?;
+                let is_good = self.boolean("result")?;
+                let values = self.get("values").filter(|raw| raw.get() != "null");
+                ActionServerOp::End {
+                    // The values of a failure may be a text that says why.
+                    values: match values {
+                        Some(_) if is_good => self.object("values")?,
+                        values => Payload::from(values.unwrap_or(RawValue::NULL)),
+                    },
+                    status: self.goal_status(is_good)?,
+                    result: is_good,
+                }
+            }
+        };
+        Ok(Op::ServeAction { action, op })
+    }
+
+    fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
+        let Some(raw) = self.get("status") else {
+            return Ok(if is_good {
+                GoalStatus::Succeeded
+            } else {
+                GoalStatus::Aborted
+            } as u8);
+        };
+        let status = json::integer(raw).and_then(|status| u8::try_from(status).ok());
+        status
+            .filter(|status| *status <= GoalStatus::Aborted as u8)
+            .ok_or_else(|| self.mistyped("status", "an integer from 0 to 6", raw))
+    }
+}
+
+// ---- answers: where one is bad, the op says which call or goal it is for --------------------------------------------
+
+/// Reads the start of a frame that is refused for the reason `why`: it may be the answer to a call, which then fails.
+#[must_use]
+pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
+    let text = start.utf8_chunks().next();
+    let mut members = [None; KEYS.len()];
+    // The members before its end or its fault count.
+    let _ = json::members_into(text.map_or("", |one| one.valid()), &KEYS, &mut members);
+    OpReader { op: "", members }.refused(Problem::NotAFrame(why.to_string()))
+}
+
+impl OpReader<'_> {
+    /// A frame that cannot be read to its end. Members before the fault count for an answer only.
+    fn refused(self, problem: Problem) -> Incoming {
+        let op = self.known_op().unwrap_or_default();
+        let reader = OpReader { op, ..self };
+        let op = reader.or_bad_answer(Err(problem));
+        let id = reader.get("id").filter(|_| op.is_ok()).map(Payload::from);
+        Incoming { id, op }
+    }
+
+    /// Makes an op of a fault in the answer to a call or goal: that call or goal ends.
+    fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
+        let (of_goal, name) = match self.op {
+            "service_response" => (false, "service"),
+            "action_result" => (true, "action"),
+            _ => return read.map_err(OpError::Status),
+        };
+        Ok(read.unwrap_or_else(|problem| Op::BadAnswer {
+            of_goal,
+            name: self.name(name).ok(),
+            problem,
+        }))
+    }
+
+    fn response(&self) -> Result<Op, Problem> {
+        self.required("id")?;
+        let (service, result) = (self.name("service")?, self.boolean("result")?);
+        Ok(Op::ServiceResponse {
+            service,
+            // The values of a failure may be a text that says why.
+            values: if result {
+                self.object("values")?
+            } else {
+                self.required("values")?.into()
+            },
+            result,
+            status: self.get("status").and_then(json::text).map(Cow::into_owned),
+        })
+    }
+}
+
+// ---- for the runtime's own nodes: only the members that they have a use for, at most `MAX_ARGS` bytes ---------------
+
+/// Arguments and messages longer than this are searched for members that no node of ours uses.
+const USUAL: usize = 4 * 1024;
+
+impl OpReader<'_> {
+    /// The arguments: of long ones for a node of ours the `fields` that it has, which must not be long.
+    fn args(&self, fields: Option<&'static [Field]>) -> Result<Arguments, Problem> {
+        let Some(raw) = self.get("args") else {
+            return Ok(Arguments::none());
+        };
+        let known = fields.filter(|_| raw.get().len() > USUAL);
+        let args = match known.and_then(|fields| only(raw, fields)) {
+            Some(known) => Payload::from(known),
+            None => Payload::from(raw),
+        };
+        if fields.is_some() {
+            self.within(MAX_ARGS, "args", args.get())?;
+        }
+        Ok(match args.get().as_bytes().first() {
+            Some(b'{') => Arguments::Object(args),
+            Some(b'[') => Arguments::Positional(args),
+            Some(b'n') => Arguments::none(),
+            _ => Arguments::Neither(args),
+        })
+    }
+
+    /// Returns the part of a long message that the runtime itself needs, where it listens to the topic.
+    fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<NodeMessage>, Problem> {
+        let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
+        if !is_ours || msg.get().len() <= USUAL {
+            return Ok(None);
+        }
+        let Some((text, left_out)) = trajectory::condensed(msg.raw()) else {
+            self.within(MAX_ARGS, "msg", msg.get())?;
+            return Ok(None);
+        };
+        self.within(MAX_ARGS, "msg", &text)?;
+        let msg = RawValue::from_string(text).ok().map(Payload::from);
+        Ok(msg.map(|msg| NodeMessage { msg, left_out }))
+    }
+}
+
+/// The object `raw` without members that are not among `fields`; `None` if it is no object.
+fn only(raw: &RawValue, fields: &[Field]) -> Option<Box<RawValue>> {
+    let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+    let mut values = vec![None; names.len()];
+    json::members_into(raw.get(), &names, &mut values).ok()?;
+    let found = names.into_iter().zip(values);
+    let found: BTreeMap<&str, &RawValue> = found
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect();
+    to_raw_value(&found).ok()
+}

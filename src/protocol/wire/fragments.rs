@@ -1,0 +1,464 @@
+//! Long messages in pieces: `fragment` in both directions.
+//!
+//! They [go out](split()) only to subscribers that asked for them with `fragment_size`, and are taken in from any
+//! client, within bounds. The module is told the time.
+//!
+//! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
+//! messages, none of them for longer than [`MAX_AGE`].
+
+use std::collections::{BTreeMap, HashMap};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::frame::start_of;
+use crate::protocol::limits::MAX_FRAME;
+
+/// Messages of one connection that may be incomplete at once: clients send one after the other.
+pub const MAX_UNFINISHED: usize = 8;
+/// Pieces of one message: each of a longest frame's has a kilobyte.
+pub const MAX_PIECES: usize = 4096;
+/// Bytes that a piece takes beside its text: its place among the others, and the allocator's own.
+pub const PIECE_BYTES: usize = 128;
+/// How long a message may take to come: longer than over the slowest usable network.
+pub const MAX_AGE: Duration = Duration::from_secs(60);
+
+/// A piece of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Piece {
+    /// The message, as the sender names it (any JSON value's text).
+    pub id: String,
+    /// The text.
+    pub data: String,
+    /// The piece's number, from 0.
+    pub num: usize,
+    /// How many there are.
+    pub total: usize,
+}
+
+/// Why a piece is not taken; the pieces of its message are forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FragmentError {
+    /// There is no piece of such a number.
+    #[error("fragment: num must be less than total, got {num} of {total}")]
+    NoSuchPiece {
+        /// The piece.
+        num: usize,
+        /// How many there are.
+        total: usize,
+    },
+    /// Too many pieces.
+    #[error("fragment: total must be at most {MAX_PIECES}, got {0}")]
+    TooMany(usize),
+    /// The number of pieces has changed.
+    #[error("fragment: total was {before}, and now is {now}")]
+    Changed {
+        /// The number as it was.
+        before: usize,
+        /// The number as it is now.
+        now: usize,
+    },
+    /// Too many messages at once.
+    #[error("fragment: at most {MAX_UNFINISHED} messages may be incomplete at once")]
+    TooManyMessages,
+    /// Too long.
+    #[error("fragment: what is incomplete has at most {MAX_FRAME} bytes")]
+    TooLong,
+}
+
+/// Messages of one connection that are still incomplete.
+#[derive(Debug, Default)]
+pub struct Fragments {
+    messages: HashMap<String, Incomplete>,
+    /// Bytes of all pieces.
+    bytes: usize,
+    /// The first bytes of the message that was refused last.
+    refused: Vec<u8>,
+}
+
+#[derive(Debug)]
+struct Incomplete {
+    began: Instant,
+    total: usize,
+    pieces: BTreeMap<usize, String>,
+}
+
+impl Incomplete {
+    fn bytes(&self) -> usize {
+        self.pieces.values().map(String::len).sum()
+    }
+}
+
+/// A message all of whose pieces have come. To put megabytes of them together takes milliseconds.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Complete {
+    pieces: BTreeMap<usize, String>,
+    bytes: usize,
+}
+
+impl Complete {
+    /// Bytes of the whole text.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The whole text.
+    #[must_use]
+    pub fn text(self) -> String {
+        let mut text = String::with_capacity(self.bytes);
+        text.extend(self.pieces.into_values());
+        text
+    }
+}
+
+impl Fragments {
+    /// Takes a piece. Returns the message with the last missing one. A piece that comes twice counts once.
+    ///
+    /// # Errors
+    /// [`FragmentError`] where the piece breaks a bound.
+    pub fn take(&mut self, piece: Piece, now: Instant) -> Result<Option<Complete>, FragmentError> {
+        self.forget_old(now);
+        let Piece {
+            id,
+            data,
+            num,
+            total,
+        } = piece;
+        let checked = self.check(&id, data.len(), num, total);
+        if let Err(why) = checked {
+            let first = self.forget(&id).and_then(|mut one| one.pieces.remove(&0));
+            let first = first.or_else(|| Some(data).filter(|_| num == 0));
+            self.refused = start_of(first.unwrap_or_default().as_bytes());
+            return Err(why);
+        }
+        let unfinished = self
+            .messages
+            .entry(id.clone())
+            .or_insert_with(|| Incomplete {
+                began: now,
+                total,
+                pieces: BTreeMap::new(),
+            });
+        self.bytes += data.len();
+        if let Some(before) = unfinished.pieces.insert(num, data) {
+            self.bytes -= before.len();
+        }
+        if unfinished.pieces.len() < total {
+            return Ok(None);
+        }
+        Ok(self.forget(&id).map(|whole| Complete {
+            bytes: whole.bytes(),
+            pieces: whole.pieces,
+        }))
+    }
+
+    /// The first bytes of the message that was refused last, if its first piece had come.
+    pub fn take_refused(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.refused)
+    }
+
+    /// Bytes of what is kept.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Bytes of memory that this takes: pieces without text take some too, and so do ids.
+    #[must_use]
+    pub fn allocated(&self) -> usize {
+        let beside = self.messages.iter();
+        let beside = beside.map(|(id, one)| id.len() + PIECE_BYTES * (1 + one.pieces.len()));
+        self.bytes + beside.sum::<usize>()
+    }
+
+    /// When the oldest unfinished message began.
+    #[must_use]
+    pub fn oldest(&self) -> Option<Instant> {
+        self.messages.values().map(|one| one.began).min()
+    }
+
+    fn check(&self, id: &str, bytes: usize, num: usize, total: usize) -> Result<(), FragmentError> {
+        if num >= total {
+            return Err(FragmentError::NoSuchPiece { num, total });
+        }
+        if total > MAX_PIECES {
+            return Err(FragmentError::TooMany(total));
+        }
+        match self.messages.get(id).map(|one| one.total) {
+            Some(before) if before != total => {
+                return Err(FragmentError::Changed { before, now: total });
+            }
+            None if self.messages.len() >= MAX_UNFINISHED => {
+                return Err(FragmentError::TooManyMessages);
+            }
+            _ => {}
+        }
+        let replaced = self.messages.get(id).and_then(|one| one.pieces.get(&num));
+        let replaced = replaced.map_or(0, String::len);
+        if self.bytes - replaced + bytes > MAX_FRAME {
+            return Err(FragmentError::TooLong);
+        }
+        Ok(())
+    }
+
+    fn forget(&mut self, id: &str) -> Option<Incomplete> {
+        let gone = self.messages.remove(id)?;
+        self.bytes -= gone.bytes();
+        Some(gone)
+    }
+
+    /// Forgets what has taken longer than [`MAX_AGE`].
+    pub fn forget_old(&mut self, now: Instant) {
+        let bytes = &mut self.bytes;
+        self.messages.retain(|_, one| {
+            let kept = now.saturating_duration_since(one.began) <= MAX_AGE;
+            if !kept {
+                *bytes -= one.bytes();
+            }
+            kept
+        });
+    }
+}
+
+// ---- a long message, cut into pieces for a subscriber: none is longer than was asked for ----------------------------
+
+/// The smallest pieces sent: smaller ones would be frame more than content.
+pub const MIN_SIZE: usize = 64;
+
+#[derive(Serialize)]
+struct Fragment<'a> {
+    op: &'static str,
+    id: &'a str,
+    data: &'a str,
+    num: usize,
+    total: usize,
+}
+
+/// A frame in pieces of at most `size` bytes of text each, one line per piece. A frame that is no longer than that
+/// stays as it is. `None` if the lines have more than `most` bytes.
+#[must_use]
+pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes> {
+    let text = frame.strip_suffix(b"\n").unwrap_or(frame);
+    let text = std::str::from_utf8(text).ok();
+    let Some(text) = text.filter(|text| text.len() > size) else {
+        return Some(frame.clone());
+    };
+    let size = size.max(MIN_SIZE);
+    if least_length(text, size, id) > most {
+        return None;
+    }
+    // A piece must not end within a character: the longest has four bytes.
+    let mut pieces = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let (piece, behind) = rest.split_at(boundary(rest, size));
+        pieces.push(piece);
+        rest = behind;
+    }
+    let total = pieces.len();
+    let mut lines = Vec::with_capacity(most.min(text.len() + total * 96));
+    for (num, data) in pieces.into_iter().enumerate() {
+        let fragment = Fragment {
+            op: "fragment",
+            id,
+            data,
+            num,
+            total,
+        };
+        let written = serde_json::to_writer(&mut lines, &fragment);
+        debug_assert!(written.is_ok(), "text can always be written as JSON");
+        if written.is_err() || lines.len() >= most {
+            return None;
+        }
+        lines.push(b'\n');
+    }
+    lines.shrink_to_fit();
+    Some(Bytes::from(lines))
+}
+
+/// The least bytes that the pieces of a text can have: pieces that would be too long are not made first.
+fn least_length(text: &str, size: usize, id: &str) -> usize {
+    const SHORTEST: usize = r#"{"op":"fragment","id":"","data":"","num":0,"total":0}"#.len() + 1;
+    let escaped = text.bytes().filter(|byte| matches!(byte, b'"' | b'\\'));
+    text.len() + escaped.count() + text.len().div_ceil(size) * (SHORTEST + id.len())
+}
+
+/// The last boundary of characters at or before `at`.
+fn boundary(text: &str, at: usize) -> usize {
+    let at = at.min(text.len());
+    let boundary = (0..=at).rev().find(|&at| text.is_char_boundary(at));
+    boundary.unwrap_or(text.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(id: &str, num: usize, total: usize, data: &str) -> Piece {
+        Piece {
+            id: id.to_owned(),
+            data: data.to_owned(),
+            num,
+            total,
+        }
+    }
+
+    #[test]
+    fn a_piece_that_comes_twice_takes_the_room_of_the_first() {
+        let half = "x".repeat(MAX_FRAME / 2);
+        let (mut fragments, now) = (Fragments::default(), Instant::now());
+        for _ in 0..3 {
+            assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
+        }
+        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
+        assert_eq!(whole.map(Complete::text), Some(half.repeat(2)));
+        assert_eq!(fragments.bytes(), 0);
+    }
+
+    #[test]
+    fn pieces_make_a_message_in_whatever_order_they_come() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.take(piece("a", 2, 3, "z"), now), Ok(None));
+        assert_eq!(fragments.take(piece("b", 0, 2, "other"), now), Ok(None));
+        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
+        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
+        let whole = fragments.take(piece("a", 1, 3, "y"), now).unwrap();
+        assert_eq!(whole.map(Complete::text), Some("xyz".to_owned()));
+        assert_eq!(fragments.bytes, "other".len());
+    }
+
+    #[test]
+    fn what_breaks_a_bound_is_refused_and_its_message_forgotten() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        fragments.take(piece("a", 0, 2, "x"), now).unwrap();
+        let half = "x".repeat(MAX_FRAME / 2 + 1);
+        for (bad, why) in [
+            (
+                piece("a", 1, 3, "y"),
+                FragmentError::Changed { before: 2, now: 3 },
+            ),
+            (
+                piece("a", 2, 2, "y"),
+                FragmentError::NoSuchPiece { num: 2, total: 2 },
+            ),
+            (
+                piece("a", 0, 0, "y"),
+                FragmentError::NoSuchPiece { num: 0, total: 0 },
+            ),
+            (
+                piece("a", 0, MAX_PIECES + 1, "y"),
+                FragmentError::TooMany(MAX_PIECES + 1),
+            ),
+        ] {
+            assert_eq!(fragments.take(bad, now), Err(why));
+            assert!(fragments.messages.is_empty());
+            assert_eq!(fragments.bytes, 0);
+            fragments.take(piece("a", 0, 2, "x"), now).unwrap();
+        }
+        fragments.take(piece("b", 0, 3, &half), now).unwrap();
+        let long = fragments.take(piece("b", 1, 3, &half), now);
+        assert_eq!(long, Err(FragmentError::TooLong));
+        assert_eq!(fragments.bytes, 1);
+        for number in 1..MAX_UNFINISHED {
+            fragments
+                .take(piece(&number.to_string(), 0, 2, "x"), now)
+                .unwrap();
+        }
+        let more = fragments.take(piece("more", 0, 2, "x"), now);
+        assert_eq!(more, Err(FragmentError::TooManyMessages));
+        let later = now + MAX_AGE + Duration::from_secs(1);
+        assert_eq!(fragments.take(piece("more", 0, 2, "x"), later), Ok(None));
+        assert_eq!(fragments.messages.len(), 1, "old ones are forgotten");
+    }
+
+    #[test]
+    fn the_bounds_themselves_are_within_bounds() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!(
+            fragments.take(piece("a", 0, MAX_PIECES, "x"), now),
+            Ok(None)
+        );
+        let half = "x".repeat(MAX_FRAME / 2);
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
+        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
+        assert_eq!(whole.map(|whole| whole.bytes()), Some(MAX_FRAME));
+    }
+
+    #[test]
+    fn what_is_kept_and_since_when_can_be_asked() {
+        let now = Instant::now();
+        let later = now + Duration::from_secs(1);
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "abc"), now).unwrap();
+        fragments.take(piece("b", 0, 2, "de"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(now)));
+        fragments.take(piece("a", 1, 2, "f"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (2, Some(later)));
+    }
+
+    #[test]
+    fn what_is_forgotten_makes_room() {
+        let now = Instant::now();
+        let much = "x".repeat(MAX_FRAME / 2 + 1);
+        let mut fragments = Fragments::default();
+        fragments.take(piece("old", 0, 2, &much), now).unwrap();
+        let at_last = now + MAX_AGE;
+        let more = fragments.take(piece("new", 0, 2, &much), at_last);
+        assert_eq!(more, Err(FragmentError::TooLong));
+        let later = at_last + Duration::from_nanos(1);
+        assert_eq!(fragments.take(piece("new", 0, 2, &much), later), Ok(None));
+        assert_eq!(fragments.bytes, much.len());
+    }
+
+    #[test]
+    fn what_is_kept_is_known_by_its_bytes_and_its_oldest() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "one"), now).unwrap();
+        let later = now + Duration::from_secs(1);
+        fragments.take(piece("b", 0, 2, "three"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (8, Some(now)));
+        fragments.forget_old(now + MAX_AGE);
+        assert_eq!(fragments.bytes(), 8);
+        fragments.forget_old(later + MAX_AGE);
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(later)));
+    }
+
+    /// Characters of one to four bytes, cut at every size: together again they are what they were.
+    #[test]
+    fn a_frame_in_pieces_is_the_frame_again() {
+        let text = format!("{{\"msg\":\"{}\"}}", "aä€😀\\\"".repeat(40));
+        let frame = Bytes::from(format!("{text}\n"));
+        assert_eq!(split(&frame, text.len(), "id", 0), Some(frame.clone()));
+        for size in MIN_SIZE..MIN_SIZE + 8 {
+            let mut fragments = Fragments::default();
+            let mut whole = None;
+            let lines = split(&frame, size, "id", usize::MAX).unwrap();
+            let within = |most: usize| split(&frame, size, "id", most).is_some();
+            assert!(within(lines.len()) && !within(lines.len() - 1));
+            let lines = lines.strip_suffix(b"\n").unwrap();
+            for line in lines.split(|byte| *byte == b'\n') {
+                let line: serde_json::Value = serde_json::from_slice(line).unwrap();
+                let number = |name: &str| usize::try_from(line[name].as_u64().unwrap()).unwrap();
+                let data = line["data"].as_str().unwrap();
+                assert!(data.len() <= size && line["id"] == "id" && line["op"] == "fragment");
+                let piece = Piece {
+                    id: "id".to_owned(),
+                    data: data.to_owned(),
+                    num: number("num"),
+                    total: number("total"),
+                };
+                whole = fragments.take(piece, Instant::now()).unwrap();
+            }
+            assert_eq!(whole.map(Complete::text).as_deref(), Some(&*text));
+        }
+    }
+}

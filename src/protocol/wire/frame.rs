@@ -1,0 +1,629 @@
+//! Bytes into frames: an incremental reader that any split of the stream leaves unmoved, and that resynchronises.
+//!
+//! A frame is one JSON object. It ends where its braces and brackets balance outside strings, or at a newline. Anything
+//! else runs to the newline and is one malformed frame.
+//!
+//! Messages that need no reading (see [`series`]) are taken as they are.
+//!
+//! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last
+//! pushed.
+
+use bytes::Bytes;
+
+use super::json;
+pub use super::opening::{Foreign, Opening, is_host_line, opening};
+use super::series::{self, Series};
+use super::text;
+use crate::protocol::limits::{MAX_FRAME, MAX_NESTING, MEDIUM, SHORT};
+
+/// Bytes of a line that is no object, kept for the error message.
+const MAX_PREFIX: usize = 32;
+/// Buffer that an idle reader may keep.
+const KEPT_BUFFER: usize = 16 * 1024;
+
+/// The part of the stream that the reader is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Within {
+    /// Between frames: white space.
+    Between,
+    /// In an object that is kept.
+    Object,
+    /// In an object that has been reported already, and is skipped to where it would have ended.
+    SkippedObject,
+    /// Behind the object of a message, which has not ended.
+    Behind,
+    /// In a line that is no object; its beginning is being collected.
+    Line,
+    /// In a line that has been reported already, and is skipped to the newline.
+    SkippedLine,
+}
+
+/// Takes bytes as they come and gives frames, one at a time.
+///
+/// [`push`](Self::push) a chunk, then [`cut`](Self::cut) until it gives `None`; at the end of the stream,
+/// [`finish`](Self::finish). As an iterator it reads each frame too, and knows no series.
+#[derive(Debug)]
+pub struct FrameReader {
+    buffer: Vec<u8>,
+    /// Start of the present frame in the buffer. Bytes before it have been handed out or skipped.
+    start: usize,
+    /// How far the buffer has been scanned.
+    at: usize,
+    state: Within,
+    nesting: Nesting,
+    /// Longest frame.
+    limit: usize,
+    /// Whether every line is a message, which holds one object.
+    of_messages: bool,
+    /// The object of a message that has not ended.
+    held: Option<RawFrame>,
+    /// The first bytes of the object that was refused last; a line that is no object has none.
+    refused: Vec<u8>,
+}
+
+impl Default for FrameReader {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl FrameReader {
+    /// A reader at the beginning of a stream.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::with_limit(MAX_FRAME)
+    }
+
+    /// A reader for frames of at most `limit` bytes.
+    #[must_use]
+    pub const fn with_limit(limit: usize) -> Self {
+        Self {
+            buffer: Vec::new(),
+            start: 0,
+            at: 0,
+            state: Within::Between,
+            nesting: Nesting::new(),
+            limit,
+            of_messages: false,
+            held: None,
+            refused: Vec::new(),
+        }
+    }
+
+    /// A reader for streams whose every line is a message. Only white space may stand behind its object; a message that
+    /// holds anything else is refused as a whole.
+    #[must_use]
+    pub const fn of_messages() -> Self {
+        let mut reader = Self::new();
+        reader.of_messages = true;
+        reader
+    }
+
+    /// Whether every line is a message.
+    #[must_use]
+    pub const fn is_of_messages(&self) -> bool {
+        self.of_messages
+    }
+
+    /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.compact();
+        // A `Vec` would double beyond [`MEDIUM`] before so many bytes have come.
+        let needed = self.buffer.len() + bytes.len();
+        if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
+            self.buffer.reserve_exact(MEDIUM - self.buffer.len());
+        }
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// The series of messages with which the stream goes on, if it does, short in all. It must be asked for before the
+    /// next frame.
+    pub fn series(&mut self) -> Option<Series> {
+        if self.state != Within::Between {
+            return None;
+        }
+        let rest = self.rest();
+        let space = rest.iter().position(|byte| !is_space(*byte))?;
+        let rest = rest.get(space..)?;
+        let rest = rest.get(..SHORT).unwrap_or(rest);
+        let (topic, length) = series::leading(rest)?;
+        let series = Series {
+            topic: topic.into(),
+            // The series is a copy, so that keeping it keeps nothing else of the stream.
+            frames: Bytes::copy_from_slice(rest.get(..length)?),
+        };
+        self.at += space + length;
+        self.start = self.at;
+        Some(series)
+    }
+
+    /// Cuts off the next part of the stream. `None` means that more bytes are needed, not that the stream has ended.
+    pub fn cut(&mut self) -> Option<FramePart> {
+        if let Some(lines) = self.series() {
+            return Some(FramePart::Lines(lines));
+        }
+        Some(match self.next_raw()? {
+            Ok(frame) => FramePart::Frame(frame),
+            Err(error) => FramePart::Error(error, std::mem::take(&mut self.refused)),
+        })
+    }
+
+    /// How much memory the reader holds, in bytes.
+    #[must_use]
+    pub fn buffered(&self) -> usize {
+        let held = self.held.as_ref().map_or(0, |frame| frame.bytes.capacity());
+        self.buffer.capacity() + held
+    }
+
+    /// Whether a frame has begun and not ended, one that is being skipped included.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        self.state != Within::Between
+    }
+
+    /// Ends the stream, after the last frame was taken. An unfinished frame is one malformed frame.
+    pub fn finish(&mut self) -> Option<FrameError> {
+        let error = match self.state {
+            Within::Object | Within::Behind => Some(FrameError::StreamEnded),
+            Within::Line => Some(self.not_an_object()),
+            Within::Between | Within::SkippedObject | Within::SkippedLine => None,
+        };
+        *self = Self {
+            of_messages: self.of_messages,
+            ..Self::with_limit(self.limit)
+        };
+        error
+    }
+
+    /// Moves what is unfinished to the front of the buffer, once what is done with has outgrown it: constant time per
+    /// byte.
+    fn compact(&mut self) {
+        let rest = self.buffer.len() - self.start;
+        if self.start < rest {
+            return;
+        }
+        self.buffer.copy_within(self.start.., 0);
+        self.buffer.truncate(rest);
+        self.at -= self.start;
+        self.start = 0;
+    }
+
+    /// Gives back the memory of a long frame once nothing of it is left.
+    fn give_back(&mut self) {
+        if self.start == self.buffer.len() {
+            self.buffer.clear();
+            self.buffer.shrink_to(KEPT_BUFFER);
+            self.start = 0;
+            self.at = 0;
+        }
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// Skips white space up to the first byte of something.
+    fn skip_space(&mut self) {
+        let rest = self.rest();
+        let space = rest.iter().position(|byte| !is_space(*byte));
+        let first = space.and_then(|space| rest.get(space)).copied();
+        self.at += space.unwrap_or(rest.len());
+        self.start = self.at;
+        match first {
+            Some(b'{') => {
+                self.state = Within::Object;
+                self.nesting = Nesting::new();
+            }
+            Some(_) => self.state = Within::Line,
+            None => {}
+        }
+    }
+
+    /// Goes on in a line that is no object. `None` if it has not ended yet or has been reported.
+    fn scan_line(&mut self) -> Option<FrameError> {
+        let rest = self.rest();
+        let newline = rest.iter().position(|&byte| byte == b'\n');
+        let length = newline.unwrap_or(rest.len());
+        if self.state == Within::SkippedLine {
+            self.at += length;
+            self.start = self.at;
+            if newline.is_some() {
+                self.state = Within::Between;
+            }
+            return None;
+        }
+        let wanted = MAX_PREFIX - (self.at - self.start);
+        self.at += length.min(wanted);
+        if newline.is_none() && length < wanted {
+            return None;
+        }
+        let error = self.not_an_object();
+        self.state = Within::SkippedLine;
+        self.start = self.at;
+        Some(error)
+    }
+
+    fn not_an_object(&self) -> FrameError {
+        let prefix = self.buffer.get(self.start..self.at).unwrap_or_default();
+        let cut = prefix.len() == MAX_PREFIX;
+        let text = String::from_utf8_lossy(prefix.trim_ascii_end());
+        let excerpt = text::excerpt(&text);
+        FrameError::NotAnObject(if cut { excerpt + "…" } else { excerpt })
+    }
+
+    /// Goes on in an object. `None` if it has not ended yet, or ended after it had been reported.
+    fn scan_object(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        let (scanned, event) = self
+            .nesting
+            .scan(self.buffer.get(self.at..).unwrap_or_default());
+        self.at += scanned;
+        let kept = self.state == Within::Object;
+        if !kept {
+            self.start = self.at;
+        }
+        // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
+        let limit = self.limit;
+        let too_long = self.at - self.start > limit;
+        let (on, behind) = if self.of_messages {
+            (Within::SkippedLine, Within::SkippedLine)
+        } else {
+            (Within::SkippedObject, Within::Between)
+        };
+        let (state, error) = match event {
+            None if !too_long => return None,
+            None => (on, FrameError::TooLong(limit)),
+            Some(Event::Balanced) if kept && !too_long => return self.take_frame().map(Ok),
+            Some(Event::Balanced) => (behind, FrameError::TooLong(limit)),
+            Some(Event::Newline { in_string: true }) => {
+                (Within::Between, FrameError::LineEndedInString)
+            }
+            Some(Event::Newline { in_string: false }) => (Within::Between, FrameError::LineEnded),
+            Some(Event::Mismatch { opener, found }) => {
+                (Within::SkippedLine, FrameError::Mismatch { opener, found })
+            }
+            Some(Event::TooDeep) => (on, FrameError::TooDeep),
+        };
+        if kept {
+            self.refused = start_of(self.buffer.get(self.start..self.at).unwrap_or_default());
+        }
+        self.state = state;
+        self.start = self.at;
+        kept.then_some(Err(if too_long {
+            FrameError::TooLong(limit)
+        } else {
+            error
+        }))
+    }
+
+    /// The frame that has just balanced; a message's comes only when the message has ended.
+    fn take_frame(&mut self) -> Option<RawFrame> {
+        let rest = self.rest();
+        let behind = rest
+            .iter()
+            .find(|byte| !matches!(byte, b' ' | b'\t' | b'\r'));
+        let newline = behind == Some(&b'\n');
+        let length = self.at - self.start;
+        let bytes = if length > KEPT_BUFFER && length >= rest.len() {
+            // The frame keeps the buffer, and the bytes behind it are copied, since they are fewer.
+            let mut kept = Vec::with_capacity(rest.len().max(KEPT_BUFFER));
+            kept.extend_from_slice(rest);
+            let mut bytes = std::mem::replace(&mut self.buffer, kept);
+            bytes.truncate(self.at);
+            bytes.drain(..self.start);
+            self.at = 0;
+            bytes
+        } else {
+            let frame = self.buffer.get(self.start..self.at);
+            frame.unwrap_or_default().to_vec()
+        };
+        self.start = self.at;
+        let frame = RawFrame {
+            bytes,
+            has_literals: self.nesting.has_literals,
+            newline,
+        };
+        if self.of_messages {
+            self.state = Within::Behind;
+            self.held = Some(frame);
+            return None;
+        }
+        self.state = Within::Between;
+        Some(frame)
+    }
+
+    /// Goes on behind the object of a message. `None` if that has not ended yet.
+    fn scan_behind(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        let rest = self.rest();
+        let behind = rest
+            .iter()
+            .position(|byte| *byte == b'\n' || !is_space(*byte));
+        let newline = behind.and_then(|at| rest.get(at)) == Some(&b'\n');
+        self.at += behind.unwrap_or(rest.len());
+        self.start = self.at;
+        behind?;
+        let frame = self.held.take();
+        if newline {
+            self.state = Within::Between;
+            return frame.map(|frame| Ok(RawFrame { newline, ..frame }));
+        }
+        self.refused = frame.map_or_else(Vec::new, |frame| start_of(&frame.bytes));
+        self.state = Within::SkippedLine;
+        Some(Err(FrameError::MoreBehind))
+    }
+
+    /// The next frame, still to be [decoded](RawFrame::decode). `None` means that more bytes are needed, not that the
+    /// stream has ended.
+    pub fn next_raw(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        loop {
+            let found = match self.state {
+                Within::Between => {
+                    self.skip_space();
+                    None
+                }
+                Within::Object | Within::SkippedObject => self.scan_object(),
+                Within::Behind => self.scan_behind(),
+                Within::Line | Within::SkippedLine => self.scan_line().map(Err),
+            };
+            if found.is_some() {
+                return found;
+            }
+            if self.at == self.buffer.len() {
+                self.give_back();
+                return None;
+            }
+        }
+    }
+}
+
+/// Frames as far as the bytes reach, decoded.
+impl Iterator for FrameReader {
+    type Item = Result<Frame, FrameError>;
+
+    fn next(&mut self) -> Option<Result<Frame, FrameError>> {
+        self.next_raw()
+            .map(|frame| frame?.decode().map_err(|(error, _)| error))
+    }
+}
+
+const fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
+}
+
+// ---- frames ---------------------------------------------------------------------------------------------------------
+
+/// One JSON object, as text. Its syntax within the outer braces is still unchecked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The text, with `NaN` and its like made [acceptable](json::accept_literals).
+    pub text: String,
+    /// Whether a line end was seen right behind it. Older raw-TCP clients send none, and want each frame in a write of
+    /// its own.
+    pub newline: bool,
+}
+
+/// Why a stretch of the stream is no frame. Nothing inside it is executed; later frames work.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// Something other than `{` began the line; holds the beginning of it.
+    #[error("malformed frame: a frame is one JSON object on one line, got \"{0}\"")]
+    NotAnObject(String),
+    /// A newline came before the object was complete.
+    #[error("malformed frame: the line ended inside an object")]
+    LineEnded,
+    /// A newline came inside a string.
+    #[error("malformed frame: the line ended inside a string")]
+    LineEndedInString,
+    /// The stream ended before the object was complete.
+    #[error("malformed frame: the connection ended inside an object")]
+    StreamEnded,
+    /// A `]` came where `}` was due, or the reverse.
+    #[error("malformed frame: {found} closes what {opener} opened")]
+    Mismatch {
+        /// The bracket that opened the innermost level.
+        opener: char,
+        /// The bracket that was to close it.
+        found: char,
+    },
+    /// More than [`MAX_NESTING`] levels.
+    #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
+    TooDeep,
+    /// Something stood behind the object of a message that holds one.
+    #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
+    MoreBehind,
+    /// Longer than the limit, which it holds: [`MAX_FRAME`](crate::protocol::limits::MAX_FRAME) unless the reader has
+    /// another.
+    #[error("frame longer than {0} bytes, skipped")]
+    TooLong(usize),
+    /// Not UTF-8.
+    #[error("malformed frame: byte {at} is not UTF-8")]
+    NotUtf8 {
+        /// Index of the first bad byte within the frame.
+        at: usize,
+    },
+}
+
+/// The next part of a stream.
+#[derive(Debug)]
+pub enum FramePart {
+    /// Messages of a client on a topic of clients that can go out as they are.
+    Lines(Series),
+    /// Any other frame.
+    Frame(RawFrame),
+    /// A stretch that is no frame, and its first bytes, at most [`KEPT_START`] of them.
+    Error(FrameError, Vec<u8>),
+}
+
+/// Bytes that are kept from the start of a frame that cannot be read: they hold the names and the id by which the call
+/// that it answers is found.
+pub const KEPT_START: usize = 1024;
+
+/// The bytes that are kept of the start of a frame that cannot be read.
+pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
+    bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
+}
+
+/// A [`Frame`] whose bytes nobody has looked at but to find its end: reading on may be left to another thread.
+#[derive(Debug)]
+pub struct RawFrame {
+    bytes: Vec<u8>,
+    /// Whether there may be names of numbers that are not finite.
+    has_literals: bool,
+    newline: bool,
+}
+
+impl RawFrame {
+    /// How long it is, in bytes; never 0.
+    #[must_use]
+    #[allow(clippy::len_without_is_empty, reason = "it has two braces at least")]
+    pub const fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Whether a line end was seen right behind it.
+    #[must_use]
+    pub const fn newline(&self) -> bool {
+        self.newline
+    }
+
+    /// The frame.
+    ///
+    /// # Errors
+    /// If it is not UTF-8; with the frame's first bytes.
+    pub fn decode(self) -> Result<Frame, (FrameError, Vec<u8>)> {
+        let text = String::from_utf8(self.bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            (FrameError::NotUtf8 { at }, start_of(error.as_bytes()))
+        })?;
+        let text = if self.has_literals {
+            json::accept_literals(text)
+        } else {
+            text
+        };
+        let newline = self.newline;
+        Ok(Frame { text, newline })
+    }
+}
+
+// ---- the end of one JSON object: the state after a byte depends on the bytes so far, not on how they were cut up ----
+
+const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
+
+/// The reason why a scan of an object stops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Event {
+    Balanced,
+    Newline { in_string: bool },
+    Mismatch { opener: char, found: char },
+    TooDeep,
+}
+
+/// State of the scan in an object: the brackets that are open, and whether it is inside a string.
+#[derive(Debug, Clone, Copy)]
+struct Nesting {
+    depth: usize,
+    /// One bit per open level, the innermost last: 1 for a bracket, 0 for a brace. Holds [`MAX_NESTING`] levels.
+    brackets: u128,
+    in_string: bool,
+    escaped: bool,
+    /// Whether an `N` or an `I` stood outside strings: only then can there be a `NaN` or an `Infinity`.
+    has_literals: bool,
+}
+
+impl Nesting {
+    const fn new() -> Self {
+        Self {
+            depth: 0,
+            brackets: 0,
+            in_string: false,
+            escaped: false,
+            has_literals: false,
+        }
+    }
+
+    /// Goes on with `bytes`. Returns how many were scanned, and what stopped the scan: it stops before a newline, and
+    /// behind anything else.
+    fn scan(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
+        let mut at = 0;
+        while let Some(&byte) = bytes.get(at) {
+            if self.in_string {
+                if self.escaped {
+                    self.escaped = false;
+                    if byte != b'\n' {
+                        at += 1;
+                        continue;
+                    }
+                }
+                at += plain_in_string(bytes.get(at..).unwrap_or_default());
+                match bytes.get(at) {
+                    None => break,
+                    Some(b'\n') => return (at, Some(Event::Newline { in_string: true })),
+                    Some(b'\\') => self.escaped = true,
+                    Some(_) => self.in_string = false,
+                }
+                at += 1;
+                continue;
+            }
+            if byte == b'\n' {
+                return (at, Some(Event::Newline { in_string: false }));
+            }
+            at += 1;
+            if let Some(event) = self.structural(byte) {
+                return (at, Some(event));
+            }
+        }
+        (bytes.len(), None)
+    }
+
+    #[inline]
+    fn structural(&mut self, byte: u8) -> Option<Event> {
+        match byte {
+            b'"' => self.in_string = true,
+            b'{' => return self.open(0),
+            b'[' => return self.open(1),
+            b'}' => return self.close(0),
+            b']' => return self.close(1),
+            b'N' | b'I' => self.has_literals = true,
+            _ => {}
+        }
+        None
+    }
+
+    fn open(&mut self, bracket: u128) -> Option<Event> {
+        self.depth += 1;
+        if self.depth <= MAX_NESTING {
+            self.brackets = (self.brackets << 1) + bracket;
+        }
+        (self.depth == MAX_NESTING + 1).then_some(Event::TooDeep)
+    }
+
+    fn close(&mut self, bracket: u128) -> Option<Event> {
+        if self.depth <= MAX_NESTING {
+            if self.brackets & 1 != bracket {
+                let (opener, found) = if bracket == 1 { ('{', ']') } else { ('[', '}') };
+                return Some(Event::Mismatch { opener, found });
+            }
+            self.brackets >>= 1;
+        }
+        self.depth -= 1;
+        (self.depth == 0).then_some(Event::Balanced)
+    }
+}
+
+/// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
+pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
+    /// Most strings are keys and names, and end before a block would pay.
+    const SHORT: usize = 16;
+    /// Bytes that the compiler compares with a few vector instructions.
+    const BLOCK: usize = 32;
+    let special = |byte: &u8| matches!(byte, b'"' | b'\\' | b'\n');
+    if let Some(end) = bytes.iter().take(SHORT).position(special) {
+        return end;
+    }
+    let blocks = bytes
+        .chunks_exact(BLOCK)
+        .take_while(|block| !block.iter().fold(false, |any, byte| any | special(byte)))
+        .count();
+    let plain = blocks * BLOCK;
+    let rest = bytes.get(plain..).unwrap_or_default();
+    plain + rest.iter().position(special).unwrap_or(rest.len())
+}
