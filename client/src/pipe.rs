@@ -87,8 +87,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
 
     /// Sends a frame.
     pub async fn send(&mut self, frame: &Value) {
+        self.send_text(&frame.to_string()).await;
+    }
+
+    /// Sends a frame as text.
+    pub async fn send_text(&mut self, frame: &str) {
         let mut bytes = Vec::new();
-        self.codec.write(&frame.to_string(), &mut bytes);
+        self.codec.write(frame, &mut bytes);
         self.send_bytes(&bytes).await;
     }
 

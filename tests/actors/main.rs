@@ -22,9 +22,11 @@ mod arm_sim;
 mod arm_turns;
 #[path = "../support/askers.rs"]
 mod askers;
+mod by_hand;
 mod connection;
 mod encodings;
 mod endings;
+mod exchanges;
 mod ik;
 mod ik_action;
 mod ik_trial;
@@ -41,6 +43,7 @@ mod paths;
 #[cfg(feature = "record")]
 mod recorder;
 mod refusals;
+mod registrations;
 mod registry;
 #[cfg(feature = "record")]
 mod replay;

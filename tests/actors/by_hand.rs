@@ -1,0 +1,141 @@
+//! A paused arm that clients step by hand: every answer is that of the offline stepper, in every bit.
+
+use crate::stage::{Client, Stage};
+use crate::system::in_virtual_time;
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::{ControlPeriod, Simulation};
+use serde_json::json;
+
+/// Both take steps, with an effort of the client in the controller's place or without one.
+async fn step(
+    client: &mut Client,
+    offline: &mut Simulation<2>,
+    steps: u64,
+    effort: Option<[f64; 2]>,
+) {
+    let mut args = json!({"steps": steps});
+    if let Some(effort) = effort {
+        args["effort"] = json!(effort);
+        offline.drive(Some(effort));
+    }
+    offline.advance(steps);
+    if effort.is_some() {
+        offline.drive(None);
+    }
+    let State { position, velocity } = offline.state();
+    let expected = json!({"steps": steps, "time": offline.time(), "position": position,
+        "velocity": velocity, "effort": offline.effort()});
+    assert_eq!(client.ask("/arm_sim/step", args).await, expected);
+}
+
+async fn paused() -> (Stage<2>, Client, Simulation<2>) {
+    let stage = Stage::<2>::start().await;
+    let mut client = stage.connect();
+    client.ask("/arm_sim/pause", json!({"data": true})).await;
+    client.ask("/arm_sim/reset", json!({})).await;
+    let offline = Simulation::new(Arm::default(), Gains::default());
+    (stage, client, offline)
+}
+
+#[test]
+fn steps_by_hand_are_those_of_the_offline_stepper_whatever_is_set_between_them() {
+    in_virtual_time(async {
+        for seed in 0..8 {
+            let (_stage, mut client, mut offline) = paused().await;
+            let mut random = fastrand::Rng::with_seed(seed);
+            for _ in 0..50 {
+                let pair = [random.f64() * 6.0 - 3.0, random.f64() * 6.0 - 3.0];
+                let on = random.bool();
+                match random.u8(0..9) {
+                    0 => {
+                        client
+                            .ask("/pid_controller/enable", json!({"data": on}))
+                            .await;
+                        offline.enable(on);
+                    }
+                    1 => {
+                        client.publish_trajectory(json!(pair)).await;
+                        offline.set_setpoint(Setpoint::at(pair));
+                    }
+                    2 => {
+                        let period = [0.0, 0.0013, 0.004, 0.01][random.usize(0..4)];
+                        let control = ControlPeriod { period, delay: on };
+                        offline.set_control_period(control);
+                        let args = json!({"period": period, "delay": on});
+                        let answer = client.ask("/pid_controller/set_period", args).await;
+                        let effective = control.effective(offline.timestep());
+                        assert_eq!(
+                            answer,
+                            json!({"period": period, "effective_period": effective, "delay": on})
+                        );
+                    }
+                    3 => {
+                        let timestep = [0.0005, 0.001, 0.003][random.usize(0..3)];
+                        let args = json!({"method": "verlet", "timestep": timestep});
+                        client.ask("/arm_sim/set_integrator", args).await;
+                        offline.set_method(Method::Verlet);
+                        if timestep != offline.timestep() {
+                            offline.set_timestep(timestep);
+                        }
+                    }
+                    4 => {
+                        let args = json!({"position": pair, "velocity": "fast"});
+                        let answer = client.call("/arm_sim/set_state", args).await;
+                        let velocity = offline.state().velocity;
+                        offline.set_state(State {
+                            position: pair,
+                            velocity,
+                        });
+                        assert_eq!(
+                            answer["values"],
+                            json!({"position": pair, "velocity": velocity})
+                        );
+                    }
+                    5 => {
+                        let push = json!({"effort": pair, "duration": 0.003});
+                        assert_eq!(client.ask("/arm_sim/disturb", push.clone()).await, push);
+                        offline.disturb(pair, 0.003);
+                    }
+                    6 => {
+                        // While the controller is on, it is refused.
+                        client.command_effort(json!(pair)).await;
+                        if !offline.pid().is_enabled() {
+                            offline.set_command(pair);
+                        }
+                    }
+                    7 => {
+                        client.ask("/arm_sim/reset", json!({})).await;
+                        offline.reset();
+                    }
+                    _ => step(&mut client, &mut offline, random.u64(1..40), Some(pair)).await,
+                }
+                step(&mut client, &mut offline, random.u64(1..30), None).await;
+            }
+        }
+    });
+}
+
+/// Steps are taken in slices. Later requests of the same client wait all the same.
+#[test]
+fn what_a_client_sends_behind_its_steps_takes_effect_behind_them() {
+    in_virtual_time(async {
+        let (_stage, mut client, mut offline) = paused().await;
+        for length in [1.1, 1.2, 1.3, 1.4] {
+            for (service, args) in [
+                ("/arm_sim/step", json!({"steps": 5000})),
+                ("/arm_sim/set_params", json!({"lengths": [length, 1]})),
+            ] {
+                let call = json!({"op": "call_service", "service": service, "args": args});
+                client.send(&call).await;
+            }
+            offline.advance(5000);
+            offline.set_arm(Arm::new([length, 1.0], [1.0; 2], 9.81).unwrap());
+        }
+        for _ in 0..8 {
+            assert_eq!(client.next().await["result"], true);
+        }
+        step(&mut client, &mut offline, 1, None).await;
+    });
+}
