@@ -2,8 +2,7 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`json`], [`cbor`], [`cdr`] | second readings, slow and strict |
-//! | [`admission`] | a second opinion on who may in |
+//! | [`json`], [`cbor`] | second readings, slow and strict |
 //! | [`limits`] | what an execution may cost in time and memory |
 //! | [`book`] | what clients have said, to compare what others hear with |
 //! | [`session`] | scripts for clients, and what must hold of what they hear |
@@ -12,10 +11,8 @@
 //!
 //! A target panics where something does not hold; the fuzzer then keeps its input.
 
-pub mod admission;
 pub mod book;
 pub mod cbor;
-pub mod cdr;
 pub mod client;
 pub mod json;
 pub mod limits;
