@@ -347,14 +347,6 @@ impl Client {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
-    /// Frames that have come, and were not awaited, once the runtime has handled all that was sent. Its messages for
-    /// this client by then stand before the answer to a call.
-    #[track_caller]
-    pub fn so_far(&mut self) -> Vec<Value> {
-        self.settle();
-        std::mem::take(&mut self.kept)
-    }
-
     /// The code with which the other side closes; messages that come before are ignored.
     #[track_caller]
     pub fn close_code(&mut self) -> Option<u16> {

@@ -39,6 +39,75 @@ async fn paused() -> (Stage<2>, Client, Simulation<2>) {
     (stage, client, offline)
 }
 
+/// Changes something on both at random.
+async fn change(client: &mut Client, offline: &mut Simulation<2>, random: &mut fastrand::Rng) {
+    let pair = [random.f64() * 6.0 - 3.0, random.f64() * 6.0 - 3.0];
+    let on = random.bool();
+    match random.u8(0..9) {
+        0 => {
+            client
+                .ask("/pid_controller/enable", json!({"data": on}))
+                .await;
+            offline.enable(on);
+        }
+        1 => {
+            client.publish_trajectory(json!(pair)).await;
+            offline.set_setpoint(Setpoint::at(pair));
+        }
+        2 => {
+            let period = [0.0, 0.0013, 0.004, 0.01][random.usize(0..4)];
+            let control = ControlPeriod { period, delay: on };
+            offline.set_control_period(control);
+            let args = json!({"period": period, "delay": on});
+            let answer = client.ask("/pid_controller/set_period", args).await;
+            let effective = control.effective(offline.timestep());
+            assert_eq!(
+                answer,
+                json!({"period": period, "effective_period": effective, "delay": on})
+            );
+        }
+        3 => {
+            let timestep = [0.0005, 0.001, 0.003][random.usize(0..3)];
+            let args = json!({"method": "verlet", "timestep": timestep});
+            client.ask("/arm_sim/set_integrator", args).await;
+            offline.set_method(Method::Verlet);
+            if timestep != offline.timestep() {
+                offline.set_timestep(timestep);
+            }
+        }
+        4 => {
+            let args = json!({"position": pair, "velocity": "fast"});
+            let answer = client.call("/arm_sim/set_state", args).await;
+            let velocity = offline.state().velocity;
+            offline.set_state(State {
+                position: pair,
+                velocity,
+            });
+            assert_eq!(
+                answer["values"],
+                json!({"position": pair, "velocity": velocity})
+            );
+        }
+        5 => {
+            let push = json!({"effort": pair, "duration": 0.003});
+            assert_eq!(client.ask("/arm_sim/disturb", push.clone()).await, push);
+            offline.disturb(pair, 0.003);
+        }
+        6 => {
+            // While the controller is on, it is refused.
+            client.command_effort(json!(pair)).await;
+            if !offline.pid().is_enabled() {
+                offline.set_command(pair);
+            }
+        }
+        7 => {
+            client.ask("/arm_sim/reset", json!({})).await;
+            offline.reset();
+        }
+        _ => step(client, offline, random.u64(1..40), Some(pair)).await,
+    }
+}
+
 #[test]
 fn steps_by_hand_are_those_of_the_offline_stepper_whatever_is_set_between_them() {
     in_virtual_time(async {
@@ -46,71 +115,7 @@ fn steps_by_hand_are_those_of_the_offline_stepper_whatever_is_set_between_them()
             let (_stage, mut client, mut offline) = paused().await;
             let mut random = fastrand::Rng::with_seed(seed);
             for _ in 0..50 {
-                let pair = [random.f64() * 6.0 - 3.0, random.f64() * 6.0 - 3.0];
-                let on = random.bool();
-                match random.u8(0..9) {
-                    0 => {
-                        client
-                            .ask("/pid_controller/enable", json!({"data": on}))
-                            .await;
-                        offline.enable(on);
-                    }
-                    1 => {
-                        client.publish_trajectory(json!(pair)).await;
-                        offline.set_setpoint(Setpoint::at(pair));
-                    }
-                    2 => {
-                        let period = [0.0, 0.0013, 0.004, 0.01][random.usize(0..4)];
-                        let control = ControlPeriod { period, delay: on };
-                        offline.set_control_period(control);
-                        let args = json!({"period": period, "delay": on});
-                        let answer = client.ask("/pid_controller/set_period", args).await;
-                        let effective = control.effective(offline.timestep());
-                        assert_eq!(
-                            answer,
-                            json!({"period": period, "effective_period": effective, "delay": on})
-                        );
-                    }
-                    3 => {
-                        let timestep = [0.0005, 0.001, 0.003][random.usize(0..3)];
-                        let args = json!({"method": "verlet", "timestep": timestep});
-                        client.ask("/arm_sim/set_integrator", args).await;
-                        offline.set_method(Method::Verlet);
-                        if timestep != offline.timestep() {
-                            offline.set_timestep(timestep);
-                        }
-                    }
-                    4 => {
-                        let args = json!({"position": pair, "velocity": "fast"});
-                        let answer = client.call("/arm_sim/set_state", args).await;
-                        let velocity = offline.state().velocity;
-                        offline.set_state(State {
-                            position: pair,
-                            velocity,
-                        });
-                        assert_eq!(
-                            answer["values"],
-                            json!({"position": pair, "velocity": velocity})
-                        );
-                    }
-                    5 => {
-                        let push = json!({"effort": pair, "duration": 0.003});
-                        assert_eq!(client.ask("/arm_sim/disturb", push.clone()).await, push);
-                        offline.disturb(pair, 0.003);
-                    }
-                    6 => {
-                        // While the controller is on, it is refused.
-                        client.command_effort(json!(pair)).await;
-                        if !offline.pid().is_enabled() {
-                            offline.set_command(pair);
-                        }
-                    }
-                    7 => {
-                        client.ask("/arm_sim/reset", json!({})).await;
-                        offline.reset();
-                    }
-                    _ => step(&mut client, &mut offline, random.u64(1..40), Some(pair)).await,
-                }
+                change(&mut client, &mut offline, &mut random).await;
                 step(&mut client, &mut offline, random.u64(1..30), None).await;
             }
         }

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::common::{Client, PATIENCE};
-pub(crate) use crate::json::numbers;
 
 /// Simulation time in the header of a message, in s.
 pub fn stamp(message: &Value) -> f64 {
@@ -77,14 +76,6 @@ pub fn let_simulate(client: &mut Client, time: f64) {
     state_within(client, patience, "end of the wait", |state| {
         stamp(state) >= end
     });
-}
-
-/// Whether every joint is within `tolerance` of its place.
-pub fn is_near(state: &Value, positions: &[f64], tolerance: f64) -> bool {
-    numbers(&state["position"])
-        .iter()
-        .zip(positions)
-        .all(|(is, wanted)| (is - wanted).abs() < tolerance)
 }
 
 /// A check that a right runtime passes on a quiet machine and a wrong one never does may fail now and then on a busy one.

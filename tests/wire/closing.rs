@@ -2,94 +2,27 @@
 //!
 //! **Invariant:** a client that has only stopped sending gets every answer that it is owed.
 
-use std::net::Shutdown;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::common::{Client, PATIENCE, Runtime, provide};
+use crate::common::{Client, PATIENCE, Runtime};
 use crate::diagnostics::gateway_count;
 use serde_json::{Value, json};
 
-fn half_close(client: &Client) {
-    client
-        .stream()
-        .shutdown(Shutdown::Write)
-        .expect("the stream is open");
-}
-
-/// All frames up to the end of the stream.
-fn rest(client: &mut Client) -> Vec<Value> {
-    let mut frames = Vec::new();
-    let mut bytes = Vec::new();
-    std::io::Read::read_to_end(&mut client.stream(), &mut bytes).expect("an orderly end");
-    for line in bytes
-        .split(|&byte| byte == b'\n')
-        .filter(|line| !line.is_empty())
-    {
-        frames.push(serde_json::from_slice(line).expect("a frame"));
-    }
-    frames
-}
-
-fn ids(frames: &[Value]) -> Vec<u64> {
-    let mut ids: Vec<u64> = frames
-        .iter()
-        .filter_map(|frame| frame["id"].as_u64())
-        .collect();
-    ids.sort_unstable();
-    ids
-}
-
 #[test]
-fn a_half_closed_client_gets_the_results_of_its_computations() {
+fn a_half_closed_client_gets_the_results_of_its_computations_and_then_the_end() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     for id in 0..25 {
         client.send(&json!({"op": "call_service", "service": "/arm_sim/integration_step", "id": id,
             "args": {"function": "sin(t)", "x0": 0, "dt": 0.1, "steps": 20_000, "integrator": "rk4"}}));
     }
-    half_close(&client);
-    let frames = rest(&mut client);
-    assert_eq!(ids(&frames), (0..25).collect::<Vec<_>>());
-    assert!(frames.iter().all(|frame| frame["result"] == true));
-}
-
-#[test]
-fn a_half_closed_client_with_nothing_to_come_is_closed_at_once() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.subscribe("/joint_states");
-    client.message("/joint_states");
-    let began = Instant::now();
-    half_close(&client);
-    rest(&mut client);
-    assert!(
-        began.elapsed() < Duration::from_secs(4),
-        "it may linger, but not for this"
-    );
-}
-
-#[test]
-fn what_a_half_closed_client_provides_is_withdrawn_and_its_own_calls_fail_if_nobody_else_can_answer()
- {
-    let runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    provider.send(&json!({"op": "call_service", "service": "/s", "id": 7}));
-    caller.send(&json!({"op": "call_service", "service": "/s", "id": 8}));
-    caller.settle();
-    half_close(&provider);
-    for (client, id) in [(&mut provider, 7), (&mut caller, 8)] {
-        let response = client.receive_where("response", |frame| frame["op"] == "service_response");
-        assert_eq!(
-            (&response["id"], &response["result"]),
-            (&json!(id), &json!(false))
-        );
-        assert!(
-            response["status"].as_str().unwrap().contains("gone"),
-            "{response}"
-        );
-    }
-    assert!(provider.is_closed());
+    client.finish();
+    let mut ids: Vec<u64> = (0..25)
+        .map(|_| client.receive()["id"].as_u64().unwrap())
+        .collect();
+    ids.sort_unstable();
+    assert_eq!(ids, (0..25).collect::<Vec<_>>());
+    assert!(client.is_closed());
 }
 
 #[test]

@@ -17,14 +17,10 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
-mod actions;
 mod advice;
 #[path = "../support/arm.rs"]
 mod arm;
 mod backpressure;
-mod broken_providers;
-mod cbor;
-mod client_actions;
 mod clock_diagnostics;
 mod closing;
 #[cfg(feature = "cli")]
@@ -34,36 +30,20 @@ mod common;
 mod computations;
 #[path = "../support/diagnostics.rs"]
 mod diagnostics;
-mod divergence;
-mod external_services;
 mod faults;
 mod faults_files;
 mod faults_slow;
 mod faults_threads;
-mod follow_path;
-mod fragments;
-mod framing;
 mod hostile_log;
 mod hostile_pages;
-mod hostile_users;
-mod hostile_websocket;
 mod http;
-mod ids;
 mod ik_action;
-mod ik_trial;
-mod joint_states;
-#[path = "../support/json.rs"]
-mod json;
-mod latched;
 mod launch;
-mod limits;
 mod memory_slow;
 mod mishaps;
-mod names;
 mod opening;
 mod options;
 mod order;
-mod parameters;
 mod places;
 #[cfg(target_os = "linux")]
 mod present;
@@ -73,18 +53,9 @@ mod readme;
 mod record;
 #[cfg(feature = "record")]
 mod record_words;
-mod rosapi;
-mod series;
-mod services;
 mod shutdown;
-mod stamps;
-mod step_disturb;
-mod study;
-mod tf_web;
 mod time;
 mod token;
-mod topics;
-mod two_clocks;
 #[path = "../support/web_client.rs"]
 mod web_client;
 mod websocket;

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
 use pendularm::actors::gateway::limits::MAX_MEMORY;
+#[cfg(feature = "web")]
+use pendularm_client::websocket;
 use serde_json::json;
 
 const MB: usize = 1_000_000;
@@ -262,20 +264,17 @@ fn registrations_and_calls_of_a_day() {
     attack("60 hogs of calls of a day", attackers);
 }
 
-/// A frame of a WebSocket, of at most 125 bytes.
+/// A frame of a WebSocket.
 #[cfg(feature = "web")]
 fn frame(opcode: u8, payload: &[u8]) -> Vec<u8> {
-    let length = u8::try_from(payload.len()).unwrap();
-    [&[opcode, 0x80 | length, 0, 0, 0, 0], payload].concat()
+    let mut bytes = Vec::new();
+    websocket::append(&mut bytes, opcode, [0; 4], payload);
+    bytes
 }
 
 #[cfg(feature = "web")]
 fn handshake(runtime: &Runtime) -> String {
-    format!(
-        "GET / HTTP/1.1\r\nHost: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-        runtime.address
-    )
+    websocket::handshake(&runtime.address.to_string(), "/", "")
 }
 
 /// Messages whose text is read before it is written: a map and a list for each few bytes of the first, a value for

@@ -179,6 +179,12 @@ fn a_warning_that_a_client_causes_in_a_loop_is_told_once_a_second_with_a_number(
         let mut published = Vec::new();
         while events(published.iter().map(String::as_str)) < TIMES {
             let message = listener.message("/rosout");
+            let from = (&message["level"], &message["name"]);
+            assert_eq!(from, (&json!(30), &json!("arm_sim")), "{message}");
+            assert!(
+                message["file"].as_str().unwrap().ends_with(".rs"),
+                "{message}"
+            );
             published.push(message["msg"].as_str().unwrap().to_owned());
         }
         published

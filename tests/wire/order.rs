@@ -1,9 +1,8 @@
-//! Frames of one connection take effect in the order sent, and those to it leave in the order in which they were
-//! produced.
+//! The order of frames where the arm and the gateway run on threads of their own.
 //!
 //! **Invariant:** a race that is possible is given hundreds of chances.
 
-use crate::arm::{stamp, state_where};
+use crate::arm::{send_trajectory, stamp, state_where, trajectory};
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
 
@@ -12,87 +11,12 @@ fn call(service: &str, id: impl Into<Value>, args: Value) -> String {
     format!("{frame}\n")
 }
 
-fn trajectory(position: f64) -> String {
-    let msg = json!({"points": [{"positions": [position, position]}]});
-    format!(
-        "{}\n",
-        json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg})
-    )
-}
-
-fn is_state(frame: &Value) -> bool {
-    frame["topic"] == "/joint_states"
-}
-
-/// All `/joint_states` that came before the response `id`, and the first `after` of those behind it.
-fn states_around(client: &mut Client, id: &str, after: usize) -> (Vec<Value>, Vec<Value>) {
-    client.receive_where("response", |frame| frame["id"] == id);
-    let before = std::mem::take(&mut client.kept)
-        .into_iter()
-        .filter(is_state);
-    let before = before.map(|mut frame| frame["msg"].take()).collect();
-    let after = (0..after)
-        .map(|_| client.message("/joint_states"))
-        .collect();
-    (before, after)
-}
-
-#[test]
-fn pipelined_calls_take_effect_and_are_answered_in_the_order_sent() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let frames: String = (0..300)
-        .map(|n| call("/arm_sim/set_params", n, json!({"gravity": n})))
-        .collect();
-    client.send_bytes(frames.as_bytes());
-    for n in 0..300 {
-        let response = client.receive();
-        assert_eq!(response["id"], n);
-        assert_eq!(response["values"]["gravity"], f64::from(n), "{response}");
-    }
-}
-
-/// A setpoint counts from the moment it is taken, and with P control alone and the arm paused the effort tells it.
-#[test]
-fn trajectories_and_calls_take_effect_in_the_order_sent() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.subscribe("/joint_states");
-    client.ask("/arm_sim/set_params", json!({"gravity": 0}));
-    client.ask(
-        "/pid_controller/set_gains",
-        json!({"kp": [1, 1], "ki": [0, 0], "kd": [0, 0]}),
-    );
-    // The reset clears the setpoint of the trajectory before it, and not that of the one behind it.
-    for round in 1..20 {
-        let frames = [
-            trajectory(7.0),
-            call("/pid_controller/enable", "on", json!({"data": true})),
-            call("/arm_sim/reset", "reset", json!({})),
-            call("/pid_controller/enable", "off", json!({"data": false})),
-        ];
-        client.send_bytes(frames.concat().as_bytes());
-        let (_, after) = states_around(&mut client, "off", 3);
-        for state in after {
-            assert_eq!(state["effort"], json!([0.0, 0.0]), "round {round}: {state}");
-            assert_eq!(state["position"], json!([0.0, 0.0]), "at rest: {state}");
-        }
-    }
-    client.send_bytes(
-        [
-            call("/arm_sim/reset", "reset", json!({})),
-            trajectory(0.5),
-            call("/pid_controller/enable", "on", json!({"data": true})),
-        ]
-        .concat()
-        .as_bytes(),
-    );
-    let (_, after) = states_around(&mut client, "on", 10);
-    assert!(
-        after[9]["effort"][0].as_f64().unwrap() > 0.0,
-        "{}",
-        after[9]
-    );
+/// The first `/joint_states` behind the response to this call.
+fn states_after<const N: usize>(client: &mut Client, service: &str, args: Value) -> [Value; N] {
+    client.send_bytes(call(service, "call", args).as_bytes());
+    client.receive_where("response", |frame| frame["id"] == "call");
+    client.kept.clear();
+    std::array::from_fn(|_| client.message("/joint_states"))
 }
 
 #[test]
@@ -102,10 +26,9 @@ fn no_state_from_before_follows_the_response_to_a_pause() {
     client.subscribe("/joint_states");
     for _ in 0..15 {
         client.message("/joint_states");
-        client.send_bytes(call("/arm_sim/pause", "pause", json!({"data": true})).as_bytes());
-        let (_, after) = states_around(&mut client, "pause", 2);
+        let [first, second] = states_after(&mut client, "/arm_sim/pause", json!({"data": true}));
         assert_eq!(
-            after[0], after[1],
+            first, second,
             "the arm moved after the response to the pause"
         );
         client.ask("/arm_sim/pause", json!({"data": false}));
@@ -125,136 +48,91 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
             (false, 0.5)
         };
         state_where(&mut client, "a moving arm", |state| stamp(state) > least);
-        client.send_bytes(
-            [
-                call("/arm_sim/pause", "pause", json!({"data": paused})),
-                call("/arm_sim/reset", "reset", json!({})),
-            ]
-            .concat()
-            .as_bytes(),
-        );
-        let (_, after) = states_around(&mut client, "reset", 1);
-        let after = stamp(&after[0]);
+        client.send_bytes(call("/arm_sim/pause", "pause", json!({"data": paused})).as_bytes());
+        let [after] = states_after(&mut client, "/arm_sim/reset", json!({}));
+        let after = stamp(&after);
         assert!(
             after == 0.0 || !paused && after < least,
-            "round {round}: {after} s after a reset"
-        );
-        client.ask("/arm_sim/pause", json!({"data": false}));
-    }
-}
-
-/// The throttled subscriber holds back half a second of states: they must not come out after the response.
-#[test]
-fn no_state_from_before_follows_also_where_throttling_holds_one_back() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.send(&json!({"op": "subscribe", "topic": "/joint_states", "throttle_rate": 150, "queue_length": 30}));
-    client.status();
-    for _ in 0..5 {
-        client.message("/joint_states");
-        client.message("/joint_states");
-        client.send_bytes(call("/arm_sim/pause", "pause", json!({"data": true})).as_bytes());
-        let (_, after) = states_around(&mut client, "pause", 2);
-        assert_eq!(
-            after[0], after[1],
-            "a state from before the pause came after its response"
+            "round {round}: {after} s"
         );
         client.ask("/arm_sim/pause", json!({"data": false}));
     }
 }
 
 #[test]
-fn no_state_from_before_follows_the_response_to_switching_the_controller_off() {
+fn no_state_from_before_follows_the_response_to_disabling_the_controller() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
-    client.send_bytes(trajectory(1.0).as_bytes());
+    send_trajectory(&mut client, &trajectory(&[1.0, 1.0]));
     for _ in 0..10 {
         client.ask("/pid_controller/enable", json!({"data": true}));
         client.receive_where("some effort", |frame| {
-            is_state(frame) && frame["msg"]["effort"] != json!([0.0, 0.0])
+            frame["topic"] == "/joint_states" && frame["msg"]["effort"] != json!([0.0, 0.0])
         });
-        client.kept.clear();
-        client.send_bytes(call("/pid_controller/enable", "off", json!({"data": false})).as_bytes());
-        let (_, after) = states_around(&mut client, "off", 1);
-        assert_eq!(after[0]["effort"], json!([0.0, 0.0]));
+        let [after] = states_after(
+            &mut client,
+            "/pid_controller/enable",
+            json!({"data": false}),
+        );
+        assert_eq!(after["effort"], json!([0.0, 0.0]));
     }
 }
 
 /// A status comes from the connection itself, an answer from the arm's thread: neither may overtake the other.
 #[test]
-fn answers_and_error_statuses_leave_in_the_order_of_what_they_answer() {
+fn answers_and_statuses_leave_in_the_order_of_the_frames_and_those_take_effect_in_it() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     let mut frames = String::new();
     for n in 0..200 {
-        frames += &call("/arm_sim/set_params", n, json!({}));
+        frames += &call("/arm_sim/set_params", n, json!({"gravity": n}));
         frames += "garbage\n";
-        frames += &call("/arm_sim/pause", n, json!(7));
         frames += &format!("{{\"op\":\"subscribe\",\"topic\":\"/t\",\"id\":{n}}}\n");
-        frames += "{\"op\":\"nonsense\"}";
         frames += &call("/none", n, json!({}));
     }
     client.send_bytes(frames.as_bytes());
     for n in 0..200 {
-        assert_eq!(client.receive()["id"], n, "an answer of the arm");
-        let malformed = client.receive();
-        assert!(
-            malformed["msg"]
-                .as_str()
-                .is_some_and(|msg| msg.contains("malformed")),
-            "{malformed}"
-        );
-        let refused = client.receive();
+        let answer = client.receive();
         assert_eq!(
-            (&refused["id"], &refused["result"]),
-            (&json!(n), &json!(false))
+            (&answer["id"], &answer["values"]["gravity"]),
+            (&json!(n), &json!(f64::from(n)))
         );
+        let malformed = client.receive()["msg"].to_string();
+        assert!(malformed.contains("malformed"), "{malformed}");
         assert_eq!(client.receive()["msg"], "subscribed to /t");
-        let unknown = client.receive();
-        assert!(
-            unknown["msg"]
-                .as_str()
-                .is_some_and(|msg| msg.contains("nonsense")),
-            "{unknown}"
-        );
         assert_eq!(client.receive()["service"], "/none");
     }
 }
 
+/// More than a chunk, and cut at lengths that have nothing to do with those of the messages.
 #[test]
-fn messages_of_one_publisher_arrive_in_the_order_sent() {
+fn a_flood_arrives_whole_and_in_order_in_every_spelling() {
+    const AT_ONCE: u64 = 1000;
     let runtime = Runtime::start();
-    let (mut publisher, mut subscriber) = (runtime.connect(), runtime.connect());
-    subscriber.subscribe("/a");
-    subscriber.subscribe("/b");
-    let mut frames = String::from(
-        "{\"op\":\"advertise\",\"topic\":\"/a\"}{\"op\":\"advertise\",\"topic\":\"/b\"}",
-    );
-    for n in 0..1000 {
-        let topic = if n % 3 == 0 { "/a" } else { "/b" };
-        frames += &format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{{\"n\":{n}}}}}\n");
+    let mut subscribers = ["/flood", "flood"].map(|topic| {
+        let mut client = runtime.connect();
+        client.subscribe(topic);
+        (client, topic)
+    });
+    let mut publisher = runtime.connect();
+    publisher.send(&json!({"op": "advertise", "topic": "/flood"}));
+    for first in (0..5000).step_by(AT_ONCE as usize) {
+        let line = |n: u64| match n % 100 {
+            // Spelled so that it has to be read.
+            98 => format!(
+                "{{\"msg\": {{\"n\":{n}}}, \"topic\": \"/flood\", \"op\": \"publish\"}}\r\n"
+            ),
+            _ => format!("{{\"op\":\"publish\",\"topic\":\"/flood\",\"msg\":{{\"n\":{n}}}}}\n"),
+        };
+        let stream: String = (first..first + AT_ONCE).map(line).collect();
+        for piece in stream.as_bytes().chunks(7919) {
+            publisher.send_bytes(piece);
+        }
+        for n in first..first + AT_ONCE {
+            for (client, topic) in &mut subscribers {
+                assert_eq!(client.message(topic)["n"], n);
+            }
+        }
     }
-    publisher.send_bytes(frames.as_bytes());
-    for n in 0..1000 {
-        assert_eq!(subscriber.receive()["msg"]["n"], n);
-    }
-}
-
-#[test]
-fn a_computation_may_answer_late_and_holds_up_no_other_call() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    let heavy =
-        json!({"function": "sin(t)", "x0": 0, "dt": 1e-3, "steps": 300_000, "integrator": "rk4"});
-    client.send_bytes(
-        [
-            call("/arm_sim/integration_step", "heavy", heavy),
-            call("/arm_sim/pause", "light", json!({})),
-        ]
-        .concat()
-        .as_bytes(),
-    );
-    assert_eq!(client.receive()["id"], "light");
-    assert_eq!(client.receive()["id"], "heavy");
 }

@@ -18,7 +18,7 @@
 //! | `a leave` | disconnects |
 //! | `pass ms` | virtual time passes |
 //!
-//! In a sent text, `%3*x%` is `xxx`, `%cr%` is a carriage return, and `$name` is a value that a pattern has bound. A pattern is JSON. An object may have more members
+//! In a sent text, `%3*x%` is `xxx`, `%MAX_NAME*x%` repeats as often as that limit says, `%cr%` is a carriage return, and `$name` is a value that a pattern has bound. A pattern is JSON. An object may have more members
 //! than its pattern. The texts `*`, `-`, `~part` and `$name` match any value, no value, a value that contains this part, and the value
 //! that the name is bound to. `{"=": value}` matches this value only. At the end, no client has a frame that was not received, other
 //! than messages of topics that are published periodically.
@@ -43,11 +43,14 @@ use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
-use pendularm::actors::ros::tf_web::TfRepublisher;
+use pendularm::actors::ros::tf_web::{MAX_FRAMES, TfRepublisher};
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{Rosapi, Service};
+use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME};
+use pendularm::protocol::op::follow::MAX_POINTS;
+use pendularm::protocol::ros::parameters::MAX_NAMED;
 use pendularm_client::codec::Event;
 use pendularm_client::{Error, pipe};
 use serde_json::{Value, json};
@@ -55,7 +58,16 @@ use tokio::io::{DuplexStream, duplex};
 use tokio::time::{sleep, timeout};
 
 /// Virtual time that a frame may take to come.
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Limits that a repetition may have as its count.
+const LIMITS: [(&str, usize); 5] = [
+    ("MAX_FRAME", MAX_FRAME),
+    ("MAX_FRAMES", MAX_FRAMES),
+    ("MAX_NAME", MAX_NAME),
+    ("MAX_NAMED", MAX_NAMED),
+    ("MAX_POINTS", MAX_POINTS),
+];
 
 /// Topics that are published periodically.
 const PERIODIC: [&str; 5] = [
@@ -255,38 +267,9 @@ impl World {
                     &mut self.bound,
                 )?;
             }
-            "call" => {
-                let got = peer.call(service, &args).await?;
-                check("{\"result\":true,\"status\":\"\"}", &got, &mut self.bound)?;
-                let wanted = if wanted.is_empty() { "{}" } else { wanted };
-                check(wanted, &got["values"], &mut self.bound)?;
-            }
-            "refused" => {
-                let got = peer.call(service, &args).await?;
-                let status = got["status"].as_str().unwrap_or_default();
-                if got["result"] != false || wanted.is_empty() || !status.contains(wanted) {
-                    return Err(format!("{wanted}: {got}"));
-                }
-            }
-            "goal" => {
-                let goal = json!({"op": "send_action_goal", "id": "the goal", "action": service});
-                let args = format!(",\"args\":{args}}}");
-                peer.send(&goal.to_string().replace('}', &args)).await;
-                let got = peer.next().await?;
-                let refused = r#"{"op":"action_result","id":"the goal","status":0,"result":false}"#;
-                check(refused, &got, &mut self.bound)?;
-                let why = got["values"].as_str().unwrap_or_default();
-                if wanted.is_empty() || !why.contains(wanted) {
-                    return Err(format!("{wanted}: {got}"));
-                }
-            }
-            "error" => {
-                peer.send(&expand(given, &self.bound)).await;
-                let got = peer.next().await?;
-                let msg = got["msg"].as_str().unwrap_or_default();
-                if got["level"] != "error" || wanted.is_empty() || !msg.contains(wanted) {
-                    return Err(format!("{wanted}: {got}"));
-                }
+            "call" | "refused" | "goal" | "error" => {
+                let text = expand(given, &self.bound);
+                ask(peer, verb, [service, &args, &text, wanted], &mut self.bound).await?;
             }
             "quiet" => {
                 let rest = peer.rest().await;
@@ -304,6 +287,52 @@ impl World {
     }
 }
 
+/// Asks something, and checks the answer.
+async fn ask(
+    peer: &mut Peer,
+    verb: &str,
+    [service, args, text, wanted]: [&str; 4],
+    bound: &mut BTreeMap<String, Value>,
+) -> Result<(), String> {
+    match verb {
+        "call" => {
+            let got = peer.call(service, args).await?;
+            check("{\"result\":true,\"status\":\"\"}", &got, bound)?;
+            let wanted = if wanted.is_empty() { "{}" } else { wanted };
+            check(wanted, &got["values"], bound)?;
+        }
+        "refused" => {
+            let got = peer.call(service, args).await?;
+            let status = got["status"].as_str().unwrap_or_default();
+            if got["result"] != false || wanted.is_empty() || !status.contains(wanted) {
+                return Err(format!("{wanted}: {got}"));
+            }
+        }
+        "goal" => {
+            let goal = json!({"op": "send_action_goal", "id": "the goal", "action": service});
+            let args = format!(",\"args\":{args}}}");
+            peer.send(&goal.to_string().replace('}', &args)).await;
+            let got = peer.next().await?;
+            let refused = r#"{"op":"action_result","id":"the goal","status":0,"result":false}"#;
+            check(refused, &got, bound)?;
+            let why = got["values"].as_str().unwrap_or_default();
+            if wanted.is_empty() || !why.contains(wanted) {
+                return Err(format!("{wanted}: {got}"));
+            }
+        }
+        "error" => {
+            peer.send(text).await;
+            let got = peer.next().await?;
+            let msg = got["msg"].as_str().unwrap_or_default();
+            if got["level"] != "error" || wanted.is_empty() || !msg.contains(wanted) {
+                return Err(format!("{wanted}: {got}"));
+            }
+        }
+        _ => return Err("no question".to_owned()),
+    }
+    Ok(())
+}
+
 /// A text as it is sent.
 fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
     let mut text = text.to_owned();
@@ -313,10 +342,9 @@ fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
     while let Some((before, rest)) = text.split_once('%') {
         let (repeated, after) = rest.split_once('%').expect("an end of the repetition");
         let (count, part) = repeated.split_once('*').unwrap_or(("1", "\r"));
-        text = format!(
-            "{before}{}{after}",
-            part.repeat(count.parse().expect("a count"))
-        );
+        let limit = LIMITS.iter().find(|(name, _)| *name == count);
+        let count = limit.map_or_else(|| count.parse().expect("a count"), |(_, limit)| *limit);
+        text = format!("{before}{}{after}", part.repeat(count));
     }
     text
 }

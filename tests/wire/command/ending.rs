@@ -60,21 +60,6 @@ fn without_a_runtime_the_status_is_3() {
     }
 }
 
-#[test]
-fn a_negative_number_is_refused_by_its_option() {
-    for (arguments, option) in [
-        (&["topic", "list", "--timeout", "-1"][..], "--timeout"),
-        (&["topic", "echo", "/clock", "-n", "-1"], "--times"),
-        (&["topic", "hz", "/clock", "-w", "-1"], "--window"),
-        (&["topic", "pub", "/chatter", "-t", "-1"], "--times"),
-        (&["topic", "pub", "/chatter", "-r", "-1.5"], "--rate"),
-    ] {
-        let said = complaint(&output(arguments), 2);
-        assert!(said.contains(&format!("{option} must be ")), "{said}");
-        assert!(said.contains("got \"-1"), "{said}");
-    }
-}
-
 /// A server that says these bytes to whoever comes, and then closes or says nothing more.
 fn server(says: &'static [u8], closes: bool) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -150,40 +135,40 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
 
 #[test]
 fn bad_usage_gives_status_2_and_a_line_that_names_it() {
-    for (arguments, words) in [
+    for (line, words) in [
         (
-            &["topic"][..],
-            "'pendularm topic' requires a subcommand but one was not provided [subcommands: list, info, echo, hz, pub",
+            "topic",
+            "'pendularm topic' requires a subcommand but one was not provided",
         ),
-        (&["topic", "bw"], "unrecognized subcommand 'bw'"),
-        (&["param", "dump"], "unrecognized subcommand 'dump'"),
-        (&["run"], "unrecognized subcommand 'run'"),
-        (&["topic", "echo"], "not provided: <TOPIC>"),
-        (&["topic", "echo", "/a", "b/msg/C", "d"], "'d'"),
+        ("topic bw", "unrecognized subcommand 'bw'"),
+        ("param dump", "unrecognized subcommand 'dump'"),
+        ("run", "unrecognized subcommand 'run'"),
+        ("topic echo", "not provided: <TOPIC>"),
+        ("topic echo /a b/msg/C d", "'d'"),
         (
-            &["topic", "list", "--connect", "no where"],
+            "topic list --connect no:where",
             "must be a port, a host, both or a URL",
         ),
+        ("topic list --timeout 0", "--timeout must be a number"),
+        ("topic list --timeout -1", "--timeout must be"),
+        ("topic echo /clock -n -1", "--times must be"),
+        ("topic hz /a -w 0", "must be a whole number from 1"),
+        ("topic hz /clock -w -1", "--window must be"),
+        ("topic pub /a {} -r x", "got \"x\""),
+        ("topic pub /chatter -t -1", "--times must be"),
+        ("topic pub /chatter -r -1.5", "--rate must be"),
         (
-            &["topic", "list", "--timeout", "0"],
-            "--timeout must be a number",
-        ),
-        (
-            &["topic", "hz", "/a", "-w", "0"],
-            "must be a whole number from 1",
-        ),
-        (&["topic", "pub", "/a", "{}", "-r", "x"], "got \"x\""),
-        (
-            &["topic", "pub", "/a", "{}", "-1", "-t", "3"],
+            "topic pub /a {} -1 -t 3",
             "'--once' cannot be used with '--times <N>'",
         ),
         (
-            &["completions", "tcsh"],
+            "completions tcsh",
             "[possible values: bash, elvish, fish, powershell, zsh]",
         ),
-        (&["--links", "3", "topic", "list"], "--links"),
+        ("--links 3 topic list", "--links"),
     ] {
-        let said = complaint(&output(arguments), 2);
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let said = complaint(&output(&arguments), 2);
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
 }

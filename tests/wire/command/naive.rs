@@ -8,132 +8,26 @@ use crate::common::{self, Runtime};
 
 const ENABLE: &str = "/pid_controller/enable";
 
-const FOLLOW: &str = "/joint_trajectory_controller/follow_joint_trajectory";
-const GOAL: &str =
-    "{trajectory: {points: [{positions: [0, 0], time_from_start: {sec: 1}}, {velocity: 1}]}}";
-
-/// A command, a name and a value; the words that are wrong, and some that are right.
-const UNKNOWN_FIELDS: [(&str, &str, &str, &str, &str); 17] = [
-    (
-        "service call",
-        ENABLE,
-        "{data:true}",
-        "\"data:true\"",
-        "{data: true}",
-    ),
-    (
-        "service call",
-        ENABLE,
-        "data:true",
-        "\"data:true\"",
-        "{data: true}",
-    ),
-    (
-        "service call",
-        ENABLE,
-        "{\"data:true\": null}",
-        "\"data:true\"",
-        "data",
-    ),
-    (
-        "service call",
-        ENABLE,
-        "{enable: true}",
-        "\"enable\"",
-        "it has data",
-    ),
-    (
-        "service call",
-        "arm_sim/set_params",
-        "{gravty: 5}",
-        "\"gravty\"",
-        "gravity",
-    ),
-    (
-        "service call",
-        "/arm_sim/set_params",
-        "{\"Gravity\": 5}",
-        "\"Gravity\"",
-        "gravity",
-    ),
-    (
-        "service call",
-        "/arm_sim/set_params",
-        "{gravity:5}",
-        "\"gravity:5\"",
-        "{gravity: 5}",
-    ),
-    (
-        "service call",
-        "/arm_sim/reset",
-        "{now: 1}",
-        "\"now\"",
-        "it has none",
-    ),
-    (
-        "service call",
-        "/ik_trial/start",
-        "{duration:5}",
-        "\"duration:5\"",
-        "{duration: 5}",
-    ),
-    (
-        "service call",
-        "/study/stability",
-        "{gains: {kP: [1, 1]}}",
-        "\"gains.kP\"",
-        "kp",
-    ),
-    (
-        "service call",
-        "/study/stability",
-        "[rk4, {kP: [1, 1]}]",
-        "\"gains.kP\"",
-        "kp",
-    ),
-    (
-        "topic pub",
-        "/joint_trajectory",
-        "{point: []}",
-        "\"point\"",
-        "points",
-    ),
-    (
-        "topic pub",
-        "/joint_trajectory",
-        "points: [{position: [1, 1]}]",
-        "\"points[0].position\"",
-        "positions",
-    ),
-    (
-        "topic pub",
-        "/joint_trajectory",
-        "points: [{positions:[1, 1], velocities:0}]",
-        "\"points[0].velocities:0\"",
-        "{velocities: 0}",
-    ),
-    (
-        "topic pub",
-        "/joint_trajectory",
-        "header: {stamps: 1}",
-        "\"header.stamps\"",
-        "stamp",
-    ),
-    (
-        "action send_goal",
-        "/ik_action",
-        "{x: 1, y: 1, epsilom: 1}",
-        "\"epsilom\"",
-        "epsilon",
-    ),
-    (
-        "action send_goal",
-        FOLLOW,
-        GOAL,
-        "\"trajectory.points[1].velocity\"",
-        "velocities",
-    ),
-];
+/// Commands, their names and values, the words that are wrong, and some that are right.
+const UNKNOWN_FIELDS: &str = r#"
+service call | /pid_controller/enable | {data:true} | "data:true" | {data: true}
+service call | /pid_controller/enable | data:true | "data:true" | {data: true}
+service call | /pid_controller/enable | {"data:true": null} | "data:true" | data
+service call | /pid_controller/enable | {enable: true} | "enable" | it has data
+service call | arm_sim/set_params | {gravty: 5} | "gravty" | gravity
+service call | /arm_sim/set_params | {"Gravity": 5} | "Gravity" | gravity
+service call | /arm_sim/set_params | {gravity:5} | "gravity:5" | {gravity: 5}
+service call | /arm_sim/reset | {now: 1} | "now" | it has none
+service call | /ik_trial/start | {duration:5} | "duration:5" | {duration: 5}
+service call | /study/stability | {gains: {kP: [1, 1]}} | "gains.kP" | kp
+service call | /study/stability | [rk4, {kP: [1, 1]}] | "gains.kP" | kp
+topic pub | /joint_trajectory | {point: []} | "point" | points
+topic pub | /joint_trajectory | points: [{position: [1, 1]}] | "points[0].position" | positions
+topic pub | /joint_trajectory | points: [{positions:[1, 1], velocities:0}] | "points[0].velocities:0" | {velocities: 0}
+topic pub | /joint_trajectory | header: {stamps: 1} | "header.stamps" | stamp
+action send_goal | /ik_action | {x: 1, y: 1, epsilom: 1} | "epsilom" | epsilon
+action send_goal | /joint_trajectory_controller/follow_joint_trajectory | {trajectory: {points: [{positions: [0, 0], time_from_start: {sec: 1}}, {velocity: 1}]}} | "trajectory.points[1].velocity" | velocities
+"#;
 
 /// Each is refused before it is sent, in words that have what is wrong and what is right.
 #[test]
@@ -141,7 +35,9 @@ fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.subscribe("/joint_trajectory");
-    for (command, name, value, wrong, right) in UNKNOWN_FIELDS {
+    for row in UNKNOWN_FIELDS.trim().lines() {
+        let [command, name, value, wrong, right] =
+            row.split(" | ").collect::<Vec<_>>().try_into().expect(row);
         let words: Vec<&str> = command.split(' ').chain([name, value]).collect();
         let refused = refusal(&runtime, &words, 2);
         assert!(
@@ -186,41 +82,18 @@ fn types_that_the_runtime_does_not_know_have_any_field() {
 #[test]
 fn a_value_that_the_shell_has_split_is_to_be_quoted() {
     let runtime = Runtime::start();
-    for words in [
-        &["service", "call", ENABLE, "{data:", "true}"][..],
-        &[
-            "service",
-            "call",
-            "/arm_sim/set_params",
-            "{gravity:",
-            "1,",
-            "masses:",
-            "[1,",
-            "1]}",
-        ],
-        &["service", "call", ENABLE, "data:", "true"],
-        &[
-            "topic",
-            "pub",
-            "/joint_trajectory",
-            "{points:",
-            "[{positions:",
-            "[0.3,",
-            "-0.5]}]}",
-        ],
-        &[
-            "topic",
-            "pub",
-            "/chatter",
-            "std_msgs/msg/String",
-            "{data:",
-            "hi}",
-        ],
+    for line in [
+        "service call /pid_controller/enable {data: true}",
+        "service call /arm_sim/set_params {gravity: 1, masses: [1, 1]}",
+        "service call /pid_controller/enable data: true",
+        "topic pub /joint_trajectory {points: [{positions: [0.3, -0.5]}]}",
+        "topic pub /chatter std_msgs/msg/String {data: hi}",
         // A shell makes this of {x:1,y:2}.
-        &["action", "send_goal", "/ik_action", "x:1", "y:2"],
-        &["param", "set", "/arm_sim", "masses", "[1,", "2]"],
+        "action send_goal /ik_action x:1 y:2",
+        "param set /arm_sim masses [1, 2]",
     ] {
-        let refused = refusal(&runtime, words, 2);
+        let words: Vec<&str> = line.split(' ').collect();
+        let refused = refusal(&runtime, &words, 2);
         assert!(
             refused.contains("put quotes around all of it, such as '{data: true}'"),
             "{words:?}: {refused}"

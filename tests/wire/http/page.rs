@@ -83,6 +83,9 @@ fn the_page_may_run_its_own_files_speak_to_its_own_port_and_nothing_else() {
         "frame-ancestors 'none'",
         "base-uri 'none'",
         "form-action 'none'",
+        // No markup is made of a text.
+        "require-trusted-types-for 'script'",
+        "trusted-types 'none'",
     ] {
         assert!(
             policy.split("; ").any(|one| one == rule),

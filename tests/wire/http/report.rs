@@ -49,52 +49,86 @@ fn a_report_larger_than_a_socket_holds_arrives_whole() {
     assert!(get(runtime.address, "/report/large.txt").text() == text);
 }
 
+/// Paths below `/report/` that lead to no file of the report.
+const PATHS: [&str; 32] = [
+    "../secret.txt",
+    "%2e%2e/secret.txt",
+    "..%2fsecret.txt",
+    "..%5csecret.txt",
+    "./../secret.txt",
+    "/secret.txt",
+    "link.txt",
+    "up/secret.txt",
+    ".hidden.txt",
+    "program.exe",
+    "program.SVG",
+    "a%20program.svg",
+    "program.js",
+    "program",
+    "1/2/3/4/5/6/7/8/9.svg",
+    "folder.txt",
+    "missing.txt",
+    "%00.txt",
+    "",
+    "%252e%252e/secret.txt",
+    "%c0%ae%c0%ae/secret.txt",
+    "..;/secret.txt",
+    "...//secret.txt",
+    "..%00/secret.txt",
+    "secret.txt%00.svg",
+    "%e2%80%a5/secret.txt",
+    "%uff0e%uff0e/secret.txt",
+    "~/secret.txt",
+    "file:///etc/passwd",
+    "con.txt:stream.txt",
+    "loop.txt",
+    "passwd.txt",
+];
+
 #[test]
 fn no_path_leads_out_of_the_reports_folder() {
     let outside = folder("outside");
     let inside = outside.join("inside");
     fs::create_dir(&inside).unwrap();
-    fs::write(outside.join("secret.txt"), "secret").unwrap();
-    fs::write(inside.join(".hidden.txt"), "secret").unwrap();
-    fs::write(inside.join("program.exe"), "secret").unwrap();
+    fs::write(outside.join("secret.txt"), "secret\n").unwrap();
+    fs::write(inside.join(".hidden.txt"), "secret\n").unwrap();
+    fs::write(inside.join("program.exe"), "secret\n").unwrap();
     for name in ["program.SVG", "a program.svg", "program.js", "program"] {
-        fs::write(inside.join(name), "secret").unwrap();
+        fs::write(inside.join(name), "secret\n").unwrap();
     }
     let deep = inside.join("1/2/3/4/5/6/7/8");
     fs::create_dir_all(&deep).unwrap();
-    fs::write(deep.join("9.svg"), "secret").unwrap();
+    fs::write(deep.join("9.svg"), "secret\n").unwrap();
     fs::create_dir(inside.join("folder.txt")).unwrap();
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink(outside.join("secret.txt"), inside.join("link.txt")).unwrap();
         std::os::unix::fs::symlink(&outside, inside.join("up")).unwrap();
+        std::os::unix::fs::symlink("loop.txt", inside.join("loop.txt")).unwrap();
+        std::os::unix::fs::symlink("/etc/passwd", inside.join("passwd.txt")).unwrap();
     }
+    let absolute = outside.join("secret.txt").to_str().unwrap().to_owned();
     let runtime = Runtime::with(&["--report", inside.to_str().unwrap()]);
-    for rest in [
-        "../secret.txt",
-        "%2e%2e/secret.txt",
-        "..%2fsecret.txt",
-        "..%5csecret.txt",
-        "./../secret.txt",
-        "/secret.txt",
-        "link.txt",
-        "up/secret.txt",
-        ".hidden.txt",
-        "program.exe",
-        "program.SVG",
-        "a%20program.svg",
-        "program.js",
-        "program",
-        "1/2/3/4/5/6/7/8/9.svg",
-        "folder.txt",
-        "missing.txt",
-        "%00.txt",
-        "",
-    ] {
+    let more = [
+        absolute.clone(),
+        absolute.replace('/', "%2f"),
+        "../".repeat(9),
+        "a/".repeat(2000),
+        "a".repeat(5000),
+    ];
+    for rest in PATHS.iter().copied().chain(more.iter().map(String::as_str)) {
         let answer = get(runtime.address, &format!("/report/{rest}"));
         assert_eq!(answer.status, 404, "{rest}");
         assert!(answer.text().contains("--report"), "{}", answer.text());
-        assert!(!answer.text().contains("secret"));
+        assert!(!answer.text().contains("secret\n"));
+    }
+    for path in [
+        "/../secret.txt",
+        "/report/../../secret.txt",
+        "/report%2f..%2fsecret.txt",
+        "//etc/passwd",
+    ] {
+        assert_eq!(get(runtime.address, path).status, 404, "{path}");
     }
 }
 

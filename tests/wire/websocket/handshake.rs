@@ -3,7 +3,7 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 
-use crate::common::{PATIENCE, Runtime};
+use crate::common::{PATIENCE, Runtime, SET_GRAVITY};
 use crate::web_client::{Answer, exchange, handshake, rest, try_handshake};
 
 #[test]
@@ -46,16 +46,45 @@ fn a_foreign_origin_is_a_403_that_names_the_option() {
         "localhost",
         "http://0.0.0.0:80",
         "http://localhost\r\nOrigin: http://localhost",
+        // Other ways to write this machine: a browser never sends them as they are here.
+        "http://localhost.",
+        "http://127.1",
+        "http://2130706433",
+        "http://0177.0.0.1",
+        "http://[::ffff:127.0.0.1]",
+        "http://[::1%25lo]",
+        "http://l\u{43e}calhost",
+        "http://%6cocalhost",
+        "http://localhost,evil.example",
+        "http://evil.example@localhost",
+        "http://localhost/",
+        "http://localhost:3000/..",
+        "http://localhost http://evil.example",
+        "http:localhost",
+        "ws://localhost",
+        "http://localhost?x",
+        "undefined",
     ] {
         let headers = handshake(address) + &format!("Origin: {origin}\r\n");
         let (status, body) = try_handshake(address, "/", &headers);
         assert_eq!(status, 403, "{origin}");
         assert!(body.contains("--allow-origin"), "{body}");
     }
-    let host = handshake(address).replace(&format!("Host: {address}"), "Host: evil.example");
-    let (status, body) = try_handshake(address, "/", &host);
-    assert_eq!(status, 403);
-    assert!(body.contains("--allow-host"), "{body}");
+    // To the browser, a page whose name was pointed here is of the same origin: `Origin` and `Host` agree.
+    let port = address.port();
+    for name in [
+        "evil.example",
+        "localhost.evil.example",
+        "127.0.0.1.nip.example",
+        "localhost,evil.example",
+    ] {
+        let headers = handshake(address)
+            .replace(&format!("Host: {address}"), &format!("Host: {name}:{port}"));
+        let headers = format!("{headers}Origin: http://{name}:{port}\r\n");
+        let (status, body) = try_handshake(address, "/", &headers);
+        assert_eq!(status, 403, "{name}");
+        assert!(body.contains("--allow-host"), "{body}");
+    }
 }
 
 #[test]
@@ -149,7 +178,14 @@ fn the_handshake_is_answered_as_the_rfc_has_it_and_frames_may_follow_at_once() {
     let runtime = Runtime::start();
     let mut stream = TcpStream::connect(runtime.address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let mut bytes = format!("GET / HTTP/1.1\r\n{}\r\n", handshake(runtime.address)).into_bytes();
+    // Compression would let a page learn what else is in the stream, and a small message be a large one.
+    let offers = "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n\
+                  Sec-WebSocket-Protocol: rosbridge_v2, json\r\n";
+    let head = format!(
+        "GET / HTTP/1.1\r\n{}{offers}\r\n",
+        handshake(runtime.address)
+    );
+    let mut bytes = head.into_bytes();
     let frame = br#"{"op":"call_service","service":"/arm_sim/pause","id":1}"#;
     bytes.extend_from_slice(&[0x81, 0x80 | u8::try_from(frame.len()).unwrap(), 0, 0, 0, 0]);
     bytes.extend_from_slice(frame);
@@ -172,10 +208,39 @@ fn the_handshake_is_answered_as_the_rfc_has_it_and_frames_may_follow_at_once() {
         Some("s3pPLMBiTxaQ9kYGzzhZRbK+xOo=")
     );
     assert_eq!(answer.header("sec-websocket-extensions"), None);
+    assert_eq!(answer.header("sec-websocket-protocol"), None);
     let text = String::from_utf8_lossy(&answer.body);
     assert!(
         text.contains("\"id\":1,\"values\":{\"data\":false}"),
         "{text}"
     );
     assert!(answer.body.ends_with(b"\x88\x00"));
+}
+
+/// A body is not a way past the check of the host and the origin, nor is a request behind one that was refused.
+#[test]
+fn a_handshake_hidden_in_a_request_opens_nothing() {
+    let runtime = Runtime::start();
+    let address = runtime.address;
+    let inner = format!("GET / HTTP/1.1\r\n{}\r\n", handshake(address));
+    let frame = SET_GRAVITY.trim_end();
+    let mut text = vec![0x81, 0x80 | u8::try_from(frame.len()).unwrap(), 0, 0, 0, 0];
+    text.extend_from_slice(frame.as_bytes());
+    for outer in [
+        format!(
+            "GET / HTTP/1.1\r\nHost: {address}\r\nContent-Length: {}\r\n\r\n",
+            inner.len()
+        ),
+        format!(
+            "GET / HTTP/1.1\r\nHost: {address}\r\nTransfer-Encoding: chunked\r\n\r\n{:x}\r\n",
+            inner.len()
+        ),
+        "GET / HTTP/1.1\r\nHost: evil.example\r\nX: \r\n\r\n".to_owned(),
+    ] {
+        let mut bytes = (outer + &inner).into_bytes();
+        bytes.extend_from_slice(&text);
+        let answer = Answer::parse(&exchange(address, &bytes));
+        assert_ne!(answer.status, 101);
+    }
+    runtime.assert_nothing_was_executed();
 }

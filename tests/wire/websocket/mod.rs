@@ -5,5 +5,4 @@
 #![cfg(feature = "web")]
 mod closing;
 mod handshake;
-mod levels;
 mod messages;
