@@ -15,7 +15,7 @@ use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, KEPT_PLACES, OPENING_T
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::options::DEFAULT_CLIENTS;
-use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::catalog::{Direction, Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, duplex};
@@ -346,5 +346,21 @@ fn a_client_that_comes_and_goes_a_thousand_times_leaves_nothing_behind() {
                 .unwrap()
                 .contains("no provider")
         );
+    });
+}
+
+#[test]
+fn clients_can_neither_advertise_nor_publish_a_topic_of_the_runtime() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        let ours = |topic: &Topic| topic.direction() == Direction::Published;
+        for topic in Topic::ALL.into_iter().filter(ours) {
+            for op in ["advertise", "publish"] {
+                let frame = json!({"op": op, "topic": topic.name(), "msg": {}});
+                client.send(frame).await;
+                assert_eq!(client.receive().await["level"], "error", "{op} {topic:?}");
+            }
+        }
     });
 }

@@ -183,22 +183,6 @@ fn an_observer_sees_what_it_sees_of_an_arm_that_is_stepped_alone_and_may_end_it(
 }
 
 #[test]
-fn an_arm_that_diverges_leaves_its_neighbours_alone() {
-    let mut arms = vec![Simulation::<3>::new(Arm::default(), Gains::default()); 16];
-    for arm in &mut arms {
-        arm.enable(true);
-        arm.set_setpoint(Setpoint::at([0.5, -0.5, 0.25]));
-    }
-    arms[5].set_timestep(0.05);
-    batch::advance(arms.iter_mut().map(|arm| (arm, 5000)));
-    for (index, arm) in arms.iter().enumerate() {
-        assert_eq!(arm.divergence().is_some(), index == 5, "arm {index}");
-        assert_eq!(arm.steps() == 5000, index != 5, "arm {index}");
-        assert!(arm.state().is_finite());
-    }
-}
-
-#[test]
 fn a_lane_ends_where_time_ends_too() {
     let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
     let mut arms = vec![Simulation::<2>::new(weightless, Gains::default()); 16];
@@ -210,20 +194,6 @@ fn a_lane_ends_where_time_ends_too() {
         alone.advance(100);
         assert_eq!(shown(arm), shown(alone), "arm {index}");
         assert_eq!(arm.divergence().is_some(), [3, 5].contains(&index));
-    }
-}
-
-#[test]
-fn an_advance_may_be_cut_anywhere() {
-    let mut rng = Rng::with_seed(3);
-    let mut whole: Vec<Simulation<2>> = (0..50).map(|_| any_simulation(&mut rng)).collect();
-    let mut cut = whole.clone();
-    batch::advance(whole.iter_mut().map(|arm| (arm, 30)));
-    for steps in [1, 0, 7, 22] {
-        batch::advance(cut.iter_mut().map(|arm| (arm, steps)));
-    }
-    for (whole, cut) in whole.iter().zip(&cut) {
-        assert_eq!(shown(whole), shown(cut));
     }
 }
 

@@ -1,6 +1,6 @@
 //! The default gains do on the default arms what they were chosen for, whatever the setpoint.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use pendularm::math::arm::{Arm, State};
@@ -79,19 +79,6 @@ fn check_reach<const N: usize>(gains: Gains<N>, free: u64, method: Method, times
 }
 
 #[test]
-fn from_rest_any_setpoint_within_a_turn_is_reached_in_four_seconds_and_held() {
-    check_reach::<2>(Gains::default(), 0, Method::Rk4, 0.001);
-    check_reach::<3>(Gains::default(), 0, Method::Rk4, 0.001);
-}
-
-#[test]
-fn after_ten_seconds_of_free_swing_any_setpoint_within_a_turn_is_reached_in_four_seconds_and_held()
-{
-    check_reach::<2>(Gains::default(), 10_000, Method::Rk4, 0.001);
-    check_reach::<3>(Gains::default(), 10_000, Method::Rk4, 0.001);
-}
-
-#[test]
 fn so_it_is_with_every_method_at_three_milliseconds() {
     for method in Method::ALL {
         check_reach::<2>(Gains::default(), 10_000, method, 0.003);
@@ -126,42 +113,6 @@ fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
         check::<2>(Gains::default(), method, 0.003);
         check::<3>(Gains::default(), method, 0.003);
     }
-}
-
-/// Held effort is stable up to a timestep that depends on the pose, most of all on how far the arm is bent. The rest
-/// of the jolt that gravity gives at the start shrinks at a rate of 1/s at least: to less than 1e-3 rad in 8 s.
-#[test]
-fn every_pose_is_stable_with_every_method_at_three_milliseconds() {
-    fn check<const N: usize>(gains: Gains<N>, poses: impl Iterator<Item = [f64; N]>) {
-        for pose in poses {
-            for method in Method::ALL {
-                let mut simulation = Simulation::new(Arm::default(), gains);
-                simulation.set_method(method);
-                simulation.set_timestep(0.003);
-                simulation.set_state(State {
-                    position: pose,
-                    velocity: [0.0; N],
-                });
-                settling_time(&mut simulation, pose);
-                let off = (0..N).map(|i| (simulation.state().position[i] - pose[i]).abs());
-                let off = off.fold(0.0, f64::max);
-                assert!(off < 1e-3, "{pose:?} {method}: {off} rad off");
-            }
-        }
-    }
-    let bends =
-        |count: i32| (0..=count).map(move |k| PI * (2.0 * f64::from(k) / f64::from(count) - 1.0));
-    let roots = [-PI / 2.0, 0.0, PI / 2.0];
-    check::<2>(
-        Gains::default(),
-        roots
-            .iter()
-            .flat_map(|&q1| bends(24).map(move |q2| [q1, q2])),
-    );
-    check::<3>(
-        Gains::default(),
-        bends(8).flat_map(|q2| bends(8).map(move |q3| [-PI / 2.0, q2, q3])),
-    );
 }
 
 /// Largest difference between effort and gravity load, in parts of the load \[1\], from the first instant on at which

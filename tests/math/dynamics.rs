@@ -1,10 +1,17 @@
-//! The equation of motion against 50-digit values, on ordinary and on extreme arms. Its properties: `dynamics_properties.rs`.
+//! The equation of motion: against 50-digit values on ordinary and extreme arms, and against a Lagrangian that is differentiated
+//! numerically on any ordinary arm.
+
+use std::fmt::Debug;
+use std::hint::black_box;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{
     coriolis, energy, forward_dynamics, gravity_load, inverse_dynamics, kinetic_energy,
-    mass_matrix, potential_energy,
+    mass_matrix, potential_energy, textbook, weightless_dynamics,
 };
+use proptest::array::uniform;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 use serde_json::Value;
 
 /// Half the distance from 1 to the next number: the relative error of one rounding.
@@ -21,8 +28,6 @@ macro_rules! for_one_to_six_links {
         $check::<6>();
     };
 }
-
-// Stored values
 
 /// One stored case: an arm in motion, and what is known about it.
 struct Case<const N: usize> {
@@ -57,16 +62,17 @@ impl<const N: usize> Case<N> {
 
     /// Element by element: `sensitivity` is by how much the exact value changes, to first order, when every input is off by
     /// one rounding; `units` of that are allowed.
-    fn check(&self, units: f64, got: &[f64], want: &Value, sensitivity: &Value) {
-        let (want, sensitivity) = (list(want), list(sensitivity));
+    fn check(&self, units: f64, got: &[f64], name: &str, sensitivity: &str) {
+        let want = list(&self.stored[name]);
+        let sensitivity = list(&self.stored[sensitivity]);
         assert_eq!((got.len(), got.len()), (want.len(), sensitivity.len()));
         for ((got, want), sensitivity) in got.iter().zip(&want).zip(&sensitivity) {
             let unit = ROUND_OFF * (sensitivity + want.abs()) + 1e-300;
             let off = (got - want).abs() / unit;
+            let id = &self.stored["id"];
             assert!(
                 off <= units,
-                "{}: got {got}, want {want}, {off} units",
-                self.stored["id"]
+                "{id} {name}: got {got}, want {want}, {off} units"
             );
         }
     }
@@ -99,95 +105,37 @@ fn cases<const N: usize>() -> Vec<Case<N>> {
     cases
 }
 
-// The units are the file's own suggestion: 16, and 32 for accelerations, where formulas of good quality stay below 8.
-
+/// The units are the file's own suggestion: 16, and 32 for accelerations, where formulas of good quality stay below 8.
 #[test]
-fn the_mass_matrix_agrees_with_the_stored_values() {
+fn every_term_of_the_equation_of_motion_agrees_with_the_stored_values() {
     fn check<const N: usize>() {
         for case in &cases::<N>() {
-            let got = mass_matrix(&case.arm, &case.q);
-            case.check(
-                16.0,
-                got.as_flattened(),
-                &case.stored["M"],
-                &case.stored["sens_M"],
-            );
-        }
-    }
-    for_one_to_six_links!(check);
-}
-
-#[test]
-fn the_coriolis_effort_agrees_with_the_stored_values() {
-    fn check<const N: usize>() {
-        for case in &cases::<N>() {
-            let got = coriolis(&case.arm, &case.q, &case.qd);
-            case.check(16.0, &got, &case.stored["h"], &case.stored["sens_h"]);
-        }
-    }
-    for_one_to_six_links!(check);
-}
-
-#[test]
-fn the_gravity_load_agrees_with_the_stored_values() {
-    fn check<const N: usize>() {
-        for case in &cases::<N>() {
-            let got = gravity_load(&case.arm, &case.q);
-            case.check(16.0, &got, &case.stored["G"], &case.stored["sens_G"]);
-        }
-    }
-    for_one_to_six_links!(check);
-}
-
-#[test]
-fn inverse_dynamics_agree_with_the_stored_values() {
-    fn check<const N: usize>() {
-        for case in &cases::<N>() {
-            let got = inverse_dynamics(&case.arm, &case.q, &case.qd, &case.array("qddot_id"));
-            case.check(
-                16.0,
-                &got,
-                &case.stored["tau_id"],
-                &case.stored["sens_tau_id"],
-            );
-        }
-    }
-    for_one_to_six_links!(check);
-}
-
-#[test]
-fn the_energies_agree_with_the_stored_values() {
-    fn check<const N: usize>() {
-        for case in &cases::<N>() {
-            let kinetic = kinetic_energy(&case.arm, &case.q, &case.qd);
-            case.check(
-                16.0,
-                &[kinetic],
-                &case.stored["kinetic"],
-                &case.stored["sens_kinetic"],
-            );
-            let potential = potential_energy(&case.arm, &case.q);
-            let (want, sensitivity) = (&case.stored["potential"], &case.stored["sens_potential"]);
-            case.check(16.0, &[potential], want, sensitivity);
+            let Case { arm, q, qd, .. } = case;
+            let (m, kinetic) = (mass_matrix(arm, q), kinetic_energy(arm, q, qd));
+            let potential = potential_energy(arm, q);
+            let inverse = inverse_dynamics(arm, q, qd, &case.array("qddot_id"));
+            for (name, sensitivity, units, got) in [
+                ("M", "sens_M", 16.0, m.as_flattened()),
+                ("h", "sens_h", 16.0, &coriolis(arm, q, qd)),
+                ("G", "sens_G", 16.0, &gravity_load(arm, q)),
+                ("tau_id", "sens_tau_id", 16.0, &inverse),
+                ("kinetic", "sens_kinetic", 16.0, &[kinetic]),
+                ("potential", "sens_potential", 16.0, &[potential]),
+                ("qddot", "sens_qddot_abs", 32.0, &case.forward()),
+            ] {
+                case.check(units, got, name, sensitivity);
+            }
+            for (i, row) in m.iter().enumerate() {
+                assert!((0..N).all(|j| row[j].to_bits() == m[j][i].to_bits()));
+            }
             let state = State {
-                position: case.q,
-                velocity: case.qd,
+                position: *q,
+                velocity: *qd,
             };
             assert_eq!(
-                energy(&case.arm, &state).to_bits(),
+                energy(arm, &state).to_bits(),
                 (kinetic + potential).to_bits()
             );
-        }
-    }
-    for_one_to_six_links!(check);
-}
-
-#[test]
-fn forward_dynamics_agree_with_the_stored_values_element_by_element() {
-    fn check<const N: usize>() {
-        for case in &cases::<N>() {
-            let (want, sensitivity) = (&case.stored["qddot"], &case.stored["sens_qddot_abs"]);
-            case.check(32.0, &case.forward(), want, sensitivity);
         }
     }
     for_one_to_six_links!(check);
@@ -231,4 +179,216 @@ fn forward_dynamics_lose_at_most_a_digit_and_a_half_with_a_heavy_tip() {
     check::<3>();
     check::<4>();
     check::<6>();
+}
+
+/// An ordinary arm in ordinary motion, and efforts.
+#[derive(Debug, Clone)]
+struct Motion<const N: usize> {
+    arm: Arm<N>,
+    q: [f64; N],
+    qd: [f64; N],
+    tau: [f64; N],
+}
+
+fn motion<const N: usize>() -> impl Strategy<Value = Motion<N>> {
+    let rod = || uniform::<_, N>(0.2..3.0);
+    let each = |bound: f64| uniform::<_, N>(-bound..bound);
+    (rod(), rod(), 0.0..20.0, each(7.0), each(3.0), each(30.0)).prop_map(
+        |(lengths, masses, gravity, q, qd, tau)| {
+            let arm = Arm::new(lengths, masses, gravity).unwrap();
+            Motion { arm, q, qd, tau }
+        },
+    )
+}
+
+type Check<'a, T> = &'a dyn Fn(T) -> Result<(), TestCaseError>;
+
+/// The runner is large: it is compiled for each type of value, not for each check.
+fn for_any<T: Debug>(strategy: impl Strategy<Value = T> + 'static, check: Check<'_, T>) {
+    let config = ProptestConfig {
+        source_file: Some(file!()),
+        ..ProptestConfig::default()
+    };
+    TestRunner::new(config)
+        .run(&strategy.boxed(), check)
+        .unwrap();
+}
+
+/// Every element within `relative` of the largest magnitude that went into it.
+fn close(got: &[f64], want: &[f64], scale: f64, relative: f64) -> Result<(), TestCaseError> {
+    for (got, want) in got.iter().zip(want) {
+        let bound = relative * scale;
+        prop_assert!(
+            (got - want).abs() <= bound,
+            "got {got}, want {want}, bound {bound}"
+        );
+    }
+    Ok(())
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m: f64, value| m.max(value.abs()))
+}
+
+/// Kinetic and potential energy the long way: two-point Gauss quadrature along each rod, exact since the squared speed is
+/// quadratic and the height linear along it. Angles are summed, velocities differentiated by hand, nothing is shared with the library.
+fn quadrature<const N: usize>(arm: &Arm<N>, q: &[f64; N], qd: &[f64; N]) -> (f64, f64) {
+    let (mut x, mut y, mut vx, mut vy, mut angle, mut rate) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut kinetic, mut potential) = (0.0, 0.0);
+    for i in 0..N {
+        angle += q[i];
+        rate += qd[i];
+        let at = |s: f64| {
+            let (sin, cos) = f64::sin_cos(angle);
+            (
+                x + s * cos,
+                y + s * sin,
+                vx - s * sin * rate,
+                vy + s * cos * rate,
+            )
+        };
+        let (length, mass) = (arm.lengths()[i], arm.masses()[i]);
+        for side in [-1.0, 1.0] {
+            let (_, height, along_x, along_y) = at(0.5 * length * (1.0 + side / 3.0_f64.sqrt()));
+            kinetic += 0.25 * mass * (along_x * along_x + along_y * along_y);
+            potential += 0.5 * mass * arm.gravity() * height;
+        }
+        (x, y, vx, vy) = at(length);
+    }
+    (kinetic, potential)
+}
+
+fn unit<const N: usize>(i: usize, size: f64) -> [f64; N] {
+    std::array::from_fn(|k| if k == i { size } else { 0.0 })
+}
+
+fn plus<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+/// Central difference of fourth order: its error is of the order of `step⁴`, and `ROUND_OFF / step` from rounding.
+fn slope(f: impl Fn(f64) -> f64, step: f64) -> f64 {
+    (8.0 * (f(step) - f(-step)) - (f(2.0 * step) - f(-2.0 * step))) / (12.0 * step)
+}
+
+#[test]
+fn the_terms_are_those_of_the_lagrangian() {
+    fn check<const N: usize>() {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, .. }| {
+            let kinetic = |q: &[f64; N], qd: &[f64; N]| quadrature(&arm, q, qd).0;
+            // ∂T/∂q̇_i, exact but for rounding: T is quadratic in q̇.
+            let momentum = |q: &[f64; N], i: usize| {
+                0.5 * (kinetic(q, &plus(&qd, &unit(i, 1.0)))
+                    - kinetic(q, &plus(&qd, &unit(i, -1.0))))
+            };
+            let step = 2e-3; // step⁴ = 1.6e-11, ROUND_OFF / step = 6e-14
+            for i in 0..N {
+                let row: [f64; N] = std::array::from_fn(|j| {
+                    let both = kinetic(&q, &plus(&unit(i, 1.0), &unit(j, 1.0)));
+                    both - kinetic(&q, &unit(i, 1.0)) - kinetic(&q, &unit(j, 1.0))
+                });
+                let m = mass_matrix(&arm, &q);
+                close(&m[i], &row, largest(m.as_flattened()), 1e-13)?;
+
+                let load = slope(|h| quadrature(&arm, &plus(&q, &unit(i, h)), &qd).1, step);
+                let weight = arm.gravity() * arm.reach() * arm.masses().iter().sum::<f64>();
+                close(&[gravity_load(&arm, &q)[i]], &[load], weight, 1e-9)?;
+
+                // d/dt ∂T/∂q̇ - ∂T/∂q with q̈ = 0.
+                let moved = |h: f64| std::array::from_fn(|k| q[k] + h * qd[k]);
+                let rate = slope(|h| momentum(&moved(h), i), step);
+                let force = slope(|h| kinetic(&plus(&q, &unit(i, h)), &qd), step);
+                let speed = (N as f64 * 3.0).powi(2);
+                let inertia = arm.reach().powi(2) * arm.masses().iter().sum::<f64>();
+                close(
+                    &[coriolis(&arm, &q, &qd)[i]],
+                    &[rate - force],
+                    inertia * speed,
+                    1e-7,
+                )?;
+            }
+            Ok(())
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+/// Both ways to the accelerations belong to the same effort; apart they may be by what an ill-conditioned M hides.
+#[test]
+fn the_line_of_the_book_and_the_recursion_agree() {
+    fn check<const N: usize>() {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
+            let (m, book) = (mass_matrix(&arm, &q), textbook(&arm, &q, &qd, &tau));
+            let recursion = forward_dynamics(&arm, &q, &qd, &tau);
+            let effort =
+                |qdd: &[f64; N]| m.map(|row| row.iter().zip(qdd).map(|(m, a)| m * a).sum());
+            let (one, other): ([f64; N], [f64; N]) = (effort(&book), effort(&recursion));
+            let scale = largest(m.as_flattened()) * largest(&recursion).max(largest(&book));
+            close(
+                &one,
+                &other,
+                N as f64 * scale + largest(&tau),
+                316.0 * ROUND_OFF,
+            )
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+/// The first angle says how the arm lies in the field of gravity, and nothing else.
+#[test]
+fn without_gravity_the_first_angle_changes_no_bit() {
+    fn check<const N: usize>() {
+        for_any((motion::<N>(), -1e9..1e9_f64), &|(motion, first)| {
+            let Motion {
+                arm,
+                mut q,
+                qd,
+                tau,
+            } = motion;
+            let arm = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap();
+            let before = forward_dynamics(&arm, &q, &qd, &tau);
+            q[0] = first;
+            let after = forward_dynamics(&arm, &q, &qd, &tau);
+            prop_assert_eq!(before.map(f64::to_bits), after.map(f64::to_bits));
+            Ok(())
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+#[test]
+fn leaving_out_the_first_angle_changes_no_bit() {
+    fn check<const N: usize>() {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
+            let arm = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap();
+            let whole = forward_dynamics(&arm, &q, &qd, &tau);
+            let less = weightless_dynamics(&arm, &q, &qd, &tau);
+            prop_assert_eq!(whole.map(f64::to_bits), less.map(f64::to_bits));
+            Ok(())
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+/// Any parameter that an arm may have and any finite state: non-finite results are allowed, panics are not.
+#[test]
+fn extreme_but_valid_input_never_panics() {
+    fn check<const N: usize>() {
+        let positive = || uniform::<_, N>((-307.0..308.0).prop_map(|e: f64| 10_f64.powf(e)));
+        let any = || uniform::<_, N>(proptest::num::f64::ANY);
+        let input = (positive(), positive(), 0.0..1e300, any(), any(), any());
+        for_any(input, &|(lengths, masses, gravity, q, qd, tau)| {
+            let arm = Arm::new(lengths, masses, gravity).unwrap();
+            let state = State {
+                position: q,
+                velocity: qd,
+            };
+            black_box(forward_dynamics(&arm, &q, &qd, &tau));
+            black_box(inverse_dynamics(&arm, &q, &qd, &tau));
+            black_box((mass_matrix(&arm, &q), energy(&arm, &state)));
+            Ok(())
+        });
+    }
+    for_one_to_six_links!(check);
 }

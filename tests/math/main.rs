@@ -25,7 +25,6 @@ mod control_period;
 mod default_gains;
 mod divergence;
 mod dynamics;
-mod dynamics_properties;
 mod expression;
 mod goal;
 mod integrators;

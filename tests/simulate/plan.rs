@@ -44,6 +44,7 @@ named! {
 }
 
 /// Virtual time, room and probabilities of one seed.
+#[derive(Debug)]
 pub struct Plan {
     pub links: usize,
     pub honest: usize,
@@ -136,43 +137,4 @@ fn swarm<T: Copy + fmt::Debug>(court: &Court, all: &[T], share: f64) -> Vec<(T, 
         without.split(',').any(|name| name == one)
     };
     weighed.filter(|(one, _)| !is_left_out(one)).collect()
-}
-
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            links,
-            honest,
-            hostile,
-            steps,
-            socket,
-            room,
-            piece,
-            scarce,
-            together,
-            ..
-        } = self;
-        write!(
-            f,
-            "links {links}, honest {honest}, hostile {hostile}, steps {steps}, socket {socket}, room {room}, piece {piece}, \
-             scarce {scarce}, together {together}, fault {:.3}, hostility {:.3};",
-            self.fault, self.hostility
-        )?;
-        for (one, weight) in &self.features {
-            write!(f, " {one:?} {weight:.2}")?;
-        }
-        write!(f, "; faults:")?;
-        for (one, weight) in &self.faults {
-            write!(f, " {one:?} {weight:.2}")?;
-        }
-        write!(f, "; hostile:")?;
-        for (one, weight) in &self.hostilities {
-            write!(f, " {one:?} {weight:.2}")?;
-        }
-        write!(f, "; bursts {:.3}:", self.burst)?;
-        for (one, weight) in &self.bursts {
-            write!(f, " {one:?} {weight:.2}")?;
-        }
-        Ok(())
-    }
 }

@@ -54,38 +54,3 @@ fn a_message_of_a_change_comes_before_the_response_and_shows_the_change() {
         assert_eq!(said, [Said::Answered], "nothing has changed");
     });
 }
-
-#[test]
-fn every_service_of_the_arm_answers_whatever_it_is_asked() {
-    in_virtual_time(async {
-        let bench = ArmBench::<3>::new(Arm::default());
-        let services = [
-            Service::SetIntegrator,
-            Service::SetParams,
-            Service::Pause,
-            Service::Reset,
-            Service::Enable,
-            Service::SetGains,
-        ];
-        for service in services {
-            let fields = service.response_fields();
-            for args in [
-                json!({}),
-                json!([]),
-                json!([null, null, null]),
-                json!([0, 0, 0, 0, 0]),
-                json!({"data": {}, "kp": 1, "method": [], "gravity": "x"}),
-            ] {
-                let response = bench.call(service, args.clone()).await;
-                let status = response["status"].as_str().unwrap();
-                assert_eq!(response["result"], status.is_empty(), "{response}");
-                let values = response["values"].as_object().unwrap();
-                assert_eq!(values.len(), fields.len(), "{args}: {response}");
-                assert!(
-                    fields.iter().all(|field| values.contains_key(field.name)),
-                    "{response}"
-                );
-            }
-        }
-    });
-}

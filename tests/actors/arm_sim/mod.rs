@@ -4,7 +4,6 @@
 //! The arm is asked as another node asks it. A client's calls are here where it is meant what is made of their fields.
 
 mod answers;
-mod offline;
 mod steps;
 mod topics;
 

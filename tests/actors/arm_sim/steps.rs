@@ -52,28 +52,6 @@ fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
     });
 }
 
-#[test]
-fn a_microsecond_is_followed_step_by_step() {
-    in_virtual_time(async {
-        // Ten thousand steps are within a wake-up's budget, however busy the machine is.
-        work_clock::count(Duration::from_micros(1));
-        let bench = ArmBench::<3>::weightless();
-        bench
-            .ask(SetIntegrator {
-                timestep: Some(1e-6),
-                ..method(Method::Rk4)
-            })
-            .await;
-        bench.ask(Reset::default()).await;
-        let began = Instant::now();
-        for _ in 0..20 {
-            sleep(ms(10)).await;
-            let steps = u128::from(bench.steps().await);
-            assert_eq!(steps, began.elapsed().as_micros());
-        }
-    });
-}
-
 /// With a timestep that no machine can follow every wake-up works for its 5 ms of real time. The 12 ticks of 0.2 s
 /// would make that 0.06 s in all; a wake-up after every breather of a millisecond (two, by the timer's grain) 0.5 s or
 /// more.
@@ -208,16 +186,32 @@ fn missed_ticks_are_skipped_and_at_most_a_quarter_of_a_second_is_caught_up() {
     });
 }
 
+/// Nobody looks in between: the request itself takes the arm to its step, not the tick before it.
 #[test]
-fn a_short_stall_is_caught_up_in_full() {
+fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
     in_virtual_time(async {
         let bench = ArmBench::<2>::new(Arm::default());
+        let mut offline = Simulation::<2>::new(Arm::default(), Gains::default());
         bench.ask(Reset::default()).await;
         let began = Instant::now();
-        for _ in 0..20 {
-            advance(ms(249)).await;
-            sleep(ms(2)).await;
-            assert_eq!(u128::from(bench.steps().await), began.elapsed().as_millis());
+        let step_due = || u64::try_from(began.elapsed().as_millis()).unwrap();
+        for (pause, angle) in [(7, 0.3), (30, -0.4), (1, 0.5), (11, 0.6)] {
+            sleep(ms(pause)).await;
+            bench.ask(enable(angle > 0.0)).await;
+            offline.advance(step_due() - offline.steps());
+            offline.enable(angle > 0.0);
+            sleep(ms(pause)).await;
+            let positions = [angle, -angle];
+            bench.hold(positions, [0.0; 2]).await;
+            offline.advance(step_due() - offline.steps());
+            offline.set_setpoint(Setpoint {
+                position: positions,
+                velocity: [0.0; 2],
+            });
         }
+        sleep(ms(5)).await;
+        bench.ask(pause(true)).await;
+        offline.advance(step_due() - offline.steps());
+        assert_eq!(bench.snapshot().await, offline);
     });
 }

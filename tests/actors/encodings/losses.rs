@@ -66,33 +66,3 @@ fn each_message_of_a_series_that_had_to_go_is_counted() {
         hear_what_was_kept(&gateway, &mut subscriber, MESSAGES).await;
     });
 }
-
-#[test]
-fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
-    const MESSAGES: u64 = 1200;
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        let throttled =
-            json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000, "queue_length": 3});
-        subscriber.send(throttled).await;
-        subscriber.receive().await;
-        publisher.advertise("/t").await;
-        for round in 0..2 {
-            let first = round * MESSAGES;
-            let mut lines = String::new();
-            for n in first..first + MESSAGES {
-                let _ = writeln!(
-                    lines,
-                    "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{{\"n\":{n}}}}}"
-                );
-            }
-            publisher.send_text(&lines).await;
-            let last = first + MESSAGES;
-            for n in [first, last - 3, last - 2, last - 1] {
-                assert_eq!(subscriber.receive().await["msg"]["n"], n);
-            }
-            assert!(subscriber.hears_nothing_for(Duration::from_secs(60)).await);
-        }
-    });
-}

@@ -79,21 +79,6 @@ fn the_target_echoes_x_and_y_and_phi_where_one_was_asked_for() {
     });
 }
 
-#[test]
-fn two_links_ignore_phi_in_a_goal_too() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.subscribe(RESULT).await;
-        client
-            .ask(SEND, json!({"x": 1, "y": 0.5, "phi": "north"}))
-            .await;
-        stage.cancel().await.unwrap();
-        client.settle().await;
-        let result = &client.messages(RESULT)[0];
-        assert_eq!(result["target"], json!({"x": 1.0, "y": 0.5}));
-    });
-}
-
 /// An arm that has wound up by two turns and more gets there without unwinding.
 #[test]
 fn a_goals_joints_are_within_pi_of_the_present_positions() {

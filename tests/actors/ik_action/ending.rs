@@ -193,21 +193,6 @@ fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() 
     });
 }
 
-#[test]
-fn goals_outlive_the_client_that_made_them() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.subscribe(RESULT).await;
-        let mut other = stage.connect();
-        let goal = json!({"x": 2, "y": 0, "epsilon": 0.1, "success_hold": 1});
-        let goal_id = other.ask(SEND, goal).await["goal_id"].take();
-        drop(other);
-        let result = client.message(RESULT).await;
-        assert_eq!(result["goal_id"], goal_id);
-        assert_eq!(result["outcome"], "reached");
-    });
-}
-
 /// Notes what reaches it.
 struct Noting(UnboundedSender<&'static str>);
 

@@ -63,39 +63,6 @@ fn none_comes_after_the_answer_to_a_pause() {
 }
 
 #[test]
-fn where_steps_are_longer_there_is_one_feedback_per_step() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        let longer = SetIntegrator {
-            timestep: Some(0.1),
-            ..SetIntegrator::default()
-        };
-        asked(&stage.arm, longer).await;
-        client.subscribe(FEEDBACK).await;
-        stage.send_goal(elsewhere()).await;
-        client.messages_for(ms(2010), FEEDBACK).await;
-        assert_eq!(client.messages(FEEDBACK).len(), 20);
-    });
-}
-
-#[test]
-fn without_an_active_goal_there_is_no_feedback() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.subscribe(FEEDBACK).await;
-        let before = client.messages_for(ms(1000), FEEDBACK).await;
-        assert!(before.is_empty());
-        stage.send_goal(elsewhere()).await;
-        pass(ms(200)).await;
-        stage.cancel().await.unwrap();
-        client.settle().await;
-        client.heard.clear();
-        let after = client.messages_for(ms(1000), FEEDBACK).await;
-        assert!(after.is_empty());
-    });
-}
-
-#[test]
 fn a_trajectory_from_somebody_else_moves_the_setpoint_and_nothing_of_the_goal() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
@@ -112,39 +79,6 @@ fn a_trajectory_from_somebody_else_moves_the_setpoint_and_nothing_of_the_goal() 
         assert_eq!(after["positions"], before["positions"]);
         assert!(client.messages(RESULT).is_empty());
         assert_eq!(stage.cancel().await, Ok(()));
-    });
-}
-
-/// A late subscriber hears from then on; nothing is kept for it.
-#[test]
-fn feedback_goes_to_whoever_subscribes_and_stops_with_the_subscription() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        stage.send_goal(elsewhere()).await;
-        pass(ms(1000)).await;
-        client.subscribe(FEEDBACK).await;
-        let first = client.message(FEEDBACK).await;
-        assert!(number(&first["elapsed"]) > 1.0 - STEP);
-        client.unsubscribe(FEEDBACK).await;
-        client.heard.clear();
-        let after = client.messages_for(ms(500), FEEDBACK).await;
-        assert!(after.is_empty());
-    });
-}
-
-#[test]
-fn clients_can_neither_publish_nor_advertise_feedback_and_result() {
-    in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        for topic in [FEEDBACK, RESULT, "/ik_trial/status"] {
-            for op in ["advertise", "publish"] {
-                client
-                    .send(&json!({"op": op, "topic": topic, "msg": {}}))
-                    .await;
-                let status = client.next_where(|frame| frame["op"] == "status").await;
-                assert_eq!(status["level"], "error");
-            }
-        }
     });
 }
 

@@ -58,30 +58,6 @@ fn any_excursion_starts_the_dwell_over_and_new_lengths_count_at_once() {
     });
 }
 
-#[test]
-fn pausing_pauses_the_dwell_and_the_feedback() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.subscribe(RESULT).await;
-        client.subscribe(FEEDBACK).await;
-        stage.send_goal(here(0.25)).await;
-        pass(ms(200)).await;
-        stage.pause(true).await;
-        client.settle().await;
-        client.heard.clear();
-        let meanwhile = client.messages_for(ms(10_000), FEEDBACK).await;
-        assert_eq!(meanwhile, [] as [Value; 0]);
-        stage.pause(false).await;
-        pass(ms(50)).await;
-        client.settle().await;
-        assert!(client.messages(RESULT).is_empty(), "250 steps");
-        pass(ms(1)).await;
-        client.settle().await;
-        client.messages_for(ms(1), RESULT).await;
-        assert_eq!(client.messages(RESULT).len(), 1, "251 steps");
-    });
-}
-
 /// By default the end effector must be within 2 cm for half a second; on an arm that moves the two goals go exactly alike.
 #[test]
 fn epsilon_is_2_cm_and_success_hold_half_a_second_where_none_is_given() {

@@ -56,33 +56,6 @@ fn what_is_reached_within_the_duration_counts_and_what_is_reached_after_it_does_
     });
 }
 
-#[test]
-fn the_clock_never_runs_backwards_and_a_reset_adds_nothing() {
-    in_virtual_time(async {
-        let (stage, mut client) = floating_and_watched().await;
-        begin(&stage.trial, hard(10.0)).await;
-        let mut last = 0.0;
-        for _ in 0..5 {
-            client.messages_for(ms(730), STATUS).await;
-            stage.reset().await;
-            client.settle().await;
-            for status in client.messages(STATUS) {
-                let elapsed = number(&status["elapsed"]);
-                assert!(elapsed >= last);
-                last = elapsed;
-            }
-            client.heard.clear();
-        }
-        // 3.65 s of simulation time have passed, of which a reset may have cut off an unfinished step each.
-        asked(&stage.trial, StopTrial).await.unwrap();
-        let elapsed = number(&client.message(STATUS).await["elapsed"]);
-        assert!(
-            (3.645 - ROUNDING..=3.65 + ROUNDING).contains(&elapsed),
-            "{elapsed}"
-        );
-    });
-}
-
 /// No timer can be set to such a time.
 #[test]
 fn a_trial_may_last_longer_than_any_timer() {

@@ -20,15 +20,13 @@ use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{CancelGoal, IkAction, Meant, SendGoal};
-use pendularm::actors::arm::ik_trial::{
-    GoalClient, IkTrial, NotStarted, SkipTarget, StartTrial, StopTrial,
-};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, SkipTarget, StartTrial, StopTrial};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::{Interest, Publish};
 use pendularm::math::goal::Criteria;
 use pendularm::math::kinematics::Target;
 use pendularm::math::pid::Gains;
-use pendularm::math::trial::{Changes, Rejection, Settings};
+use pendularm::math::trial::{Changes, Settings};
 use pendularm::protocol::catalog::Topic;
 use serde_json::{Value, json};
 use tokio::sync::mpsc::unbounded_channel;

@@ -29,33 +29,6 @@ fn a_trial_whose_goal_is_preempted_by_somebody_else_shows_that_and_waits() {
     });
 }
 
-#[test]
-fn a_trial_that_waits_goes_on_with_skip_and_anew_with_start_and_ends_with_stop_or_by_itself() {
-    in_virtual_time(async {
-        let (stage, mut client) = floating_and_watched().await;
-        let trial = &stage.trial;
-        begin(trial, hard(5.0)).await;
-        stage.cancel().await.unwrap();
-        assert_eq!(status(&mut client).await["action_status"], "preempted");
-        asked(trial, SkipTarget).await.unwrap();
-        assert_eq!(status(&mut client).await["action_status"], "active");
-        stage.cancel().await.unwrap();
-        begin(trial, StartTrial::default()).await;
-        let afresh = status(&mut client).await;
-        assert_eq!(afresh["action_status"], "active");
-        assert!(number(&afresh["elapsed"]) < 0.11);
-        stage.cancel().await.unwrap();
-        asked(trial, StopTrial).await.unwrap();
-        assert_nothing_in_flight(&status(&mut client).await);
-        begin(trial, StartTrial::default()).await;
-        stage.cancel().await.unwrap();
-        client.messages_for(ms(5000), STATUS).await;
-        let end = status(&mut client).await;
-        assert_eq!(end["running"], false);
-        assert_nothing_in_flight(&end);
-    });
-}
-
 /// A trial that ends must not take somebody else's goal with it.
 #[test]
 fn a_trial_cancels_no_goal_but_its_own() {

@@ -83,23 +83,6 @@ fn status_comes_at_every_change_too() {
     });
 }
 
-#[test]
-fn status_goes_to_whoever_subscribes_while_they_do() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        begin(&stage.trial, hard(60.0)).await;
-        pass(ms(1000)).await;
-        client.subscribe(STATUS).await;
-        assert_eq!(client.messages_for(ms(1050), STATUS).await.len(), 10);
-        let mut other = stage.connect();
-        other.subscribe(STATUS).await;
-        client.unsubscribe(STATUS).await;
-        client.heard.clear();
-        assert!(client.messages_for(ms(500), STATUS).await.is_empty());
-        assert!(!other.messages_for(ms(500), STATUS).await.is_empty());
-    });
-}
-
 /// The node's own messages, before the registry could drop them.
 #[test]
 fn no_status_is_encoded_while_nobody_wants_it() {

@@ -36,32 +36,6 @@ fn a_client_that_only_enables_and_starts_sees_targets_reached_counted_and_report
     });
 }
 
-/// The targets of a second, each once: how many statuses tell of one depends on when the arm looks up.
-async fn targets_of(seed: u64) -> Vec<Value> {
-    let stage = Stage::<3>::with_seed(seed).await;
-    let mut client = stage.connect();
-    client.subscribe(STATUS).await;
-    begin(&stage.trial, easy(1.0, 0.01)).await;
-    client.messages_for(ms(1100), STATUS).await;
-    let mut targets: Vec<Value> = client
-        .messages(STATUS)
-        .iter()
-        .map(|status| status["target"].clone())
-        .collect();
-    targets.dedup();
-    targets
-}
-
-#[test]
-fn a_seed_makes_the_targets_repeatable() {
-    in_virtual_time(async {
-        let first = targets_of(7).await;
-        assert!(first.len() > 50);
-        assert_eq!(first, targets_of(7).await);
-        assert_ne!(first, targets_of(8).await);
-    });
-}
-
 /// Reachable whatever the lengths: none of the goals is refused, which would show as `idle` after the first `active`.
 #[test]
 fn targets_are_reachable_at_any_lengths_also_when_these_change_during_the_trial() {

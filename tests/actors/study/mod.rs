@@ -18,8 +18,8 @@ use crate::stage::{ms, pass};
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmSettings, Consult, HeldLimit, LEAST_PAUSE, Present, Reset, SetGains, SetIntegrator,
-    SetParams, SetPeriod, TakeSnapshot,
+    ArmSettings, Consult, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
+    TakeSnapshot,
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{

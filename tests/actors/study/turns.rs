@@ -103,32 +103,6 @@ fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
 }
 
 #[test]
-fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
-    in_real_time(async {
-        let mut bench = study::<2>();
-        let (first, third) = (bench.ask_as(1, heavy()), bench.ask_as(3, heavy()));
-        bench.ask_as(2, PredictStability::default());
-        while bench.pool.is_idle() {
-            tokio::task::yield_now().await;
-        }
-        bench.pool.close("shutting down");
-        let late = bench.ask_as(4, heavy());
-        let mut heard = Vec::new();
-        for _ in 1..=4 {
-            heard.push(bench.next().await);
-        }
-        heard.sort_unstable();
-        assert_eq!(heard, [1, 2, 3, 4]);
-        for refused in [first, third, late] {
-            let answer = refused.answer.await.unwrap();
-            assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
-        }
-        let control = settings::<2>().control;
-        assert_eq!(bench.node.send(HeldLimit(control)).await.unwrap(), None);
-    });
-}
-
-#[test]
 fn the_arms_own_question_is_answered_by_the_pool() {
     in_real_time(async {
         let bench = study::<2>();

@@ -72,17 +72,6 @@ proptest! {
     }
 
     #[test]
-    fn wherever_two_equal_links_can_be_they_can_be_sent(
-        length in length(),
-        distance in share(),
-        bearing in -PI..=PI,
-        present in [angle(), angle()],
-    ) {
-        let DVec2 { x, y } = 2.0 * length * distance * DVec2::from_angle(bearing);
-        check_round_trip(&[length, length], &present, &at(x, y));
-    }
-
-    #[test]
     fn three_links_round_trip_at_every_distance_and_ratio_without_an_orientation(
         lengths in [length(), length(), length()],
         share in share(),

@@ -1,7 +1,6 @@
 //! The live loop: motion against 50-digit references, determinism, what each call changes and what it keeps.
 
 mod changes;
-mod disturbances;
 mod motion;
 mod stepping;
 

@@ -7,7 +7,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
 
-use super::{Offline, moving, no_gains};
+use super::{moving, no_gains};
 
 #[test]
 fn a_simulation_starts_in_the_starting_pose_with_runge_kutta_at_a_millisecond_and_no_control() {
@@ -35,58 +35,6 @@ fn many_steps_at_once_are_the_same_bits_as_one_by_one() {
             }
             assert_eq!(at_once, one_by_one, "{method}");
         }
-    }
-}
-
-/// The law runs on the state at the start and its effort is held through all stages: the step is the one that the
-/// offline stepper takes under that effort.
-#[test]
-fn a_step_runs_the_control_law_once_and_holds_its_effort() {
-    for method in Method::ALL {
-        let mut simulation = moving(method);
-        simulation.advance(100);
-        let state = *simulation.state();
-        simulation.set_state(state);
-        let control = simulation.pid().control(&state, simulation.timestep());
-        let mut offline = Offline {
-            arm: *simulation.arm(),
-            method,
-            dt: simulation.timestep(),
-            tau: control.effort,
-            state,
-            carry: State::rest(),
-        };
-        offline.step();
-        assert!(simulation.step());
-        assert_eq!(simulation.state(), &offline.state, "{method}");
-        assert_eq!(simulation.effort(), &control.effort);
-        assert_eq!(simulation.pid().integral(), &control.integral);
-    }
-}
-
-#[test]
-fn without_control_the_arm_falls_and_the_effort_is_zero() {
-    let mut simulation = Simulation::new(Arm::<2>::default(), Gains::default());
-    simulation.advance(100);
-    assert!(simulation.state().position[0] < -0.05);
-    assert_eq!(simulation.effort(), &[0.0; 2]);
-    assert_eq!(simulation.pid().integral(), &[0.0; 2]);
-}
-
-#[test]
-fn an_arm_at_rest_without_gravity_stays_where_it_is_to_the_last_bit() {
-    let arm = Arm::new([1.0, 0.5, 2.0], [1.0, 3.0, 0.1], 0.0).unwrap();
-    let start = State {
-        position: [0.3, 4.0, -1e8],
-        velocity: [0.0; 3],
-    };
-    for method in Method::ALL {
-        let mut simulation = Simulation::new(arm, no_gains());
-        simulation.set_method(method);
-        simulation.set_state(start);
-        simulation.advance(1000);
-        assert_eq!(simulation.state(), &start);
-        assert_eq!(simulation.time(), 1.0);
     }
 }
 

@@ -21,101 +21,105 @@ fn spelled(outcome: &Outcome) -> String {
     }
 }
 
+/// The name of a row, its stream, and the outcomes.
+type Row = (&'static str, &'static [u8], &'static [&'static str]);
+
+const STREAMS: [Row; 26] = [
+    ("a line", b"{\"a\":1}\n", &["{\"a\":1}"]),
+    (
+        "blank lines",
+        b"\r\n\n \t\r\n{}\r\n\r\n\n{\"b\":2}\r\n",
+        &["{}", "{\"b\":2}"],
+    ),
+    ("no newline", b"{\"a\":{\"b\":[]}}", &["{\"a\":{\"b\":[]}}"]),
+    (
+        "one behind another",
+        b"{}{\"a\":1} {}\n{}",
+        &["{}", "{\"a\":1}", "{}", "{}"],
+    ),
+    (
+        "brackets in strings",
+        br#"{"a":"}]{[\"}\\"}"#,
+        &[r#"{"a":"}]{[\"}\\"}"#],
+    ),
+    (
+        "after a malformed one",
+        b"{\"a\":1\n{}\n",
+        &["LineEnded", "{}"],
+    ),
+    (
+        "newline in a string",
+        b"{\"a\":\"x\n{}\n",
+        &["LineEndedInString", "{}"],
+    ),
+    (
+        "escape at the end",
+        b"{\"a\":\"x\\\n{}",
+        &["LineEndedInString", "{}"],
+    ),
+    (
+        "not an object: text",
+        b"hello {\"op\":\"x\"} there\n{}\n",
+        &["NotAnObject", "{}"],
+    ),
+    (
+        "not an object: array",
+        b"[{\"op\":\"x\"}]\n{}\n",
+        &["NotAnObject", "{}"],
+    ),
+    (
+        "not an object: string",
+        b"\"{}\"\n{}\n",
+        &["NotAnObject", "{}"],
+    ),
+    (
+        "not an object: bracket",
+        b"}{}\n{}\n",
+        &["NotAnObject", "{}"],
+    ),
+    (
+        "not an object: mark",
+        "\u{feff}{}\n{}\n".as_bytes(),
+        &["NotAnObject", "{}"],
+    ),
+    ("not an object: number", b"1\n{}\n", &["NotAnObject", "{}"]),
+    (
+        "] closes {",
+        b"{\"a\":]{\"op\":\"x\"}}\n{}\n",
+        &["Mismatch", "{}"],
+    ),
+    (
+        "} closes [",
+        b"{\"a\":[1}]} {\"op\":\"x\"}\n{}\n",
+        &["Mismatch", "{}"],
+    ),
+    ("deeper", b"{\"a\":[{]}]}\n{}\n", &["Mismatch", "{}"]),
+    (
+        "stream ends in a frame",
+        b"{}\n{\"a\":1",
+        &["{}", "StreamEnded"],
+    ),
+    ("stream ends in text", b"hello", &["NotAnObject"]),
+    ("stream ends in space", b"{}\n  ", &["{}"]),
+    (
+        "not UTF-8",
+        b"{\"a\":\"\xff\"}\n{\"b\":\"\xc3\xa9\"}\n",
+        &["NotUtf8", "{\"b\":\"é\"}"],
+    ),
+    (
+        "NaN",
+        br#"{"a":[NaN,-Infinity],"b":"NaN"}"#,
+        &[r#"{"a":[9e999,-1e999],"b":"NaN"}"#],
+    ),
+    ("NaN in a name", br#"{"NaN":1}"#, &[r#"{"NaN":1}"#]),
+    ("empty", b"", &[]),
+    ("space alone", b" \r\n\t", &[]),
+    ("comma between", b"{},{}\n{}", &["{}", "NotAnObject", "{}"]),
+];
+
 #[test]
 fn a_stream_gives_the_frames_and_errors_of_its_row() {
-    let rows: [(&str, &[u8], &[&str]); 26] = [
-        ("a line", b"{\"a\":1}\n", &["{\"a\":1}"]),
-        (
-            "blank lines",
-            b"\r\n\n \t\r\n{}\r\n\r\n\n{\"b\":2}\r\n",
-            &["{}", "{\"b\":2}"],
-        ),
-        ("no newline", b"{\"a\":{\"b\":[]}}", &["{\"a\":{\"b\":[]}}"]),
-        (
-            "one behind another",
-            b"{}{\"a\":1} {}\n{}",
-            &["{}", "{\"a\":1}", "{}", "{}"],
-        ),
-        (
-            "brackets in strings",
-            br#"{"a":"}]{[\"}\\"}"#,
-            &[r#"{"a":"}]{[\"}\\"}"#],
-        ),
-        (
-            "after a malformed one",
-            b"{\"a\":1\n{}\n",
-            &["LineEnded", "{}"],
-        ),
-        (
-            "newline in a string",
-            b"{\"a\":\"x\n{}\n",
-            &["LineEndedInString", "{}"],
-        ),
-        (
-            "escape at the end",
-            b"{\"a\":\"x\\\n{}",
-            &["LineEndedInString", "{}"],
-        ),
-        (
-            "not an object: text",
-            b"hello {\"op\":\"x\"} there\n{}\n",
-            &["NotAnObject", "{}"],
-        ),
-        (
-            "not an object: array",
-            b"[{\"op\":\"x\"}]\n{}\n",
-            &["NotAnObject", "{}"],
-        ),
-        (
-            "not an object: string",
-            b"\"{}\"\n{}\n",
-            &["NotAnObject", "{}"],
-        ),
-        (
-            "not an object: bracket",
-            b"}{}\n{}\n",
-            &["NotAnObject", "{}"],
-        ),
-        (
-            "not an object: mark",
-            "\u{feff}{}\n{}\n".as_bytes(),
-            &["NotAnObject", "{}"],
-        ),
-        ("not an object: number", b"1\n{}\n", &["NotAnObject", "{}"]),
-        (
-            "] closes {",
-            b"{\"a\":]{\"op\":\"x\"}}\n{}\n",
-            &["Mismatch", "{}"],
-        ),
-        (
-            "} closes [",
-            b"{\"a\":[1}]} {\"op\":\"x\"}\n{}\n",
-            &["Mismatch", "{}"],
-        ),
-        ("deeper", b"{\"a\":[{]}]}\n{}\n", &["Mismatch", "{}"]),
-        (
-            "stream ends in a frame",
-            b"{}\n{\"a\":1",
-            &["{}", "StreamEnded"],
-        ),
-        ("stream ends in text", b"hello", &["NotAnObject"]),
-        ("stream ends in space", b"{}\n  ", &["{}"]),
-        (
-            "not UTF-8",
-            b"{\"a\":\"\xff\"}\n{\"b\":\"\xc3\xa9\"}\n",
-            &["NotUtf8", "{\"b\":\"é\"}"],
-        ),
-        (
-            "NaN",
-            br#"{"a":[NaN,-Infinity],"b":"NaN"}"#,
-            &[r#"{"a":[9e999,-1e999],"b":"NaN"}"#],
-        ),
-        ("NaN in a name", br#"{"NaN":1}"#, &[r#"{"NaN":1}"#]),
-        ("empty", b"", &[]),
-        ("space alone", b" \r\n\t", &[]),
-        ("comma between", b"{},{}\n{}", &["{}", "NotAnObject", "{}"]),
-    ];
-    for (name, stream, expected) in rows {
+    for (name, stream, expected) in STREAMS {
         let found: Vec<String> = outcomes(stream).iter().map(spelled).collect();
         assert_eq!(found, expected, "{name}");
     }

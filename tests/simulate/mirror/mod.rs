@@ -102,29 +102,23 @@ impl<const N: usize> Handler<Called> for Tap<N> {
         let named = Named::read(call.service, &call.arguments);
         let id = call.caller.id().map(|id| id.get().to_owned());
         let steps = id.clone().filter(|_| call.service == Service::Step);
-        let Some(route) = self.routes.services.get(&call.service) else {
-            return;
-        };
-        // One behind the other in the arm's mailbox: nothing comes between them, not even steps by hand.
-        let before = self.snapshot().into_actor(self);
-        route(call);
-        let after = self.snapshot().into_actor(self);
-        let input = before.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
-            tap.mirror.observe(arm.as_ref());
-            let answer = tap.mirror.apply(&named);
+        let apply = move |mirror: &mut Mirror<N>| {
+            let answer = mirror.apply(&named);
             if let (Some(values), Some(id)) = (answer, id) {
-                let answer = (values, tap.mirror.is_done);
-                tap.mirror.court.expected.borrow_mut().insert(id, answer);
+                let answer = (values, mirror.is_done);
+                mirror.court.expected.borrow_mut().insert(id, answer);
+            }
+        };
+        let send = |tap: &Self| {
+            let route = tap.routes.services.get(&call.service);
+            route.expect("a service of the arm")(call);
+        };
+        self.pass(ctx, send, apply, |mirror, (), arm| {
+            mirror.observe(arm);
+            if let Some(id) = steps {
+                mirror.look_after_steps(&id);
             }
         });
-        ctx.wait(input.then(|(), _, _| {
-            after.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
-                tap.mirror.observe(arm.as_ref());
-                if let Some(id) = steps {
-                    tap.mirror.look_after_steps(&id);
-                }
-            })
-        }));
     }
 }
 
@@ -138,39 +132,39 @@ impl<const N: usize> Handler<Sent> for Tap<N> {
 
     fn handle(&mut self, Sent(message): Sent, ctx: &mut Context<Self>) {
         let heard = message.heard.clone();
-        let Some(route) = self.routes.listeners.get(&Topic::JointTrajectory) else {
-            return;
+        let send = |tap: &Self| {
+            let route = tap.routes.listeners.get(&Topic::JointTrajectory);
+            route.expect("the arm listens")(message);
         };
-        let before = self.snapshot().into_actor(self);
-        route(message);
-        let after = self.snapshot().into_actor(self);
-        let input = before.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
-            tap.mirror.observe(arm.as_ref());
-            tap.mirror.point(&heard);
-        });
-        ctx.wait(input.then(|(), _, _| {
-            after.map(|arm, tap: &mut Self, _: &mut Context<Self>| tap.mirror.observe(arm.as_ref()))
-        }));
+        self.pass(ctx, send, move |mirror| mirror.point(&heard), observe);
     }
 }
 
+fn observe<const N: usize>(mirror: &mut Mirror<N>, (): (), arm: Option<&Simulation<N>>) {
+    mirror.observe(arm);
+}
+
 impl<const N: usize> Tap<N> {
-    /// An input of another node's: goes to the arm, and has the same effect on the double.
-    fn pass(
+    /// An input goes to the arm, and has the same effect on the double; `end` compares them behind it. All are one behind the
+    /// other in the arm's mailbox: nothing comes between them, not even steps by hand.
+    fn pass<T: 'static>(
         &mut self,
         ctx: &mut Context<Self>,
-        send: impl FnOnce(&Addr<ArmSim<N>>),
-        apply: impl FnOnce(&mut Mirror<N>) + 'static,
+        send: impl FnOnce(&Self),
+        apply: impl FnOnce(&mut Mirror<N>) -> T + 'static,
+        end: impl FnOnce(&mut Mirror<N>, T, Option<&Simulation<N>>) + 'static,
     ) {
         let before = self.snapshot().into_actor(self);
-        send(&self.arm);
+        send(self);
         let after = self.snapshot().into_actor(self);
         let input = before.map(|arm, tap: &mut Self, _: &mut Context<Self>| {
             tap.mirror.observe(arm.as_ref());
-            apply(&mut tap.mirror);
+            apply(&mut tap.mirror)
         });
-        ctx.wait(input.then(|(), _, _| {
-            after.map(|arm, tap: &mut Self, _: &mut Context<Self>| tap.mirror.observe(arm.as_ref()))
+        ctx.wait(input.then(|applied, _, _| {
+            after.map(|arm, tap: &mut Self, _: &mut Context<Self>| {
+                end(&mut tap.mirror, applied, arm.as_ref());
+            })
         }));
     }
 }
@@ -185,7 +179,7 @@ impl<const N: usize> Handler<Call<SetParams<N>>> for Tap<N> {
             let changed = ask.applied_to(&present).unwrap_or(present);
             mirror.simulation.set_arm(changed);
         };
-        self.pass(ctx, |arm| arm.do_send(call), apply);
+        self.pass(ctx, |tap| tap.arm.do_send(call), apply, observe);
     }
 }
 
@@ -198,7 +192,7 @@ impl<const N: usize> Handler<Call<SetGains<N>>> for Tap<N> {
             let gains = ask.applied_to(mirror.simulation.pid().gains());
             mirror.simulation.set_gains(gains);
         };
-        self.pass(ctx, |arm| arm.do_send(call), apply);
+        self.pass(ctx, |tap| tap.arm.do_send(call), apply, observe);
     }
 }
 
@@ -218,7 +212,7 @@ impl<const N: usize> Handler<Call<SetIntegrator>> for Tap<N> {
                 mirror.anchor = None;
             }
         };
-        self.pass(ctx, |arm| arm.do_send(call), apply);
+        self.pass(ctx, |tap| tap.arm.do_send(call), apply, observe);
     }
 }
 
@@ -227,28 +221,22 @@ impl<const N: usize> Handler<CommandGoal<N>> for Tap<N> {
 
     fn handle(&mut self, command: CommandGoal<N>, ctx: &mut Context<Self>) {
         self.mirror.has_goals = true;
-        let before = self.snapshot().into_actor(self);
-        self.arm.do_send(command);
-        let after = self.snapshot().into_actor(self);
-        let input = before.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
-            tap.mirror.observe(arm.as_ref());
-            // It may have been overtaken by a reset: then the arm leaves it aside.
-            let held = *tap.mirror.simulation.pid().setpoint();
-            tap.mirror.simulation.set_setpoint(Setpoint {
-                position: command.positions,
+        let position = command.positions;
+        let apply = move |mirror: &mut Mirror<N>| {
+            let held = *mirror.simulation.pid().setpoint();
+            mirror.simulation.set_setpoint(Setpoint {
+                position,
                 velocity: [0.0; N],
             });
             held
+        };
+        let send = |tap: &Self| tap.arm.do_send(command);
+        self.pass(ctx, send, apply, |mirror, held, arm| {
+            // It may have been overtaken by a reset: then the arm leaves it aside.
+            if arm.is_some_and(|arm| *arm.pid().setpoint() == held) {
+                mirror.simulation.set_setpoint(held);
+            }
+            mirror.observe(arm);
         });
-        ctx.wait(input.then(|held, _, _| {
-            after.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
-                if let Some(arm) = &arm
-                    && *arm.pid().setpoint() == held
-                {
-                    tap.mirror.simulation.set_setpoint(held);
-                }
-                tap.mirror.observe(arm.as_ref());
-            })
-        }));
     }
 }

@@ -42,7 +42,7 @@ pub fn play(seed: u64, is_newest: bool, keeps_log: bool) -> Outcome {
         if is_newest {
             plan = plan.with_bursts(&court);
         }
-        let text = plan.to_string();
+        let text = format!("{plan:?}");
         let mut course = Course::new(&court, plan, seed).await;
         course.run().await;
         let (hash, log) = court.record();

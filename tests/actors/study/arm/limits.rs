@@ -100,32 +100,6 @@ fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
     });
 }
 
-/// A setpoint that is dragged asks for a prediction now and then, not at every tick; the last one has its own.
-#[test]
-fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
-    in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
-        arm.want(Topic::Diagnostics, true).await;
-        arm.ask(enable(true)).await;
-        arm.questions().await;
-        let time = Duration::from_secs(2);
-        let moves = 100_u32;
-        for n in 1..=moves {
-            arm.hold([f64::from(n) * 1e-2, 0.0], [0.0; 2]).await;
-            sleep(time / moves).await;
-        }
-        let asked = arm.questions().await;
-        let most = usize::try_from(time.as_millis() / LEAST_PAUSE.as_millis()).unwrap() + 2;
-        assert!(
-            asked.len() > 5 && asked.len() <= most,
-            "{} questions",
-            asked.len()
-        );
-        let last = f64::from(moves) * 1e-2;
-        assert_eq!(asked.last().unwrap().setpoint.position, [last, 0.0]);
-    });
-}
-
 /// A limit of other gains says nothing: between the change and the answer the limit is unknown, and there is no warning.
 #[test]
 fn a_limit_of_another_loop_is_never_held_against_the_arm() {

@@ -1,0 +1,163 @@
+//! Fields are read one by one, and rejected by name: absent, null, within an object, by position, repeated, refused by another
+//! layer. Bad literals are the rows of `tests/actors/refusals/`.
+//!
+//! **Invariant:** a message is compared whole: it is what the sender of a request has to go by.
+
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::op::Arguments;
+use pendularm::protocol::op::fields::{Bound, Fields, Reason, RejectedField};
+use serde_json::value::RawValue;
+
+fn args(text: &str) -> Arguments {
+    let raw = RawValue::from_string(text.to_owned()).expect("valid JSON");
+    if text.starts_with('[') {
+        Arguments::Positional(raw.into())
+    } else {
+        Arguments::Object(raw.into())
+    }
+}
+
+/// The values that `read` takes from a request, and the status.
+fn reading<T>(
+    service: Service,
+    text: &str,
+    read: impl FnOnce(&mut Fields<'_>) -> T,
+) -> (T, String) {
+    let args = args(text);
+    let mut fields = Fields::read(&args, service).expect("arguments that fit");
+    let value = read(&mut fields);
+    assert_eq!(fields.accepted(), fields.status().is_empty());
+    (value, fields.status())
+}
+
+#[test]
+fn an_absent_optional_field_is_no_rejection() {
+    let (value, status) = reading(Service::SetIntegrator, "{}", |fields| {
+        (
+            fields.number("timestep", Bound::Positive),
+            fields.boolean("method"),
+        )
+    });
+    assert_eq!((value, status.as_str()), ((None, None), ""));
+}
+
+#[test]
+fn null_means_absent_only_in_optional_fields_of_services_that_take_all_or_nothing() {
+    let (value, status) = reading(Service::Solve, r#"{"x":null,"y":1,"phi":null}"#, |fields| {
+        (
+            fields.number("phi", Bound::Finite),
+            fields.number("x", Bound::Finite),
+        )
+    });
+    assert_eq!(value, (None, None));
+    assert_eq!(status, "x must be a number, got null");
+    let (value, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
+        fields.text("goal_id").map(std::borrow::Cow::into_owned)
+    });
+    assert_eq!((value, status.as_str()), (None, ""));
+    let (_, status) = reading(Service::SetParams, r#"{"gravity":null}"#, |fields| {
+        fields.number("gravity", Bound::NonNegative)
+    });
+    assert_eq!(status, "gravity must be a number, got null");
+}
+
+#[test]
+fn members_of_an_object_are_read_like_fields_and_named_after_it() {
+    let read = |args: &str| {
+        reading(Service::Stability, args, |fields| {
+            fields.object("params", |params| {
+                let gravity = params.number("gravity", Bound::NonNegative);
+                (gravity, params.numbers("masses", 2, Bound::Positive))
+            })
+        })
+    };
+    let (value, status) = read(r#"{"params":{"gravity":2,"masses":[1,2],"colour":"red"}}"#);
+    assert_eq!(value, Some((Some(2.0), Some(vec![1.0, 2.0]))));
+    assert_eq!(status, "");
+    let (value, status) = read(r#"{"params":{"gravity":-2,"masses":[1,1e999]}}"#);
+    assert_eq!(value, Some((None, None)));
+    assert_eq!(
+        status,
+        "params.gravity must be at least 0, got -2; params.masses[1] must be a finite number"
+    );
+    assert_eq!(read(r#"{"params":{"gravity":null}}"#).0, Some((None, None)));
+    for absent in ["{}", r#"{"params":null}"#] {
+        assert_eq!(read(absent), (None, String::new()));
+    }
+    let (value, status) = read(r#"{"params":[1]}"#);
+    assert_eq!(
+        (value, status.as_str()),
+        (None, "params must be an object, got an array")
+    );
+}
+
+#[test]
+fn a_reason_given_from_outside_for_a_member_names_it_with_its_object() {
+    let (_, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
+        fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"))
+    });
+    assert_eq!(status, "gains.kp is not to my taste");
+}
+
+#[test]
+fn a_positional_array_is_read_in_documented_order() {
+    let (value, status) = reading(Service::SendGoal, "[1,2,null,0.5]", |fields| {
+        let mut read = |name| fields.number(name, Bound::Finite);
+        [
+            read("x"),
+            read("y"),
+            read("phi"),
+            read("epsilon"),
+            read("success_hold"),
+        ]
+    });
+    assert_eq!(value, [Some(1.0), Some(2.0), None, Some(0.5), None]);
+    assert_eq!(status, "");
+}
+
+#[test]
+fn of_a_repeated_field_the_last_counts() {
+    let (value, status) = reading(
+        Service::SetIntegrator,
+        r#"{"timestep":"x","timestep":2}"#,
+        |fields| fields.number("timestep", Bound::Positive),
+    );
+    assert_eq!((value, status.as_str()), (Some(2.0), ""));
+}
+
+#[test]
+fn another_layer_may_refuse_a_field_in_its_own_words() {
+    let args = args("{}");
+    let mut fields = Fields::read(&args, Service::SetIntegrator).unwrap();
+    fields.refuse("method", &"is not to be trusted");
+    assert!(!fields.accepted());
+    assert_eq!(fields.status(), "method is not to be trusted");
+    assert_eq!(
+        fields.rejections(),
+        [RejectedField {
+            field: "method".to_owned(),
+            reason: Reason::Refused("is not to be trusted".to_owned()),
+        }]
+    );
+}
+
+#[test]
+fn a_status_is_bounded_however_long_the_request_was() {
+    let long = "x".repeat(1_000_000);
+    let (_, status) = reading(
+        Service::SetIntegrator,
+        &format!(r#"{{"method":"{long}","timestep":"{long}"}}"#),
+        |fields| {
+            let _ = fields.choice("method", &[1], |_| "rk4");
+            let _ = fields.number("timestep", Bound::Positive);
+            for _ in 0..1000 {
+                fields.refuse("method", &long);
+            }
+        },
+    );
+    assert!(
+        status.chars().count() < 2100,
+        "{} characters",
+        status.chars().count()
+    );
+}
