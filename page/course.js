@@ -82,14 +82,14 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the speed of the last joint at one look of the controller, after a push of a millionth of a radian. The arm takes two looks a second.",
+    text: "Each bar is the speed of the last joint at one look of the controller, after a tiny push. The arm moves in slow motion: two looks a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
     question: {
-      text: "Why does each bar point the other way?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is kept too long. It pushes past the target, each time further.",
+      text: "Beyond the limit each bar points the other way. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
+      because: "The torque is kept too long. It pushes past the target, and beyond the limit each time further.",
     },
   },
   {
@@ -149,7 +149,7 @@ export const STEPS = [
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, strong gains, wild numbers. Each picture starts one. Its sentence says what a correct simulation does.",
+    text: "Thirty-nine arms that are hard to simulate: light links, strong gains, wild numbers. A picture starts its scene; some need three links. Its sentence says what a correct simulation does.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes >= SOME_SCENES },

@@ -1,6 +1,7 @@
 // @ts-check
 // Shows the course, a step at a time: sets its scene, draws its chart, ticks its task, checks its answer.
-// Invariant: the arm changes only when somebody clicks; a link that names a step shows it, and waits for Start.
+// Invariant: an arm that others watch changes only when somebody clicks: a link that names a step shows it, and waits for Start.
+// The arm of the page in one file belongs to its page: there the step begins at once.
 
 import { remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
@@ -11,6 +12,7 @@ import { METHODS, shortName } from "./format.js";
 import { ENERGY, KINETIC, POTENTIAL, TIME, VELOCITY, record } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
+import { isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { controlPeriodLimit, limitInForce, question as loopQuestion, verdict } from "./policy.js";
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, stability, step as stepArm } from "./runtime.js";
@@ -24,12 +26,15 @@ import { Surface } from "./surface.js";
 
 const SHAKES = 2; // rad/s: beyond the limit, and seen to
 const LOOKS = 14; // bars
-const PUSH = 1e-6; // rad
+const PUSH = 1e-6; // rad/s
 const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // looks of the arm in slow motion
 const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];
+
+/** A link without settings. */
+const ONLY_STEP = /^#?(?:links=[23])?&?(?:step=\w+)?&?$/;
 
 /** The map's axes: control period [s], and damping gains as a multiple of the usual ones. */
 const PERIODS = new LogScale(1e-3, 2e-2, [1, 2, 5, 10, 20].map((ms) => [1e-3 * ms, `${ms} ms`]));
@@ -45,7 +50,7 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
 const CHARTS = {
   velocity: { caption: "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
   energy: { caption: "Energy [J]: kinetic, potential, total in black", draw: strip([{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }]) },
-  bars: { caption: "A push of a millionth of a radian, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
+  bars: { caption: "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
   errors: { caption: "Two errors of one move", draw: () => drawErrors(surface, now.errors), ask: askErrors },
   map: { caption: "Which period is stable", draw: paintMap, ask: askMap },
   ladder: { caption: "Error over run time", draw: () => drawLadder(surface, now.runs) },
@@ -87,7 +92,7 @@ export function startCourse() {
   }, String(i + 1))));
   at = Math.max(0, stepIn(location.hash));
   addEventListener("hashchange", () => { if (stepIn(location.hash) >= 0) { at = stepIn(location.hash); rest(); } });
-  watch("links", rest);
+  watch("links", () => (isAlone && state.view === "course" && ONLY_STEP.test(location.hash) ? begin() : rest()));
   watch("connection", (connection) => { if (connection !== "open") rest(); });
   watchAll(look);
   rest();
@@ -175,7 +180,7 @@ function show() {
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
   setText(byId("course-caption"), caption);
-  setText(byId("course-status"), "");
+  setText(byId("course-status"), now.began || state.links === 0 ? "" : "Press “Start”: it sets the arm for everybody who watches.");
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   byId("course-start").disabled = state.links === 0;
   byId("course-back").disabled = at === 0;
@@ -281,13 +286,13 @@ function showBig() {
   setText(byId("course-figure"), hidden ? "" : ofLimit(value(), unknown ? NaN : limit()));
   setText(byId("course-what"), label);
   byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
-  if (kind === "diverged") setText(byId("course-status"), "The arm flew apart. Press “Restart step”.");
+  if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm flew apart. Press “Restart step”.");
 }
 
 function showTask() {
   const { task, guess, question } = STEPS[at];
   const { began, ticked, guessed, answered } = now;
-  byId("course-task").hidden = !began;
+  byId("course-task").hidden = !began || (guess !== undefined && guessed < 0);
   byId("course-task").classList.toggle("done", ticked);
   setText(byId("course-tick"), ticked ? "✓" : "○");
   setText(byId("course-task-text"), task.text);
@@ -365,8 +370,8 @@ const inquire = latestOnly(async ({ ask, mine }) => {
 async function askBars(common) {
   const mine = now;
   const zero = new Array(state.links).fill(0);
-  // Without gravity, so that nothing but the push is seen.
-  const { result, values } = await rollout({ ...common, params: { ...state.params, gravity: 0 }, q0: zero.with(-1, PUSH), setpoint: zero, duration: LOOKS * period(), samples: LOOKS + 1 });
+  // Without gravity, so that nothing but the push is seen. It is one of speed, which the fastest motion of the loop answers.
+  const { result, values } = await rollout({ ...common, params: { ...state.params, gravity: 0 }, q0: zero, qdot0: zero.with(-1, PUSH), setpoint: zero, duration: LOOKS * period(), samples: LOOKS + 1 });
   if (!result) return;
   mine.bars = values.velocities.slice(1).map((row) => row.at(-1));
   mine.seen.shrinks = shrinks(mine.bars);

@@ -6,9 +6,14 @@ import { byId, el } from "./dom.js";
 import { option, refusal } from "./field.js";
 import { METHODS, significant } from "./format.js";
 import { cause, limitText, others } from "./policy.js";
-import { stability } from "./runtime.js";
+import { MOVE_TO } from "./ladder.js";
+import { rollout, stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
 import { state } from "./store.js";
+
+/** The move whose error the sheet names: how long it takes [s], and its timestep and control period [s]. */
+const MOVE = 2;
+const AT = 0.001;
 
 /** @type {[string, string][]} */
 const LISTS = [["masses", "mass [kg]"], ["lengths", "length [m]"], ["kp", "kp [N m/rad]"], ["ki", "ki [N m/(rad s)]"], ["kd", "kd [N m s/rad]"]];
@@ -42,10 +47,12 @@ async function make() {
   for (const [method] of METHODS) {
     const answer = await stability({ params, gains, setpoint, integrator: method, control_period: 0 });
     if (!answer.result) {
-      said.show(answer.status);
+      said.show(plain(answer.status));
+      byId("sheet").hidden = true;
       return false;
     }
-    answers[method] = answer.values;
+    const move = await rollout({ params, gains, q0: setpoint, setpoint: MOVE_TO[state.links], duration: MOVE, timestep: AT, integrator: method, samples: 2, reference: true });
+    answers[method] = { ...answer.values, error: move.result ? move.values.error : null };
   }
   said.show("");
   const link = new URL(location.href);
@@ -67,12 +74,13 @@ function sheet(params, gains, answers, link) {
     el("table", {}, el("tbody", {},
       row("Masses", `${text(params.masses)} kg`), row("Lengths", `${text(params.lengths)} m`), row("Gravity", `${significant(params.gravity, 4)} m/s²`),
       row("Gains kp", text(gains.kp)), row("Gains ki", text(gains.ki)), row("Gains kd", text(gains.kd)),
-      row("Longest control period, stretched out", limitText(period)),
-      ...METHODS.map(([method, name]) => row(`Longest timestep, ${name}`, limitText(least(answers[method])))),
+      row("Longest control period, stretched out", period === 0 ? "none" : limitText(period)),
+      ...METHODS.map(([method, name]) => row(`Longest timestep, the controller at each step, ${name}`, limitText(least(answers[method])))),
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
+      ...METHODS.map(([method, name]) => row(`Error of a move of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error === null ? "too small to measure, or diverged" : `${significant(answers[method].error, 2)} rad`)),
     )),
-    el("p", {}, reason(answers.rk4, period)),
-    el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])])))),
+    el("p", {}, reason(answers.rk4, period, gains)),
+    ...(period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])]))))]),
     el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
     el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
   ];
@@ -83,8 +91,13 @@ function least(answer) {
   return Math.min(answer.timestep_limit_held ?? Infinity, answer.timestep_limit_motion ?? Infinity);
 }
 
-/** @param {any} answer @param {number} period */
-export function reason(answer, period) {
-  if (period === 0) return "Reason: these gains do not hold the arm, however often the controller looks. Raise the derivative gains or lower the integral gains.";
+/** A refusal in the words of the form: "kd of joint 1 must be a number". @param {string} status */
+function plain(status) {
+  return status.replace(/\b(?:gains|params)\.(\w+)(?:\[(\d)\])?/g, (_, name, i) => i === undefined ? name : `${name.replace(/s$/, "")} ${Number(i) + 1}`).replace(/, got null$/, "");
+}
+
+/** @param {any} answer @param {number} period @param {{ki: number[]}} gains */
+export function reason(answer, period, { ki }) {
+  if (period === 0) return `Reason: these gains do not hold the arm, however often the controller looks. Raise the derivative gains${ki.some((one) => one > 0) ? " or lower the integral gains" : ""}.`;
   return !answer.critical || period === Infinity ? "Reason: nothing limits this arm." : `Reason: ${cause(answer)}`;
 }

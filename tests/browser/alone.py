@@ -43,7 +43,8 @@ class Alone(Runtime):
 
     def restart(self, links=None):
         self.links = links or self.links
-        self.page.go(self.url)
+        self.page.go("about:blank")
+        self.page.go(f"{self.url}#workbench")
 
     @property
     def url(self):

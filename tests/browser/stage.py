@@ -59,6 +59,9 @@ class PageTest(unittest.TestCase):
         self.page = self.open(**self.view)
 
     def open(self, fragment="", **view):
+        if IS_FILE and not self.course:
+            # Its course would begin at once.
+            fragment = fragment or "#workbench"
         page = browser().page(self.runtime.url + fragment, **view)
         if IS_FILE:
             self.runtime.page = page

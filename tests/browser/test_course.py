@@ -2,7 +2,7 @@
 
 import time
 
-from stage import PageTest
+from stage import IS_FILE, PageTest, needs_server
 from test_layout import PHONE, audit, forget_the_inspectors
 
 STEPS = 10
@@ -15,7 +15,7 @@ class CourseTest(PageTest):
     def step(self, number):
         self.page.click(f"#course-steps button:nth-child({number})")
         self.page.until(f"document.querySelector('#course-number').textContent === 'Step {number} of {STEPS}'")
-        self.page.until("!document.querySelector('#course-task').hidden")
+        self.page.until("document.querySelector('#course-start').textContent === 'Restart step'")
         self.page.until("!document.querySelector('#course-dial').inert", why="the scene is set")
 
     def done(self, why):
@@ -29,6 +29,7 @@ class CourseTest(PageTest):
 
 
 class Tasks(CourseTest):
+    @needs_server("the arm of the file belongs to its page")
     def test_the_course_is_the_first_view_and_leaves_the_arm_alone(self):
         self.assertTrue(self.page.run("document.querySelector('#course').checkVisibility() && !document.querySelector('#controls').checkVisibility()"))
         before = self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")
@@ -37,6 +38,17 @@ class Tasks(CourseTest):
         self.assertEqual(page.text("#course-start"), "Start")
         time.sleep(0.5)
         self.assertEqual(before, (self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")))
+
+    def test_a_link_to_a_step_begins_it_in_the_file_and_waits_at_a_server(self):
+        page = self.open("#step=4")
+        page.until("document.querySelector('#course-title').textContent === 'A better method?'")
+        begun = "document.querySelector('#course-start').textContent === 'Restart step'"
+        if IS_FILE:
+            page.until(begun)
+            self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
+        else:
+            page.until("document.querySelector('#course-status').textContent.startsWith('Press')")
+            self.assertFalse(page.run(begun))
 
     def test_holding_ticks_when_the_tip_arrives(self):
         self.page.click("#course-start")
