@@ -504,7 +504,7 @@ impl Outbox {
     }
 }
 
-// ---- dropping: the oldest messages go first, whole -------------------------------------------------------------------
+// ---- dropping: the oldest messages go first, whole ------------------------------------------------------------------
 
 impl Outbox {
     /// Whether there is room for a message once all else has gone; if not, it counts as dropped.

@@ -11,7 +11,7 @@ use tokio::time::Instant;
 
 use super::admission::authentication::AuthError;
 use super::admission::slots::HeldSlot;
-use super::session::{ClientSession, Newcomer, Opened, Place};
+use super::session::{ClientSession, HeldPlace, Newcomer, Opened};
 use super::transport::Transport;
 use super::websocket::WebSocket;
 use crate::actors::gateway::limits::OPENING_TIME;
@@ -25,7 +25,7 @@ struct HttpGate<'a> {
     session: &'a ClientSession,
     /// The ways to a client that has no place yet.
     outlets: Cell<Option<Outlets>>,
-    place: Cell<Option<Place>>,
+    place: Cell<Option<HeldPlace>>,
     /// Its slot, and why it is turned away without.
     newcomer: Option<(HeldSlot<'a>, Option<Refused>)>,
 }
@@ -85,7 +85,7 @@ impl ClientSession {
         stream: S,
         first: BytesMut,
         due: Instant,
-        client: Result<Newcomer<'_>, Place>,
+        client: Result<Newcomer<'_>, HeldPlace>,
     ) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,

@@ -39,7 +39,7 @@ use tokio::time::Instant;
 use self::admission::Admission;
 use self::computations::Computations;
 use self::outgoing::Outgoing;
-use self::session::{ClientSession, Place};
+use self::session::{ClientSession, HeldPlace};
 use self::transport::Transport;
 pub use self::unread::UnreadSource;
 pub use super::ends::Ends;
@@ -63,7 +63,7 @@ pub struct Connection<S> {
     /// The stream, once the client is spoken with.
     transport: Option<Transport<S>>,
     /// Its place among the clients.
-    place: Option<Place>,
+    place: Option<HeldPlace>,
     outgoing: Outgoing,
     computations: Computations,
     /// When something was last written or computed, while the reader waited for that.

@@ -20,7 +20,7 @@ use super::session::Opened;
 use super::timer::Timer;
 use super::transport::Transport;
 use super::unfinished::Unfinished;
-use super::writer::Writing;
+use super::writer::ClientWriter;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
 use crate::actors::gateway::messages::{Disconnect, Retire};
@@ -36,9 +36,9 @@ const TOO_SLOW: &str = "a frame that has begun must be complete within a minute"
 type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// The reading half of a connection.
-struct Reading {
+struct ClientReader {
     id: ConnectionId,
-    step: Step,
+    step: ReadStep,
     frames: FrameReader,
     /// Bytes that have come and not been given to `frames`.
     chunk: BytesMut,
@@ -60,7 +60,7 @@ struct Reading {
 }
 
 /// What the reader does.
-enum Step {
+enum ReadStep {
     /// It handles frames.
     Frames,
     /// The client has stopped sending, and may still be reading: it waits for the responses that are still to come.
@@ -90,9 +90,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         } else {
             FrameReader::new()
         };
-        ctx.spawn(Reading {
+        ctx.spawn(ClientReader {
             id,
-            step: Step::Frames,
+            step: ReadStep::Frames,
             frames,
             chunk: opened.first,
             is_cut: true,
@@ -105,11 +105,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             is_last: false,
             timer: Timer::default(),
         });
-        ctx.spawn(Writing::default());
+        ctx.spawn(ClientWriter::default());
     }
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for Reading {
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for ClientReader {
     type Output = ();
 
     fn poll(
@@ -131,7 +131,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for
     }
 }
 
-impl Reading {
+impl ClientReader {
     /// Reads until the client ends or is refused, then lets the connection finish.
     fn poll_to_the_end<S: AsyncRead + AsyncWrite + Unpin + 'static>(
         &mut self,
@@ -140,7 +140,7 @@ impl Reading {
     ) -> Poll<()> {
         loop {
             match &mut self.step {
-                Step::Frames => {
+                ReadStep::Frames => {
                     self.step = match ready!(self.poll_frames(connection, cx)) {
                         Ok(()) => self.retire(connection),
                         // A broken stream takes no answers, and nobody waits for those that don't come.
@@ -151,7 +151,7 @@ impl Reading {
                         }
                     };
                 }
-                Step::Retiring(answered, due) => {
+                ReadStep::Retiring(answered, due) => {
                     if let Some(all) = answered
                         && all.as_mut().poll(cx).is_ready()
                     {
@@ -163,15 +163,15 @@ impl Reading {
                     }
                     self.step = self.leave(connection);
                 }
-                Step::Leaving(left) => {
+                ReadStep::Leaving(left) => {
                     ready!(left.as_mut().poll(cx));
                     connection.finish();
                     if !connection.is_refused {
                         return Poll::Ready(());
                     }
-                    self.step = Step::Discarding(DISCARD_BYTES, Instant::now() + DISCARD_TIME);
+                    self.step = ReadStep::Discarding(DISCARD_BYTES, Instant::now() + DISCARD_TIME);
                 }
-                Step::Discarding(left, due) => {
+                ReadStep::Discarding(left, due) => {
                     let Some(transport) = &mut connection.transport else {
                         return Poll::Ready(());
                     };
@@ -192,21 +192,21 @@ impl Reading {
 
     /// Withdraws the client's registrations, since it can no longer answer or withdraw, and waits for the responses
     /// that are still to come.
-    fn retire<S>(&self, connection: &Connection<S>) -> Step {
+    fn retire<S>(&self, connection: &Connection<S>) -> ReadStep {
         let retired = connection.registry.send(Retire(self.id));
         let answered = async move {
             if let Ok(handled) = retired.await {
                 handled.effect().await;
             }
         };
-        Step::Retiring(Some(Box::pin(answered)), Instant::now() + RESPONSES_TIME)
+        ReadStep::Retiring(Some(Box::pin(answered)), Instant::now() + RESPONSES_TIME)
     }
 
     /// Answers that are on their way arrive before the registry answers this, and so before the end.
-    fn leave<S>(&mut self, connection: &Connection<S>) -> Step {
+    fn leave<S>(&mut self, connection: &Connection<S>) -> ReadStep {
         (self.performer, self.room) = (None, None);
         let left = connection.registry.send(Disconnect(self.id));
-        Step::Leaving(Box::pin(async move {
+        ReadStep::Leaving(Box::pin(async move {
             let _ = left.await;
         }))
     }

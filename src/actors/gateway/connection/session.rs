@@ -48,25 +48,25 @@ pub(super) struct ClientSession {
 
 /// A client that is spoken with from now on.
 pub(super) struct Opened<S> {
-    pub(super) place: Place,
+    pub(super) place: HeldPlace,
     pub(super) transport: Transport<S>,
     /// Bytes that have been read.
     pub(super) first: BytesMut,
 }
 
 /// The place of a client that the registry knows; whoever drops it gives it back.
-pub(super) struct Place {
+pub(super) struct HeldPlace {
     id: ConnectionId,
     registry: Addr<Registry>,
 }
 
-impl Place {
+impl HeldPlace {
     pub(super) const fn id(&self) -> ConnectionId {
         self.id
     }
 }
 
-impl Drop for Place {
+impl Drop for HeldPlace {
     fn drop(&mut self) {
         self.registry.do_send(Disconnect(self.id));
     }
@@ -208,7 +208,7 @@ impl ClientSession {
         outlets: &Outlets,
         slot: &HeldSlot<'_>,
         due: Instant,
-    ) -> Result<Place, Refused> {
+    ) -> Result<HeldPlace, Refused> {
         loop {
             let place = self.connect(outlets, true).await;
             let is_full = matches!(place, Err(Refused::Full { .. }));
@@ -308,7 +308,7 @@ impl ClientSession {
     }
 
     /// Makes the client known.
-    async fn connect(&self, outlets: &Outlets, may_use_kept: bool) -> Result<Place, Refused> {
+    async fn connect(&self, outlets: &Outlets, may_use_kept: bool) -> Result<HeldPlace, Refused> {
         let connect = Connect {
             outlets: outlets.clone(),
             from: self.ends.peer.ip().to_canonical(),
@@ -317,7 +317,7 @@ impl ClientSession {
         let answer = self.registry.send(connect).await;
         let id = answer.unwrap_or(Err(Refused::Closed))?;
         let registry = self.registry.clone();
-        Ok(Place { id, registry })
+        Ok(HeldPlace { id, registry })
     }
 
     /// Reads until it is clear what is to be done about the client.
@@ -368,7 +368,7 @@ impl ClientSession {
     async fn serve<S>(
         &self,
         mut stream: S,
-        place: Place,
+        place: HeldPlace,
         first: BytesMut,
         verdict: HowServed,
     ) -> Option<Opened<S>>

@@ -23,7 +23,7 @@ use crate::actors::panics::contain;
 
 /// The writing half of a connection: it ends the connection.
 #[derive(Default)]
-pub(super) struct Writing {
+pub(super) struct ClientWriter {
     timer: Timer,
     /// By when the end of the stream has to be out.
     end_due: Option<Instant>,
@@ -33,7 +33,7 @@ pub(super) struct Writing {
     answer_due: Option<Instant>,
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for Writing {
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for ClientWriter {
     type Output = ();
 
     fn poll(
@@ -55,7 +55,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> ActorFuture<Connection<S>> for
     }
 }
 
-impl Writing {
+impl ClientWriter {
     /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
     fn poll_to_the_end<S: AsyncRead + AsyncWrite + Unpin + 'static>(
         &mut self,

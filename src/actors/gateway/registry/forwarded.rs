@@ -23,13 +23,13 @@ pub(crate) struct Forwarded {
     pub(crate) provider: ConnectionId,
     /// The name of the service or action, as the caller spells it.
     pub(crate) name: Box<str>,
-    pub(crate) terms: Terms,
+    pub(crate) terms: RequestTerms,
     /// The part of its caller's room that it takes.
     pub(crate) _entry: KeptEntry,
 }
 
 /// What sets calls and goals apart.
-pub(crate) enum Terms {
+pub(crate) enum RequestTerms {
     /// A call ends when its caller's patience does. The registry may look later, if the process has stood still.
     Call { deadline: Instant },
     /// A goal goes on, and may be cancelled under the name that its server knows.
@@ -42,8 +42,8 @@ pub(crate) enum Terms {
 impl Forwarded {
     fn deadline(&self) -> Option<Instant> {
         match self.terms {
-            Terms::Call { deadline } => Some(deadline),
-            Terms::Goal { .. } => None,
+            RequestTerms::Call { deadline } => Some(deadline),
+            RequestTerms::Goal { .. } => None,
         }
     }
 }

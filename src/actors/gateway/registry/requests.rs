@@ -10,7 +10,7 @@ use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::directory::Served;
-use super::forwarded::{Forwarded, Terms};
+use super::forwarded::{Forwarded, RequestTerms};
 use super::refusal::Refusal;
 use super::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
@@ -73,7 +73,7 @@ impl Registry {
             }
         } else {
             let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-            let terms = |_: &str| Terms::Call { deadline };
+            let terms = |_: &str| RequestTerms::Call { deadline };
             let encode =
                 |spelling: &str, id: &str| messages::call(spelling, id, call.args.payload());
             self.forward(
@@ -103,7 +103,7 @@ impl Registry {
         } else if Action::from_name(&goal.action).is_some() {
             self.action_route(&goal)
         } else {
-            let terms = |spelling: &str| Terms::Goal {
+            let terms = |spelling: &str| RequestTerms::Goal {
                 spelling: spelling.into(),
                 wants_feedback: goal.feedback,
             };
@@ -268,7 +268,7 @@ impl Registry {
         origin: &FrameOrigin,
         kind: Served,
         (name, args): (&str, &Arguments),
-        terms: impl FnOnce(&str) -> Terms,
+        terms: impl FnOnce(&str) -> RequestTerms,
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
@@ -296,8 +296,8 @@ impl Registry {
         };
         let terms = terms(&provider.spelling);
         let spelling = match &terms {
-            Terms::Call { .. } => 0,
-            Terms::Goal { spelling, .. } => spelling.len(),
+            RequestTerms::Call { .. } => 0,
+            RequestTerms::Goal { spelling, .. } => spelling.len(),
         };
         let id = origin.id.as_ref().map_or(0, Payload::allocated);
         let entry = caller.kept.enter(id + name.len() + spelling, None)?;
@@ -327,7 +327,7 @@ impl Registry {
                 None => Refusal::NoAction(action.to_owned()),
             });
         };
-        if let (Some(server), Terms::Goal { spelling, .. }) =
+        if let (Some(server), RequestTerms::Goal { spelling, .. }) =
             (self.clients.get(&goal.provider), &goal.terms)
         {
             if server.backlog() > MAX_BACKLOG {
@@ -351,7 +351,8 @@ impl Registry {
         if !names::are_same(&goal.name, action) {
             return Err(Refusal::OfAnother(Served::Action, goal.name.to_string()));
         }
-        let is_wanted = matches!(goal.terms, Terms::Goal { wants_feedback, .. } if wants_feedback);
+        let is_wanted =
+            matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
         if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
             let frame = messages::action_feedback_raw(&goal.name, goal.id.as_ref(), values);
             sender.outlets.deliver.do_send(Deliver {
@@ -430,14 +431,14 @@ impl Registry {
             caller, id, name, ..
         } = request;
         match request.terms {
-            Terms::Call { .. } => {
+            RequestTerms::Call { .. } => {
                 let origin = FrameOrigin {
                     from: *caller,
                     id: id.clone(),
                 };
                 self.refuse_call(&origin, name, why);
             }
-            Terms::Goal { .. } => {
+            RequestTerms::Goal { .. } => {
                 if let Some(sender) = self.clients.get(caller) {
                     let (id, why) = (id.as_ref(), why.to_string());
                     let status = GoalStatus::Aborted as u8;
