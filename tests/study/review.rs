@@ -9,7 +9,6 @@ use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pendularm::report::experiments::chaos::separation;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate_step;
@@ -267,8 +266,10 @@ fn at_26_seconds_a_sixth_of_the_timestep_is_hundreds_of_times_nearer() {
     let arm = Arm::<2>::default();
     let truth = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 26.0, 1);
     let off = |timestep: f64, every: u64| {
-        let errors = separation(&arm, &State::rest(), Method::Rk4, timestep, every, &truth);
-        errors[0]
+        let control = ControlLoop::free(arm).with_timestep(timestep);
+        let mut live = control.simulation(State::rest());
+        assert_eq!(live.advance(every), every);
+        truth.angle_error(0, &live.state().position).unwrap()
     };
     let coarse = off(0.5_f64.powi(14), 26 << 14);
     let fine = off(1e-5, 2_600_000);
