@@ -1,6 +1,7 @@
 // @ts-check
-// The 39 stiff and extreme scenes of the report, as settings of the live arm: each with its pose at the start and what is expected.
-// Invariant: names and settings are those of `src/report/experiments/scenarios/`; a test compares them.
+// The 39 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its behaviour.
+// The report reads the rows from this file, for its pictures and their links; so they are JSON.
+// Invariant: the rows are those of `src/report/experiments/scenarios/`, in their order.
 
 import { DEFAULTS } from "./settings.js";
 
@@ -14,78 +15,52 @@ import { DEFAULTS } from "./settings.js";
  * @property {number[]} start pose at the start [rad]
  * @property {number[]} [velocity] at the start [rad/s]
  * @property {Partial<Settings>} settings what differs from the defaults
+ * @property {{seconds: number, timestep?: number, start?: number[]}} [watch] the report's picture: its length [s], its own timestep [s] and pose [rad]
+ * @property {string} [hidden] why the report has no picture
  */
 
-const DOWN = -Math.PI / 2;
-const POSE = [0.5, 0.8];
-const MODERATE = { kp: [200, 100], ki: [0, 0], kd: [30, 12] };
-const SPREAD = [0.3, -1.2, 2];
-
-/** @param {number[]} kp @param {number[]} kd @param {number[]} [ki] */
-function gains(kp, kd, ki = [0, 0]) {
-  return { kp, ki, kd };
-}
-
-/** @param {number[]} masses @param {number} [gravity] */
-function weights(masses, gravity = 9.81) {
-  return { gravity, masses, lengths: masses.map(() => 1) };
-}
-
-/** @param {object} used @returns {Partial<Settings>} */
-function held(used) {
-  return { servo: true, setpoint: POSE, .../** @type {any} */ (used) };
-}
-
-/** @param {number} timestep */
-function every(timestep) {
-  return { integrator: { method: "rk4", timestep } };
-}
-
-/** @type {[string, string, number, string, number[], Partial<Settings>, number[]?][]} */
-const ROWS = [
-  ["S01", "rest without gravity", 3, "It stays where it is, to the last bit.", SPREAD, { params: weights([1, 1, 1], 0) }],
-  ["S02", "hanging at rest", 3, "It hangs still.", [DOWN, 0, 0], {}],
-  ["S03", "upright", 2, "It stands for seconds, then falls.", [-DOWN + 1e-12, 1e-12], {}],
-  ["S04", "regular swing", 2, "A small swing keeps its energy.", [0.3 + DOWN, 0], {}],
-  ["S05", "chaotic swing, 2 links", 2, "No two such swings stay alike.", [0, 0], {}],
-  ["S06", "chaotic swing, 3 links", 3, "No two such swings stay alike.", [0, 0, 0], {}],
-  ["S07", "stiff, kp 1e4", 2, "Stable, but only with short steps.", POSE, held({ gains: gains([1e4, 1e4], [200, 60]) })],
-  ["S08", "stiff, kp 1e6", 2, "1 ms is far too long.", POSE, held({ gains: gains([1e6, 1e6], [2000, 600]) })],
-  ["S09", "overdamped", 2, "Strong damping needs very short steps.", POSE, held({ gains: gains([200, 200], [500, 500]) })],
-  ["S10", "undamped", 2, "No step is short enough.", POSE, held({ gains: gains([1e4, 1e4], [0, 0]) })],
-  ["S11", "slow control", 2, "Ten steps for each correction.", POSE, held({ gains: MODERATE, period: { period: 0.01 } })],
-  ["S12", "held control turns into push", 2, "Waiting turns damping into a push.", POSE, held({ gains: gains([1000, 1000], [5, 2]), params: weights([1, 1], 0), period: { period: 0.02 }, ...every(0.0002) })],
-  ["S13", "control one period late", 2, "A late torque halves the limit.", POSE, held({ gains: MODERATE, period: { period: 0, delay: true } })],
-  ["S14", "windup", 2, "The integral fills while the arm is far away.", [DOWN, 0], { servo: true, setpoint: [0, 0], gains: gains([100, 100], [20, 20], [50, 50]) }],
-  ["S15", "too much integral", 2, "These gains fail at every step.", POSE, held({ gains: gains([100, 100], [20, 20], [2000, 2000]) })],
-  ["S16", "light last link, 1e-3", 2, "A light link reacts fast: short steps.", POSE, held({ gains: MODERATE, params: weights([1, 1e-3]) })],
-  ["S17", "light last link, 1e-6", 2, "A light link reacts fast: short steps.", POSE, held({ gains: MODERATE, params: weights([1, 1e-6]) })],
-  ["S18", "light last link, 1e-9", 2, "A light link reacts fast: short steps.", POSE, held({ gains: MODERATE, params: weights([1, 1e-9]) })],
-  ["S19", "heavy last link, 1e3", 3, "A heavy last link throws the others.", SPREAD, { params: weights([1, 1, 1e3]) }],
-  ["S20", "heavy last link, 1e6", 3, "A heavy last link throws the others.", SPREAD, { params: weights([1, 1, 1e6]) }],
-  ["S21", "heavy last link, 1e9", 3, "A heavy last link throws the others.", SPREAD, { params: weights([1, 1, 1e9]) }],
-  ["S22", "heavy last link, stretched", 3, "Stable below 16 microseconds.", [DOWN, 1e-6, -1e-6], { params: weights([1, 1, 1e9]), ...every(1e-5) }],
-  ["S23", "length ratio 1e3 and 1e-3", 3, "A kilometre beside a metre.", SPREAD, { params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1e3] } }],
-  ["S24", "stretched", 3, "Nothing breaks where all links line up.", [0, 0, 0], {}, [2, -2, 2]],
-  ["S25", "folded", 3, "Nothing breaks where links fold back.", [0, Math.PI, 0], { servo: true, setpoint: [0, Math.PI, 0] }],
-  ["S26", "whirl", 2, "1000 rad/s: fast turns need short steps.", [0, 0], { params: weights([1, 1], 0), ...every(5e-4) }, [1000, 0]],
-  ["S27", "gravity from 0 to 1000", 2, "A hundred times the usual gravity.", [0.5, -0.5], { params: weights([1, 1], 981), ...every(4e-4) }],
-  ["S28", "timestep 1e-6", 2, "A million steps a second.", [0.3 + DOWN, 0], every(1e-6)],
-  ["S29", "timesteps of 0.1 and 1 s", 2, "Even a slow swing needs a step below 0.4 s.", [0.01 + DOWN, 0], every(0.1)],
-  ["S30", "wound up", 2, "16 million turns change nothing.", [1e8, 0.7], {}, [1, -2]],
-  ["S31", "setpoints of 1e6 and 1e300", 2, "A target that no arm can follow.", [0, 0], { servo: true, setpoint: [1e6, 1e6] }],
-  ["S32", "subnormal start", 2, "An offset of 1e-310 rad dies away.", [1e-310, 0], { servo: true, setpoint: [0, 0], params: weights([1, 1], 0), gains: gains([100, 100], [10, 10]) }],
-  ["S33", "subnormal inertia", 2, "Links of 1e-160 m overflow, and that is said.", [0, 0], { params: { gravity: 9.81, masses: [1, 1], lengths: [1e-160, 1e-160] } }],
-  ["S34", "parameters that are no numbers", 2, "Refused, with the reason.", [0, 0], { params: weights([-1, 1]) }],
-  ["S35", "massless link", 2, "Refused, with the reason.", [0, 0], { params: weights([0, 1]) }],
-  ["S36", "one joint", 0, "20 000 oscillators; only in the report.", [0], {}],
-  ["S37", "another method, another timestep", 3, "Change the method while it swings.", SPREAD, {}],
-  ["S38", "there and back", 2, "Backwards it returns, almost.", [0.5, -0.5], every(0.004)],
-  ["S39", "step doubling", 3, "Two half steps tell the error of one.", SPREAD, {}],
-];
-
 /** @type {Scene[]} */
-export const SCENES = ROWS.map(([id, name, links, expected, start, settings, velocity]) => ({ id, name, links, expected, start, settings, velocity }));
+export const SCENES = [
+  {"id": "S01", "name": "rest without gravity", "links": 3, "expected": "It stays where it is, to the last bit.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 0, "masses": [1, 1, 1], "lengths": [1, 1, 1]}}, "watch": {"seconds": 5}},
+  {"id": "S02", "name": "hanging at rest", "links": 3, "expected": "It hangs still.", "start": [-1.5707963267948966, 0, 0], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S03", "name": "upright", "links": 2, "expected": "It stands for seconds, then falls.", "start": [1.5707963267958966, 1e-12], "settings": {}, "watch": {"seconds": 12}},
+  {"id": "S04", "name": "regular swing", "links": 2, "expected": "A small swing keeps its energy.", "start": [-1.2707963267948965, 0], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S05", "name": "chaotic swing, 2 links", "links": 2, "expected": "No two such swings stay alike.", "start": [0, 0], "settings": {}, "watch": {"seconds": 20}},
+  {"id": "S06", "name": "chaotic swing, 3 links", "links": 3, "expected": "No two such swings stay alike.", "start": [0, 0, 0], "settings": {}, "watch": {"seconds": 20}},
+  {"id": "S07", "name": "stiff, kp 1e4", "links": 2, "expected": "Stable, but only with short steps.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [10000, 10000], "ki": [0, 0], "kd": [200, 60]}}, "watch": {"start": [0, 0], "seconds": 1, "timestep": 0.0005}},
+  {"id": "S08", "name": "stiff, kp 1e6", "links": 2, "expected": "1 ms is far too long.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [1000000, 1000000], "ki": [0, 0], "kd": [2000, 600]}}, "watch": {"start": [0, 0], "seconds": 0.2, "timestep": 0.00005}},
+  {"id": "S09", "name": "overdamped", "links": 2, "expected": "Strong damping needs very short steps.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 200], "ki": [0, 0], "kd": [500, 500]}}, "watch": {"start": [0, 0], "seconds": 10, "timestep": 0.0001}},
+  {"id": "S10", "name": "undamped", "links": 2, "expected": "No step is short enough.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [10000, 10000], "ki": [0, 0], "kd": [0, 0]}}, "watch": {"start": [0, 0], "seconds": 1}},
+  {"id": "S11", "name": "slow control", "links": 2, "expected": "Ten steps for each correction.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "period": {"period": 0.01}}, "watch": {"start": [0, 0], "seconds": 3}},
+  {"id": "S12", "name": "held control turns into push", "links": 2, "expected": "Waiting turns damping into a push.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [1000, 1000], "ki": [0, 0], "kd": [5, 2]}, "params": {"gravity": 0, "masses": [1, 1], "lengths": [1, 1]}, "period": {"period": 0.02}, "integrator": {"method": "rk4", "timestep": 0.0002}}, "watch": {"start": [0, 0], "seconds": 3}},
+  {"id": "S13", "name": "control one period late", "links": 2, "expected": "A late torque halves the limit.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "period": {"period": 0.01, "delay": true}}, "watch": {"start": [0, 0], "seconds": 3}},
+  {"id": "S14", "name": "windup", "links": 2, "expected": "The integral fills while the arm is far away.", "start": [-1.5707963267948966, 0], "settings": {"servo": true, "setpoint": [0, 0], "gains": {"kp": [100, 100], "ki": [50, 50], "kd": [20, 20]}}, "hidden": "needs capped efforts"},
+  {"id": "S15", "name": "too much integral", "links": 2, "expected": "These gains fail at every step.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [100, 100], "ki": [2000, 2000], "kd": [20, 20]}}, "watch": {"start": [0, 0], "seconds": 3}},
+  {"id": "S16", "name": "light last link, 1e-3", "links": 2, "expected": "A light link reacts fast: short steps.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "params": {"gravity": 9.81, "masses": [1, 0.001], "lengths": [1, 1]}}, "watch": {"start": [0, 0], "seconds": 3, "timestep": 0.00002}},
+  {"id": "S17", "name": "light last link, 1e-6", "links": 2, "expected": "A light link reacts fast: short steps.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "params": {"gravity": 9.81, "masses": [1, 0.000001], "lengths": [1, 1]}}, "watch": {"start": [0, 0], "seconds": 0.002, "timestep": 2e-8}},
+  {"id": "S18", "name": "light last link, 1e-9", "links": 2, "expected": "A light link reacts fast: short steps.", "start": [0.5, 0.8], "settings": {"servo": true, "setpoint": [0.5, 0.8], "gains": {"kp": [200, 100], "ki": [0, 0], "kd": [30, 12]}, "params": {"gravity": 9.81, "masses": [1, 1e-9], "lengths": [1, 1]}}, "watch": {"start": [0, 0], "seconds": 0.000002, "timestep": 2e-11}},
+  {"id": "S19", "name": "heavy last link, 1e3", "links": 3, "expected": "A heavy last link throws the others.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 9.81, "masses": [1, 1, 1000], "lengths": [1, 1, 1]}}, "watch": {"start": [0, 0, 0], "seconds": 2}},
+  {"id": "S20", "name": "heavy last link, 1e6", "links": 3, "expected": "A heavy last link throws the others.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 9.81, "masses": [1, 1, 1000000], "lengths": [1, 1, 1]}}, "watch": {"start": [0, 0, 0], "seconds": 2, "timestep": 0.0001}},
+  {"id": "S21", "name": "heavy last link, 1e9", "links": 3, "expected": "A heavy last link throws the others.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 9.81, "masses": [1, 1, 1000000000], "lengths": [1, 1, 1]}}, "watch": {"start": [0, 0, 0], "seconds": 2, "timestep": 0.000002}},
+  {"id": "S22", "name": "heavy last link, stretched", "links": 3, "expected": "Stable below 16 microseconds.", "start": [-1.5707963267948966, 0.000001, -0.000001], "settings": {"params": {"gravity": 9.81, "masses": [1, 1, 1000000000], "lengths": [1, 1, 1]}, "integrator": {"method": "rk4", "timestep": 0.00001}}, "watch": {"seconds": 1}},
+  {"id": "S23", "name": "length ratio 1e3 and 1e-3", "links": 3, "expected": "A kilometre beside a metre.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 9.81, "masses": [1, 1, 1], "lengths": [1, 1, 1000]}}, "watch": {"seconds": 5}},
+  {"id": "S24", "name": "stretched", "links": 3, "expected": "Nothing breaks where all links line up.", "start": [0, 0, 0], "velocity": [2, -2, 2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S25", "name": "folded", "links": 3, "expected": "Nothing breaks where links fold back.", "start": [0, 3.141592653589793, 0], "settings": {"servo": true, "setpoint": [0, 3.141592653589793, 0]}, "watch": {"seconds": 5}},
+  {"id": "S26", "name": "whirl", "links": 2, "expected": "1000 rad/s: fast turns need short steps.", "start": [0, 0], "velocity": [1000, 0], "settings": {"params": {"gravity": 0, "masses": [1, 1], "lengths": [1, 1]}, "integrator": {"method": "rk4", "timestep": 0.0005}}, "watch": {"seconds": 0.1}},
+  {"id": "S27", "name": "gravity from 0 to 1000", "links": 2, "expected": "A hundred times the usual gravity.", "start": [0.5, -0.5], "settings": {"params": {"gravity": 981, "masses": [1, 1], "lengths": [1, 1]}, "integrator": {"method": "rk4", "timestep": 0.0004}}, "watch": {"seconds": 2}},
+  {"id": "S28", "name": "timestep 1e-6", "links": 2, "expected": "A million steps a second.", "start": [-1.2707963267948965, 0], "settings": {"integrator": {"method": "rk4", "timestep": 0.000001}}, "watch": {"seconds": 1}},
+  {"id": "S29", "name": "timesteps of 0.1 and 1 s", "links": 2, "expected": "Even a slow swing needs a step below 0.4 s.", "start": [-1.5607963267948965, 0], "settings": {"integrator": {"method": "rk4", "timestep": 0.1}}, "watch": {"seconds": 20}},
+  {"id": "S30", "name": "wound up", "links": 2, "expected": "16 million turns change nothing.", "start": [100000000, 0.7], "velocity": [1, -2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S31", "name": "setpoints of 1e6 and 1e300", "links": 2, "expected": "A target that no arm can follow.", "start": [0, 0], "settings": {"servo": true, "setpoint": [1000000, 1000000]}, "watch": {"seconds": 3}},
+  {"id": "S32", "name": "subnormal start", "links": 2, "expected": "An offset of 1e-310 rad dies away.", "start": [1e-310, 0], "settings": {"servo": true, "setpoint": [0, 0], "params": {"gravity": 0, "masses": [1, 1], "lengths": [1, 1]}, "gains": {"kp": [100, 100], "ki": [0, 0], "kd": [10, 10]}}, "watch": {"seconds": 3}},
+  {"id": "S33", "name": "subnormal inertia", "links": 2, "expected": "Links of 1e-160 m overflow, and that is said.", "start": [0, 0], "settings": {"params": {"gravity": 9.81, "masses": [1, 1], "lengths": [1e-160, 1e-160]}}, "watch": {"seconds": 1}},
+  {"id": "S34", "name": "parameters that are no numbers", "links": 2, "expected": "Refused, with the reason.", "start": [0, 0], "settings": {"params": {"gravity": 9.81, "masses": [-1, 1], "lengths": [1, 1]}}, "hidden": "refused by name"},
+  {"id": "S35", "name": "massless link", "links": 2, "expected": "Refused, with the reason.", "start": [0, 0], "settings": {"params": {"gravity": 9.81, "masses": [0, 1], "lengths": [1, 1]}}, "hidden": "refused by name"},
+  {"id": "S36", "name": "one joint", "links": 0, "expected": "20 000 oscillators; only in the report.", "start": [0], "settings": {}, "hidden": "has one joint"},
+  {"id": "S37", "name": "another method, another timestep", "links": 3, "expected": "Change the method while it swings.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S38", "name": "there and back", "links": 2, "expected": "Backwards it returns, almost.", "start": [0.5, -0.5], "settings": {"integrator": {"method": "rk4", "timestep": 0.004}}, "watch": {"seconds": 2}},
+  {"id": "S39", "name": "step doubling", "links": 3, "expected": "Two half steps tell the error of one.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
+];
 
 /** All settings of a scene. @param {Scene} scene @returns {Settings} */
 export function settingsOf({ links, settings }) {

@@ -1,266 +1,139 @@
 //! The page: abstract, findings, numbered figures and tables, verdicts. One file, no script, no network.
 //!
-//! **Invariant:** everything that comes from a section is escaped, but for the panels, which are SVG of our own making.
-
-use std::fmt::{self, Write};
+//! **Invariant:** text from a section is escaped where the section makes HTML of it, or here.
 
 use super::machine::Machine;
-use super::section::{Block, Cell, Figure, Section, Table};
-use super::svg::{SMALL, STYLE, escape};
+use super::section::{Cell, NUMBER, Section, Table};
+use super::svg::{STYLE, escape};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 
-/// The section that only a maintainer asks for.
+/// The section that only a maintainer asks for; it comes last.
 const LAST: &str = "work";
 
 /// The sections whose first claims make the abstract, in this order.
 const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
-/// Rows of a table beyond which it is folded.
-const FOLDED: usize = 8;
+const METHOD: &str = "Sections are made side by side on the cores there are, those that measure times one after the \
+     other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the quartiles. While \
+     the clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. \
+     References are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no \
+     formula with the arm's own kernel. Their uncertainty is the distance to a second series of other order and \
+     tolerance. Nothing is tuned per method.";
 
 /// The whole page.
 pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
-    let mut out = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-         <title>pendularm: which method, at which timestep</title>\n<style>{STYLE}{PAGE_STYLE}</style></head>\n<body>"
-    );
-    header(&mut out, sections, machine);
-    out.push_str("<main>");
-    summary(&mut out, sections);
-    findings(&mut out, sections);
-    let mut figures = 0;
-    // A maintainer's sections come last.
-    let (others, last): (Vec<_>, Vec<_>) = sections.iter().partition(|it| it.name != LAST);
-    for section in others {
-        body(&mut out, section, &mut figures);
-    }
-    verdicts(&mut out, sections);
-    for section in last {
-        body(&mut out, section, &mut figures);
-    }
-    making(&mut out, sections, machine);
-    out.push_str("</main></body></html>\n");
-    out
-}
-
-fn header(out: &mut String, sections: &[Section], machine: &Machine) {
-    out.push_str("<header><h1>Which method, at which timestep, for which error, at what cost</h1>");
-    append(
-        out,
-        format_args!(
-            "<p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>",
-            escape(&machine.version)
-        ),
-    );
-    for section in sections {
-        append(
-            out,
-            format_args!(
-                "<a href=\"#{}\">{}</a>",
-                escape(&section.name),
-                escape(&section.title)
-            ),
-        );
-    }
-    out.push_str(
-        "<a href=\"#verdicts\">Verdicts</a><a href=\"#making\">How this was made</a></nav>",
-    );
-}
-
-/// The abstract: the claim of the first finding of each of these sections.
-fn summary(out: &mut String, sections: &[Section]) {
-    out.push_str("<section id=\"abstract\"><h2>Abstract</h2><p>");
-    for name in ABSTRACT {
-        let section = sections.iter().find(|section| section.name == name);
-        let finding = section.and_then(|section| section.findings.first());
-        if let Some(claim) = finding.and_then(|finding| finding.split("**").nth(1)) {
-            append(
-                out,
-                format_args!("{}. ", escape(claim.trim_end_matches('.'))),
-            );
-        }
-    }
-    out.push_str("</p></section>");
-}
-
-fn findings(out: &mut String, sections: &[Section]) {
-    out.push_str("<section><h2>Findings</h2><ul class=\"findings\">");
-    for finding in sections.iter().flat_map(|section| &section.findings) {
-        append(out, format_args!("<li>{}</li>", emphasised(finding)));
-    }
-    out.push_str("</ul></section>");
-}
-
-fn verdicts(out: &mut String, sections: &[Section]) {
-    let all = || sections.iter().flat_map(|section| &section.verdicts);
-    let short = all().filter(|verdict| !verdict.holds).count();
-    let count = all().count();
-    let heading = if short == 0 {
-        format!("Verdicts: all {count} hold")
-    } else {
+    let link = |section: &Section| {
         format!(
-            "Verdicts: {} of {count} hold, {short} fall short",
-            count - short
+            "<a href=\"#{}\">{}</a>",
+            section.name,
+            escape(&section.title)
         )
     };
-    let mut table = Table::new("verdicts", heading, "", &["Claim", "Seen in this run", ""]);
-    for verdict in all() {
-        table.rows.push(vec![
-            Cell::new(&verdict.claim),
-            Cell::new(&verdict.seen),
-            Cell::verdict(verdict.holds),
-        ]);
-    }
-    out.push_str("<section id=\"verdicts\" class=\"verdicts\">");
-    self::table(out, &table, "h2");
-    out.push_str("</section>");
+    let findings = sections.iter().flat_map(|section| &section.findings);
+    let findings = findings.map(|finding| format!("<li>{}</li>", emphasised(finding)));
+    let (others, last): (Vec<_>, Vec<_>) = sections.iter().partition(|it| it.name != LAST);
+    let mut body: String = others.into_iter().map(section).collect();
+    body += &verdicts(sections);
+    body.extend(last.into_iter().map(section));
+    let mut pieces = body.split(NUMBER);
+    let first = pieces.next().unwrap_or_default().to_owned();
+    let body = (1..).zip(pieces).fold(first, |out, (number, piece)| {
+        format!("{out}Figure {number}.{piece}")
+    });
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>pendularm: which method, at which timestep</title>\n<style>{STYLE}{PAGE_STYLE}</style></head>\n<body>\
+         <header><h1>Which method, at which timestep, for which error, at what cost</h1>\
+         <p>The arm of pendularm under each of its integrators. Version {}.</p></header><nav>{}\
+         <a href=\"#verdicts\">Verdicts</a><a href=\"#making\">How this was made</a></nav><main>\
+         <section id=\"abstract\"><h2>Abstract</h2><p>{}</p></section>\
+         <section><h2>Findings</h2><ul class=\"findings\">{}</ul></section>{body}{}</main></body></html>\n",
+        escape(&machine.version),
+        sections.iter().map(link).collect::<String>(),
+        summary(sections),
+        findings.collect::<String>(),
+        making(sections, machine)
+    )
 }
 
-fn body(out: &mut String, section: &Section, figures: &mut usize) {
-    append(
-        out,
-        format_args!(
-            "<section id=\"{}\"><h2>{}</h2>",
-            escape(&section.name),
-            escape(&section.title)
-        ),
-    );
-    for block in &section.blocks {
-        match block {
-            Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
-            Block::Figure(figure) => {
-                *figures += 1;
-                self::figure(out, figure, *figures);
-            }
-            Block::Table(table) => self::table(out, table, "h3"),
-        }
-    }
-    out.push_str("</section>");
+/// The claim of the first finding of each section of the abstract.
+fn summary(sections: &[Section]) -> String {
+    let claims = ABSTRACT.iter().filter_map(|name| {
+        let section = sections.iter().find(|section| section.name == *name)?;
+        let claim = section.findings.first()?.split("**").nth(1)?;
+        Some(escape(claim.trim_end_matches('.')) + ". ")
+    });
+    claims.collect()
 }
 
-fn figure(out: &mut String, figure: &Figure, number: usize) {
-    append(
-        out,
-        format_args!(
-            "<figure id=\"{}\"><h3>Figure {number}. {}</h3><p class=\"legend\">",
-            escape(&figure.name),
-            escape(&figure.title)
+fn section(section: &Section) -> String {
+    let Section { name, html, .. } = section;
+    let title = escape(&section.title);
+    format!("<section id=\"{name}\"><h2>{title}</h2>{html}</section>")
+}
+
+fn verdicts(sections: &[Section]) -> String {
+    let all: Vec<_> = sections
+        .iter()
+        .flat_map(|section| &section.verdicts)
+        .collect();
+    let short = all.iter().filter(|verdict| !verdict.holds).count();
+    let heading = match (all.len(), short) {
+        (count, 0) => format!("Verdicts: all {count} hold"),
+        (count, short) => format!(
+            "Verdicts: {} of {count} hold, {short} fall short",
+            count - short
         ),
-    );
-    for (swatch, label) in &figure.legend {
-        append(out, format_args!("<span>{swatch} {}</span>", escape(label)));
-    }
-    let few = match figure.panels.len() {
-        0..=2 => " few",
-        SMALL.. => " many",
-        many if many % 4 == 0 => " four",
-        _ => "",
     };
-    append(out, format_args!("</p><div class=\"panels{few}\">"));
-    for panel in &figure.panels {
-        out.push_str(panel);
-    }
-    append(
-        out,
-        format_args!(
-            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a \
-             href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
-            escape(&figure.caption),
-            name = escape(&figure.name)
-        ),
-    );
+    let mut table = Table::new("verdicts", heading, "", ["Claim", "Seen in this run", ""]);
+    let row = |verdict: &&super::section::Verdict| {
+        let words = [&verdict.claim, &verdict.seen].map(Cell::new);
+        words
+            .into_iter()
+            .chain([Cell::verdict(verdict.holds)])
+            .collect()
+    };
+    table.rows.extend(all.iter().map(row));
+    format!(
+        "<section id=\"verdicts\" class=\"verdicts\">{}</section>",
+        table.html("h2")
+    )
 }
 
-fn table(out: &mut String, table: &Table, heading: &str) {
-    append(
-        out,
-        format_args!("<{heading}>{}</{heading}>", escape(&table.title)),
-    );
-    if !table.caption.is_empty() {
-        append(
-            out,
-            format_args!("<p class=\"caption\">{}</p>", escape(&table.caption)),
-        );
-    }
-    let folded = table.rows.len() > FOLDED;
-    if folded {
-        let rows = table.rows.len();
-        append(out, format_args!("<details><summary>{rows} rows</summary>"));
-    }
-    out.push_str("<div class=\"scroll\"><table><thead><tr>");
-    for head in &table.head {
-        let tag = if head.is_empty() { "td" } else { "th" };
-        append(out, format_args!("<{tag}>{}</{tag}>", escape(head)));
-    }
-    out.push_str("</tr></thead><tbody>");
-    for row in &table.rows {
-        out.push_str("<tr>");
-        for cell in row {
-            let class = if cell.class.is_empty() {
-                String::new()
-            } else {
-                format!(" class=\"{}\"", escape(&cell.class))
-            };
-            append(out, format_args!("<td{class}>{}", escape(&cell.text)));
-            if !cell.detail.is_empty() {
-                append(out, format_args!("<small>{}</small>", escape(&cell.detail)));
-            }
-            out.push_str("</td>");
-        }
-        out.push_str("</tr>");
-    }
-    out.push_str("</tbody></table></div>");
-    if folded {
-        out.push_str("</details>");
-    }
-}
-
-fn making(out: &mut String, sections: &[Section], machine: &Machine) {
-    out.push_str("<section id=\"making\"><h2>How this was made</h2><dl>");
-    for (name, value) in &machine.facts {
-        append(
-            out,
-            format_args!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)),
-        );
-    }
-    out.push_str("</dl><p>Sections are made side by side on the cores there are, those that measure times one after \
-         the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
-         quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of \
-         the same steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and \
-         not from the arm's own kernel; their own uncertainty is the distance to a second series of other order and \
-         tolerance. Nothing is tuned per method.</p><ul class=\"sections\">");
-    for section in sections {
+fn making(sections: &[Section], machine: &Machine) -> String {
+    let fact = |(name, value): &(String, String)| {
+        format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value))
+    };
+    let made = |section: &Section| {
         let quick = if section.quick { ", quick" } else { "" };
-        append(
-            out,
-            format_args!(
-                "<li>{}: {:.0} s at {}{quick}</li>",
-                escape(&section.name),
-                section.seconds,
-                escape(&section.version)
-            ),
-        );
-    }
-    out.push_str("</ul></section>");
+        let Section {
+            name,
+            seconds,
+            version,
+            ..
+        } = section;
+        format!(
+            "<li>{name}: {seconds:.0} s at {}{quick}</li>",
+            escape(version)
+        )
+    };
+    format!(
+        "<section id=\"making\"><h2>How this was made</h2><dl>{}</dl><p>{METHOD}</p><ul class=\"sections\">{}</ul>\
+         </section>",
+        machine.facts.iter().map(fact).collect::<String>(),
+        sections.iter().map(made).collect::<String>()
+    )
 }
 
 /// Escaped, with `**words**` set off.
 fn emphasised(text: &str) -> String {
     let escaped = escape(text);
-    let mut out = String::new();
-    for (index, part) in escaped.split("**").enumerate() {
-        if index % 2 == 1 {
-            append(&mut out, format_args!("<strong>{part}</strong>"));
-        } else {
-            out.push_str(part);
-        }
-    }
-    out
-}
-
-fn append(out: &mut String, text: fmt::Arguments<'_>) {
-    // Writing to a string cannot fail.
-    let _ = out.write_fmt(text);
+    let parts = escaped.split("**").enumerate();
+    let emphasise = |(index, part): (usize, &str)| match index % 2 {
+        1 => format!("<strong>{part}</strong>"),
+        _ => part.to_owned(),
+    };
+    parts.map(emphasise).collect()
 }

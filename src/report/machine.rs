@@ -20,44 +20,34 @@ pub(crate) struct Machine {
 
 impl Machine {
     pub(crate) fn here() -> Self {
-        let fact = |name: &str, value: String| (name.to_owned(), value);
-        let unknown = || "unknown".to_owned();
+        use std::env::consts::{ARCH, OS};
         let build = if cfg!(debug_assertions) {
             "development build: its times say nothing about the shipped program"
         } else {
             "release build (optimised, link-time optimisation, one codegen unit)"
         };
-        let facts = vec![
-            fact("Version", format!("pendularm {VERSION}")),
-            fact("Build", build.to_owned()),
-            fact(
-                "Target",
-                format!(
-                    "{} {}, {}",
-                    std::env::consts::ARCH,
-                    std::env::consts::OS,
-                    features()
-                ),
-            ),
-            fact(
-                "Compiler on the path",
-                output("rustc", &["--version"]).unwrap_or_else(unknown),
-            ),
-            fact("Processor", processor().unwrap_or_else(unknown)),
-            fact(
-                "Cores",
-                std::thread::available_parallelism().map_or_else(|_| unknown(), |n| n.to_string()),
-            ),
-            fact(
-                "Load when started",
-                load().map_or_else(unknown, |load| {
-                    format!("{load} (1, 5 and 15 minutes); above 0 somebody else was at work too")
-                }),
-            ),
+        let cores = std::thread::available_parallelism().ok();
+        let load = load().map(|load| {
+            format!("{load} (1, 5 and 15 minutes); above 0 other programs were at work too")
+        });
+        let facts = [
+            ("Version", Some(format!("pendularm {VERSION}"))),
+            ("Build", Some(build.to_owned())),
+            ("Target", Some(format!("{ARCH} {OS}, {}", features()))),
+            ("Compiler on the path", output("rustc", &["--version"])),
+            ("Processor", processor()),
+            ("Cores", cores.map(|cores| cores.to_string())),
+            ("Load when started", load),
         ];
+        let facts = facts.map(|(name, value)| {
+            (
+                name.to_owned(),
+                value.unwrap_or_else(|| "unknown".to_owned()),
+            )
+        });
         Self {
             version: VERSION.to_owned(),
-            facts,
+            facts: facts.to_vec(),
         }
     }
 }

@@ -7,12 +7,11 @@
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
-mod csv;
 pub mod experiments;
 mod figures;
 mod html;
 mod machine;
-mod making;
+pub mod scenes;
 mod section;
 mod svg;
 mod timing;
@@ -28,8 +27,7 @@ use std::time::Instant;
 use clap::builder::PossibleValuesParser;
 use figures::{Maker, SECTIONS};
 use machine::Machine;
-use making::Making;
-use section::{Block, Section, Table};
+use section::Section;
 use serde_json::{Value, json};
 
 /// Measure error against run time and stability, and write a page about it
@@ -101,39 +99,33 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         path: kept.clone(),
         error,
     })?;
-    let wanted =
-        |name: &str| options.only.is_empty() || options.only.iter().any(|only| only == name);
-    let mut others = Vec::new();
-    for maker in SECTIONS.iter().filter(|maker| !wanted(maker.name)) {
-        others.extend(read(&kept.join(format!("{}.json", maker.name)))?);
+    let file = |maker: &Maker| kept.join(format!("{}.json", maker.name));
+    let (makers, others): (Vec<_>, Vec<_>) = SECTIONS.iter().partition(|maker| {
+        options.only.is_empty() || options.only.iter().any(|only| only == maker.name)
+    });
+    let mut sections = Vec::new();
+    for maker in others {
+        sections.extend(read(&file(maker))?);
     }
-    let makers: Vec<_> = SECTIONS.iter().filter(|maker| wanted(maker.name)).collect();
     let (of, done) = (makers.len(), AtomicUsize::new(0));
-    let made = side_by_side(makers, |maker| {
+    sections.extend(side_by_side(makers, |maker| {
         let section = make(maker, options, &machine)?;
-        let file = kept.join(format!("{}.json", maker.name));
-        write(&file, &serde_json::to_string(&section).unwrap_or_default())?;
+        write(
+            &file(maker),
+            &serde_json::to_string(&section).unwrap_or_default(),
+        )?;
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         say(&format!("report: {} ({done} of {of} sections)", maker.name));
         Ok(section)
-    })?;
-    let mut sections = Vec::new();
-    for maker in SECTIONS {
-        let mut all = made.iter().chain(&others);
-        sections.extend(all.find(|section| section.name == maker.name).cloned());
-    }
+    })?);
+    sections.sort_by_key(|section| SECTIONS.iter().position(|maker| maker.name == section.name));
     let page = options.out.join("index.html");
     write(&page, &html::page(&sections, &machine))?;
-    let json = summary(&sections, &machine, options.quick);
-    write(
-        &options.out.join("report.json"),
-        &serde_json::to_string_pretty(&json).unwrap_or_default(),
-    )?;
-    let short = sections
-        .iter()
-        .flat_map(|section| &section.verdicts)
-        .filter(|verdict| !verdict.holds)
-        .count();
+    let summary = summary(&sections, &machine, options.quick);
+    let summary = serde_json::to_string_pretty(&summary).unwrap_or_default();
+    write(&options.out.join("report.json"), &summary)?;
+    let verdicts = sections.iter().flat_map(|section| &section.verdicts);
+    let short = verdicts.filter(|verdict| !verdict.holds).count();
     say(&format!(
         "report: {} ({short} verdicts fall short)",
         page.display()
@@ -185,71 +177,31 @@ fn say(line: &str) {
 
 fn make(maker: &Maker, options: &ReportOptions, machine: &Machine) -> Result<Section, ReportError> {
     let started = Instant::now();
-    let mut making = Making {
+    let mut section = Section {
+        name: maker.name.to_owned(),
+        title: maker.title.to_owned(),
+        version: machine.version.clone(),
         quick: options.quick,
-        out: &options.out,
-        tables: Vec::new(),
+        out: options.out.clone(),
+        ..Section::default()
     };
-    let mut section = (maker.make)(&mut making);
-    for (stem, csv) in making.tables {
-        write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
+    (maker.make)(&mut section);
+    for (name, text) in std::mem::take(&mut section.files) {
+        write(&options.out.join(name), &text)?;
     }
-    for block in &section.blocks {
-        if let Block::Figure(figure) = block {
-            let path = options.out.join(format!("{}.svg", figure.name));
-            write(&path, &figure.sheet)?;
-        }
-    }
-    maker.name.clone_into(&mut section.name);
-    maker.title.clone_into(&mut section.title);
-    section.version.clone_from(&machine.version);
-    section.quick = options.quick;
     section.seconds = started.elapsed().as_secs_f64();
     Ok(section)
 }
 
 /// Everything but the drawings.
 fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
-    let tables = |section: &Section| -> Vec<Value> {
-        let tables = section.blocks.iter().filter_map(|block| match block {
-            Block::Table(table) => Some(table),
-            Block::Text(_) | Block::Figure(_) => None,
-        });
-        tables.map(rows).collect()
-    };
-    let sections: Vec<Value> = sections
-        .iter()
-        .map(|section| {
-            json!({
-                "name": section.name,
-                "title": section.title,
-                "findings": section.findings,
-                "verdicts": section.verdicts,
-                "tables": tables(section),
-                "seconds": section.seconds,
-                "version": section.version,
-                "quick": section.quick,
-            })
-        })
-        .collect();
-    json!({ "machine": machine, "quick": quick, "sections": sections })
-}
-
-fn rows(table: &Table) -> Value {
-    let cells = |row: &Vec<section::Cell>| -> Vec<String> {
-        row.iter()
-            .map(|cell| match cell.detail.as_str() {
-                "" => cell.text.clone(),
-                detail => format!("{} ({detail})", cell.text),
-            })
-            .collect()
-    };
-    json!({
-        "name": table.name,
-        "title": table.title,
-        "head": table.head,
-        "rows": table.rows.iter().map(cells).collect::<Vec<_>>(),
-    })
+    let mut summary = json!({ "machine": machine, "quick": quick, "sections": sections });
+    let sections = summary.get_mut("sections").and_then(Value::as_array_mut);
+    let sections = sections.into_iter().flatten();
+    for section in sections.filter_map(Value::as_object_mut) {
+        section.remove("html");
+    }
+    summary
 }
 
 /// The section in that file; none if it has not been made yet.

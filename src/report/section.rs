@@ -1,14 +1,16 @@
-//! A section of the report: findings, verdicts, figures and tables, as values.
+//! A section of the report under construction: findings, verdicts, and figures and tables as HTML.
 //!
 //! A section is kept in a file of its own as JSON, so that `--only` can recompute one and keep the others.
 //!
 //! **Invariant:** every sentence and every cell is made from numbers of the run that made the section.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
+use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, escape};
+use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
-
-use super::svg::{Key, Plot, sheet};
 
 /// One part of the report.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -18,12 +20,20 @@ pub(crate) struct Section {
     /// Sentences that open the report.
     pub(crate) findings: Vec<String>,
     pub(crate) verdicts: Vec<Verdict>,
-    pub(crate) blocks: Vec<Block>,
+    pub(super) tables: Vec<TableText>,
     /// Seconds it took, and the version that made it.
     pub(crate) seconds: f64,
     pub(crate) version: String,
     /// Whether it was made with `--quick`.
     pub(crate) quick: bool,
+    /// Figures and tables, in order.
+    pub(crate) html: String,
+    /// Folder of the report, where counts from outside are looked for.
+    #[serde(skip)]
+    pub(super) out: PathBuf,
+    /// Names and contents of files beside the page.
+    #[serde(skip)]
+    pub(super) files: Vec<(String, String)>,
 }
 
 /// Something that the section was to show, and whether it did.
@@ -36,104 +46,166 @@ pub(crate) struct Verdict {
     pub(crate) holds: bool,
 }
 
-/// A piece of a section's body.
+/// A table in words alone.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) enum Block {
-    Text(String),
-    Figure(Figure),
-    Table(Table),
+pub(super) struct TableText {
+    name: String,
+    title: String,
+    head: Vec<String>,
+    rows: Vec<Vec<String>>,
 }
 
-/// A grid of panels.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Figure {
-    /// Stem of its `.svg` and `.csv`.
-    pub(crate) name: String,
-    /// The finding.
-    pub(crate) title: String,
-    /// How to read it.
-    pub(crate) caption: String,
-    /// Swatch and label of each entry.
-    pub(crate) legend: Vec<(String, String)>,
-    pub(crate) panels: Vec<String>,
-    /// The figure as a file of its own; not part of the page.
-    #[serde(skip)]
-    pub(crate) sheet: String,
-}
+/// The number of a figure, which the page knows.
+pub(super) const NUMBER: &str = "Figure #.";
 
-impl Figure {
-    pub(crate) fn new(
-        name: &str,
-        title: impl Into<String>,
-        caption: impl Into<String>,
-        legend: &[Key],
-        plots: &[Plot],
-    ) -> Self {
-        let panels = plots.iter().map(Plot::render).collect();
-        Self::of_panels(name, title, caption, legend, panels)
+impl Section {
+    /// One of two values: for the report, and for a quick look.
+    pub(crate) fn choose<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
     }
 
-    /// Makes a figure as [`Figure::new`] does, from panels that are drawn already.
-    pub(crate) fn of_panels(
-        name: &str,
-        title: impl Into<String>,
-        caption: impl Into<String>,
-        legend: &[Key],
-        panels: Vec<String>,
-    ) -> Self {
-        let title = title.into();
-        Self {
-            name: name.to_owned(),
-            sheet: sheet(&title, legend, &panels),
-            title,
-            caption: caption.into(),
-            legend: legend
-                .iter()
-                .map(|key| (key.swatch(), key.label.clone()))
-                .collect(),
-            panels,
+    pub(crate) fn find(&mut self, finding: String) {
+        self.findings.push(finding);
+    }
+
+    pub(crate) fn claim(&mut self, claim: impl Into<String>, seen: impl Into<String>, holds: bool) {
+        let (claim, seen) = (claim.into(), seen.into());
+        self.verdicts.push(Verdict { claim, seen, holds });
+    }
+
+    pub(crate) fn table(&mut self, table: &Table) {
+        self.html += &table.html("h3");
+        let text = |row: &Vec<Cell>| row.iter().map(Cell::said).collect();
+        self.tables.push(TableText {
+            name: table.name.to_owned(),
+            title: table.title.clone(),
+            head: table.head.clone(),
+            rows: table.rows.iter().map(text).collect(),
+        });
+    }
+
+    /// A grid of panels with its files: a title that says what was found, a caption that says how to read it.
+    pub(crate) fn figure(&mut self, name: &str, title: &str, caption: &str, panels: &[Panel]) {
+        let mut legend: Vec<&Key> = Vec::new();
+        for key in panels.iter().flat_map(|panel| &panel.keys) {
+            match legend.iter_mut().find(|known| known.label == key.label) {
+                // A line and its marks are one entry.
+                Some(known) if known.marker == Marker::None => *known = key,
+                None if !key.label.is_empty() => legend.push(key),
+                _ => {}
+            }
         }
+        let key = |key: &&Key| format!("<span>{} {}</span>", key.swatch(), escape(&key.label));
+        let drawn: String = panels.iter().map(|panel| panel.svg.as_str()).collect();
+        self.html += &format!(
+            "<figure id=\"{name}\"><h3>{NUMBER} {}</h3><p class=\"legend\">{}</p><div class=\"panels{}\">{drawn}</div>\
+             <figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a>\
+             </figcaption></figure>",
+            escape(title),
+            legend.iter().map(key).collect::<String>(),
+            grid(panels.len()).1,
+            escape(caption),
+        );
+        let mut csv = "curve,x,y,note\n".to_owned();
+        for (curve, x, y, note) in panels.iter().flat_map(|panel| &panel.rows) {
+            csv += &format!(
+                "{},{},{},{}\n",
+                quoted(curve),
+                spelled(*x),
+                spelled(*y),
+                quoted(note)
+            );
+        }
+        self.files.push((format!("{name}.csv"), csv));
+        self.files
+            .push((format!("{name}.svg"), sheet(title, &legend, panels)));
+    }
+}
+
+/// A field of a CSV file.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        return format!("\"{}\"", text.replace('"', "\"\""));
+    }
+    text.to_owned()
+}
+
+/// A number that reads back to the same bits; nothing where there is none.
+fn spelled(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:e}")
+    } else {
+        String::new()
     }
 }
 
 /// Rows and columns of text.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub(crate) struct Table {
-    pub(crate) name: String,
-    pub(crate) title: String,
-    pub(crate) caption: String,
-    pub(crate) head: Vec<String>,
+    name: &'static str,
+    title: String,
+    caption: &'static str,
+    head: Vec<String>,
     pub(crate) rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
-    pub(crate) fn new(
-        name: &str,
+    pub(crate) fn new<'a>(
+        name: &'static str,
         title: impl Into<String>,
-        caption: impl Into<String>,
-        head: &[&str],
+        caption: &'static str,
+        head: impl IntoIterator<Item = &'a str>,
     ) -> Self {
         Self {
-            name: name.to_owned(),
+            name,
             title: title.into(),
-            caption: caption.into(),
-            head: head.iter().map(|&head| head.to_owned()).collect(),
+            caption,
+            head: head.into_iter().map(str::to_owned).collect(),
             rows: Vec::new(),
         }
     }
+
+    /// The table under a heading; a long one is folded.
+    pub(super) fn html(&self, heading: &str) -> String {
+        const FOLDED: usize = 8;
+        let fold = if self.rows.len() > FOLDED {
+            let summary = format!("<details><summary>{} rows</summary>", self.rows.len());
+            (summary, "</details>")
+        } else {
+            (String::new(), "")
+        };
+        let head = |name: &String| match name.as_str() {
+            "" => "<td></td>".to_owned(),
+            name => format!("<th>{}</th>", escape(name)),
+        };
+        let row = |row: &Vec<Cell>| {
+            let cells: String = row.iter().map(Cell::html).collect();
+            format!("<tr>{cells}</tr>")
+        };
+        format!(
+            "<{heading}>{}</{heading}><p class=\"caption\">{}</p>{}<div class=\"scroll\"><table><thead><tr>{}</tr>\
+             </thead><tbody>{}</tbody></table></div>{}",
+            escape(&self.title),
+            escape(self.caption),
+            fold.0,
+            self.head.iter().map(head).collect::<String>(),
+            self.rows.iter().map(row).collect::<String>(),
+            fold.1
+        )
+    }
 }
 
-/// The head of a table with a column for each method, and others before and after them.
-pub(crate) fn by_method<'a>(before: &[&'a str], after: &[&'a str]) -> Vec<&'a str> {
-    [before, &Method::ALL.map(Method::name), after].concat()
+/// A column for each method, and others before them.
+pub(crate) fn by_method<'a>(before: &[&'a str]) -> Vec<&'a str> {
+    [before, &Method::ALL.map(Method::name)].concat()
 }
 
 /// A cell: its text, a line of detail under it, and a class that colours it.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
-    pub(crate) text: String,
-    pub(crate) detail: String,
-    pub(crate) class: String,
+    text: String,
+    detail: String,
+    class: &'static str,
 }
 
 impl Cell {
@@ -149,17 +221,17 @@ impl Cell {
         Self::new(method.name()).class(method.name())
     }
 
-    pub(crate) fn detail(mut self, detail: impl Into<String>) -> Self {
-        self.detail = detail.into();
-        self
+    pub(crate) fn detail(self, detail: impl Into<String>) -> Self {
+        Self {
+            detail: detail.into(),
+            ..self
+        }
     }
 
-    pub(crate) fn class(mut self, class: &str) -> Self {
-        class.clone_into(&mut self.class);
-        self
+    pub(crate) fn class(self, class: &'static str) -> Self {
+        Self { class, ..self }
     }
 
-    /// `yes` or `no`, coloured.
     pub(crate) fn verdict(holds: bool) -> Self {
         if holds {
             Self::new("holds").class("good")
@@ -167,10 +239,117 @@ impl Cell {
             Self::new("falls short").class("bad")
         }
     }
+
+    fn said(&self) -> String {
+        match self.detail.as_str() {
+            "" => self.text.clone(),
+            detail => format!("{} ({detail})", self.text),
+        }
+    }
+
+    fn html(&self) -> String {
+        let detail = match self.detail.as_str() {
+            "" => String::new(),
+            detail => format!("<small>{}</small>", escape(detail)),
+        };
+        format!(
+            "<td class=\"{}\">{}{detail}</td>",
+            self.class,
+            escape(&self.text)
+        )
+    }
 }
 
-impl<T: Into<String>> From<T> for Cell {
-    fn from(text: T) -> Self {
-        Self::new(text)
+/// Columns of a sheet with so many panels, the class of the grid on the page, and the size of a panel.
+fn grid(panels: usize) -> (usize, &'static str, f64) {
+    match panels {
+        0..=2 => (panels.max(1), " few", 1.0),
+        24.. => (6, " many", 0.5),
+        _ if panels.is_multiple_of(4) => (4, " four", 1.0),
+        _ => (3, "", 1.0),
+    }
+}
+
+/// A figure as one file, with its style inside. Heading and legend take as many lines as they need.
+fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
+    /// Between the edge and the text in pixels.
+    const MARGIN: f64 = 14.0;
+    let (columns, _, scale) = grid(panels.len());
+    let (panel_width, panel_height) = (scale * WIDTH, scale * HEIGHT);
+    let width = panel_width * length_in_f64(columns);
+    let mut head = String::new();
+    let mut y = 4.0;
+    for line in lines(title, width - 2.0 * MARGIN) {
+        y += 22.0;
+        let line = escape(&line);
+        head += &format!("<text class=\"heading\" x=\"{MARGIN}\" y=\"{y}\">{line}</text>");
+    }
+    let mut x = MARGIN;
+    y += 14.0;
+    for key in legend {
+        let entry = 52.0 + 6.6 * length_in_f64(key.label.chars().count());
+        if x > MARGIN && x + entry > width {
+            (x, y) = (MARGIN, y + 18.0);
+        }
+        head += &format!(
+            "<g transform=\"translate({x} {y})\">{}<text class=\"label\" x=\"34\" y=\"10\">{}</text></g>",
+            key.swatch(),
+            escape(&key.label)
+        );
+        x += entry;
+    }
+    let header = y + 22.0;
+    let height = panel_height * length_in_f64(panels.len().div_ceil(columns)) + header;
+    let placed = panels.iter().enumerate().map(|(index, panel)| {
+        let x = panel_width * length_in_f64(index % columns);
+        let y = header + panel_height * length_in_f64(index / columns);
+        let place =
+            format!("<svg x=\"{x}\" y=\"{y}\" width=\"{panel_width}\" height=\"{panel_height}\" ");
+        panel.svg.replacen("<svg ", &place, 1)
+    });
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>{head}{}</svg>\n",
+        placed.collect::<String>()
+    )
+}
+
+/// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
+const LETTER: f64 = 10.4;
+
+/// A heading's words in lines of at most `room` pixels; a word that is longer stands alone.
+fn lines(heading: &str, room: f64) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in heading.split_whitespace() {
+        let line = lines.last().map_or("", String::as_str);
+        let length = line.chars().count() + 1 + word.chars().count();
+        if line.is_empty() || LETTER * length_in_f64(length) <= room {
+            let line = format!("{line} {word}").trim_start().to_owned();
+            lines.pop();
+            lines.push(line);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LETTER, length_in_f64, lines};
+
+    #[test]
+    fn a_heading_takes_as_many_lines_as_it_needs_and_loses_no_word() {
+        let heading =
+            "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
+        for room in [100.0, 400.0, 812.0, 5000.0] {
+            let lines = lines(heading, room);
+            assert_eq!(lines.join(" "), heading);
+            for line in &lines {
+                let fits = LETTER * length_in_f64(line.chars().count()) <= room;
+                assert!(fits || !line.contains(' '), "{line}");
+            }
+        }
+        assert_eq!(lines(heading, 5000.0).len(), 1);
     }
 }

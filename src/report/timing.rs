@@ -17,14 +17,22 @@ pub(crate) struct Effort {
     pub(crate) seconds: f64,
 }
 
+impl Effort {
+    pub(crate) const fn new(least: usize, most: usize, seconds: f64) -> Self {
+        Self {
+            least,
+            most,
+            seconds,
+        }
+    }
+}
+
 /// Repeats of one computation \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Timing {
     pub(crate) minimum: f64,
-    pub(crate) median: f64,
     /// First and third quartile.
     pub(crate) quartiles: (f64, f64),
-    pub(crate) repeats: u64,
 }
 
 /// Times `work`, again and again.
@@ -53,9 +61,7 @@ pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
     };
     Timing {
         minimum: at(0),
-        median: at(2),
         quartiles: (at(1), at(3)),
-        repeats: times.len() as u64,
     }
 }
 

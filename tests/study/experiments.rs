@@ -5,7 +5,6 @@ use std::f64::consts::FRAC_PI_2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
-use pendularm::report::experiments::chaos::separation;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, are_carried, arrive, move_of, spun,
@@ -116,8 +115,10 @@ fn at_26_seconds_a_sixth_of_the_timestep_is_hundreds_of_times_nearer() {
     let arm = Arm::<2>::default();
     let truth = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 26.0, 1);
     let off = |timestep: f64, every: u64| {
-        let errors = separation(&arm, &State::rest(), Method::Rk4, timestep, every, &truth);
-        errors[0]
+        let control = ControlLoop::free(arm).with_timestep(timestep);
+        let mut live = control.simulation(State::rest());
+        assert_eq!(live.advance(every), every);
+        truth.angle_error(0, &live.state().position).unwrap()
     };
     let coarse = off(0.5_f64.powi(14), 26 << 14);
     let fine = off(1e-5, 2_600_000);

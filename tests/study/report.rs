@@ -47,9 +47,9 @@ fn a_section_leaves_page_figures_and_numbers() {
     assert!(
         svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("<style>")
     );
-    // A pose, 19 mass ratios, three times, and the head.
+    // Three poses, three ways of solving, 19 mass ratios, and the head.
     let csv = fs::read_to_string(scratch.0.join("conditioning.csv")).unwrap();
-    assert_eq!(csv.lines().count(), 58);
+    assert_eq!(csv.lines().count(), 3 * 3 * 19 + 1);
 }
 
 /// Side by side, and yet each where it belongs.

@@ -19,7 +19,7 @@ use crate::study::control_loop::ControlLoop;
 const MOST_LOOKS: usize = 1024;
 
 /// The parts of an error \[rad\], each the largest over all comparisons and joints.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Parts {
     /// Length of a step \[s\].
     pub timestep: f64,
@@ -36,10 +36,8 @@ pub struct Parts {
 /// The reach of the study, 2 links, `duration` \[s\] in a number of steps that is a power of two.
 #[derive(Debug)]
 pub struct Budget {
-    arm: Arm<2>,
-    start: State<2>,
+    control: ControlLoop<2>,
     duration: f64,
-    control: bool,
     law: ReferenceMotion<2>,
 }
 
@@ -47,94 +45,69 @@ impl Budget {
     /// The free swing, or with `control` the reach with its effort held for each step.
     #[must_use]
     pub fn new(control: bool, duration: f64) -> Self {
-        let law = if control {
-            Law::Continuous(REACH_GAINS, REACH_SETPOINT)
+        let control = if control {
+            ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT)
         } else {
-            Law::FREE
+            ControlLoop::free(Arm::default())
         };
-        let (arm, start) = (Arm::default(), State::rest());
+        let law = Law::Continuous(control.gains, control.setpoint);
         let spacing = duration / length_in_f64(MOST_LOOKS);
-        let law = ReferenceMotion::of(&arm, &start, &law, spacing, MOST_LOOKS);
         Self {
-            arm,
-            start,
-            duration,
             control,
-            law,
+            duration,
+            law: ReferenceMotion::of(&control.arm, &State::rest(), &law, spacing, MOST_LOOKS),
         }
     }
 
     /// The parts for each of `methods` at one timestep. The motion under the held effort is the same for all of them.
     #[must_use]
     pub fn parts(&self, methods: &[Method], steps: u64) -> Vec<Parts> {
+        let (arm, start) = (&self.control.arm, State::rest());
         let timestep = self.duration / in_f64(steps);
         let looks = usize::try_from(steps).map_or(MOST_LOOKS, |steps| steps.clamp(1, MOST_LOOKS));
         let every = steps / looks as u64;
-        let truth = || {
-            let stride = MOST_LOOKS / looks;
-            self.law.samples().iter().skip(stride - 1).step_by(stride)
-        };
+        let stride = MOST_LOOKS / looks;
+        let truth = self.law.samples().iter().skip(stride - 1).step_by(stride);
         let held = Law::Held {
-            gains: REACH_GAINS,
-            setpoint: REACH_SETPOINT,
+            gains: self.control.gains,
+            setpoint: self.control.setpoint,
             period: timestep,
         };
-        let plant = self.control.then(|| {
-            let spacing = self.duration / length_in_f64(looks);
-            ReferenceMotion::of(&self.arm, &self.start, &held, spacing, looks)
-        });
-        let law = if self.control { held } else { Law::FREE };
+        let spacing = self.duration / length_in_f64(looks);
+        let plant = (!self.control.is_free())
+            .then(|| ReferenceMotion::of(arm, &start, &held, spacing, looks));
         let plant: Vec<_> = match &plant {
             Some(plant) => plant.samples().iter().collect(),
-            None => truth().collect(),
+            None => truth.clone().collect(),
         };
-        methods
-            .iter()
-            .map(|&method| {
-                let exact =
-                    exact_steps(&self.arm, &self.start, &law, method, timestep, every, looks);
-                let live = self.live(method, timestep, every, looks);
-                let mut parts = Parts {
-                    timestep,
-                    total: 0.0,
-                    truncation: 0.0,
-                    rounding: 0.0,
-                    hold: 0.0,
-                };
-                let samples = truth().zip(&plant).zip(&exact).zip(&live);
-                for ((((law, _), (plant, _)), (exact, _)), live) in samples {
-                    parts.total = larger(parts.total, largest_difference(law, live));
-                    parts.rounding = larger(parts.rounding, largest_difference(exact, live));
-                    parts.truncation = larger(parts.truncation, distance(exact, plant));
-                    parts.hold = larger(parts.hold, distance(plant, law));
-                }
-                parts
-            })
-            .collect()
-    }
-
-    fn live(&self, method: Method, timestep: f64, every: u64, looks: usize) -> Vec<[f64; 2]> {
-        let control = if self.control {
-            ControlLoop::new(self.arm, REACH_GAINS, REACH_SETPOINT)
-        } else {
-            ControlLoop::free(self.arm)
+        let parts = |&method| {
+            let exact = exact_steps(arm, &start, &held, method, timestep, every, looks);
+            let control = self.control.with_method(method).with_timestep(timestep);
+            let mut live = control.simulation(start);
+            let mut parts = Parts {
+                timestep,
+                ..Parts::default()
+            };
+            for (((law, _), (plant, _)), (exact, _)) in truth.clone().zip(&plant).zip(&exact) {
+                let is_whole = live.advance(every) == every;
+                let live = live
+                    .state()
+                    .position
+                    .map(|q| if is_whole { q } else { f64::NAN });
+                parts.total = larger(parts.total, largest_difference(law, &live));
+                parts.rounding = larger(parts.rounding, largest_difference(exact, &live));
+                parts.truncation = larger(parts.truncation, distance(exact, plant));
+                parts.hold = larger(parts.hold, distance(plant, law));
+            }
+            parts
         };
-        let stepped = control.with_method(method).with_timestep(timestep);
-        let mut simulation = stepped.simulation(self.start);
-        (0..looks)
-            .map(|_| {
-                let whole = simulation.advance(every) == every;
-                let position = simulation.state().position;
-                if whole { position } else { [f64::NAN; 2] }
-            })
-            .collect()
+        methods.iter().map(parts).collect()
     }
 }
 
 fn distance(a: &[DoubleDouble; 2], b: &[DoubleDouble; 2]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (*a - *b).abs().to_f64())
+    let both = a.iter().zip(b);
+    both.map(|(a, b)| (*a - *b).abs().to_f64())
         .fold(0.0, larger)
 }
 

@@ -13,9 +13,10 @@
 
 use std::f64::consts::PI;
 
-use super::reference::{DoubleDouble, exact_acceleration};
+use super::reference::{DoubleDouble, exact_acceleration, largest_difference};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{forward_dynamics, textbook};
+use crate::study::matrix::largest;
 
 /// Shape of the sampled poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,24 +62,17 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
         let tau = [10.0 * any(), 10.0 * any(), 10.0 * any()];
         let truth = exact_acceleration(&arm, &state, &tau);
         let State { position, velocity } = &state;
-        recursion.push(lost(
-            &truth,
-            &forward_dynamics(&arm, position, velocity, &tau),
-        ));
+        let found = forward_dynamics(&arm, position, velocity, &tau);
+        recursion.push(lost(&truth, &found));
         dense.push(lost(&truth, &textbook(&arm, position, velocity, &tau)));
         // The worst of turning one joint alone, and all of them.
         let changes = (0..=3).map(|turned| {
-            let nudged = State {
-                position: std::array::from_fn(|i| {
-                    let q = position[i];
-                    if turned == i || turned == 3 {
-                        q.next_up()
-                    } else {
-                        q
-                    }
-                }),
-                velocity: *velocity,
-            };
+            let mut nudged = state;
+            for (i, q) in nudged.position.iter_mut().enumerate() {
+                if turned == i || turned == 3 {
+                    *q = q.next_up();
+                }
+            }
             let near = exact_acceleration(&arm, &nudged, &tau).map(DoubleDouble::to_f64);
             // Half a unit, where the neighbour is a whole one away.
             (lost(&truth, &near) - std::f64::consts::LOG10_2).max(0.0)
@@ -93,11 +87,8 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
 }
 
 fn lost(truth: &[DoubleDouble; 3], values: &[f64; 3]) -> f64 {
-    let scale = truth
-        .iter()
-        .map(|value| value.abs().to_f64())
-        .fold(0.0, f64::max);
-    let error = super::reference::largest_difference(truth, values) / scale;
+    let scale = largest(truth.iter().map(|value| value.abs().to_f64()));
+    let error = largest_difference(truth, values) / scale;
     (error / (0.5 * f64::EPSILON)).log10().max(0.0)
 }
 

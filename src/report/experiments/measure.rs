@@ -53,7 +53,7 @@ pub fn measured_limit<const N: usize>(
     guess: f64,
 ) -> Option<f64> {
     boundary(guess, |timestep| {
-        decays(&control.with_timestep(timestep), sampling)
+        decays(growth(&control.with_timestep(timestep), sampling))
     })
 }
 
@@ -67,16 +67,15 @@ pub fn measured_period<const N: usize>(
     delayed: bool,
 ) -> Option<f64> {
     boundary(guess, |period| {
-        sampled_growth(&control.with_timestep(period), substeps, delayed)
-            .is_some_and(|growth| growth < 1.0)
+        let control = control.with_timestep(period);
+        decays(sampled_growth(&control, substeps, delayed))
     })
 }
 
-/// Whether a small deviation from the equilibrium has less energy at the end of [`STEPS`] steps than soon after their
-/// beginning.
+/// Whether a deviation with this growth of its energy dies out.
 #[must_use]
-pub fn decays<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> bool {
-    growth(control, sampling).is_some_and(|growth| growth < 1.0)
+pub fn decays(growth: Option<f64>) -> bool {
+    growth.is_some_and(|growth| growth < 1.0)
 }
 
 /// The 2-link arm with the default gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
@@ -95,26 +94,7 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
 /// modes die out that say nothing about the last to do so. `None` once the deviation has escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
-    let rest = equilibrium(control);
-    let start = nudged(&rest.position, control.timestep);
-    let energy = energy_about(control, &rest.position);
-    match sampling {
-        Sampling::Held => {
-            let mut live = primed(control, &rest.integral)?;
-            live.set_state(start);
-            let mut watch = Watch::default();
-            live.advance_with(STEPS, |now| watch.see(energy(now.state())));
-            watch.growth()
-        }
-        Sampling::Continuous => {
-            let mut whole = ContinuousLoop {
-                control: *control,
-                state: start,
-                integral: rest.integral,
-            };
-            watch(|| whole.step().then(|| energy(&whole.state)).flatten())
-        }
-    }
+    growths(&[*control], sampling).pop().flatten()
 }
 
 /// The [`growth`] of each of the loops. Arms whose efforts are held are stepped side by side.
@@ -123,24 +103,30 @@ pub fn growths<const N: usize>(
     controls: &[ControlLoop<N>],
     sampling: Sampling,
 ) -> Vec<Option<f64>> {
-    match sampling {
-        Sampling::Held => held_growths(controls),
-        // No live arm, which is all that lanes know to step.
-        Sampling::Continuous => controls
-            .iter()
-            .map(|control| growth(control, sampling))
-            .collect(),
-    }
-}
-
-fn held_growths<const N: usize>(controls: &[ControlLoop<N>]) -> Vec<Option<f64>> {
     let watched = controls.iter().map(|control| {
         let rest = equilibrium(control);
-        let mut live = primed(control, &rest.integral);
-        if let Some(live) = &mut live {
-            live.set_state(nudged(&rest.position, control.timestep));
-        }
+        let start = nudged(&rest.position, control.timestep);
         let energy = energy_about(control, &rest.position);
+        (control, rest.integral, start, energy)
+    });
+    if sampling == Sampling::Continuous {
+        // No live arm, which is all that lanes know to step.
+        let growths = watched.map(|(control, integral, state, energy)| {
+            let control = *control;
+            let mut whole = ContinuousLoop {
+                control,
+                state,
+                integral,
+            };
+            watch(|| whole.step().then(|| energy(&whole.state)).flatten())
+        });
+        return growths.collect();
+    }
+    let watched = watched.map(|(control, integral, start, energy)| {
+        let mut live = primed(control, &integral);
+        if let Some(live) = &mut live {
+            live.set_state(start);
+        }
         (live, energy, Watch::default())
     });
     let mut watched: Vec<_> = watched.collect();
@@ -233,35 +219,27 @@ pub(super) fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> Stat
 /// The boundary above which `holds` no longer does, by bisection around `guess`.
 pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     let (mut below, mut above) = (0.5 * guess, 2.0 * guess);
-    let mut widenings = 0;
-    while !holds(below) {
-        above = below;
-        below *= 0.5;
-        widenings += 1;
-        if widenings > WIDENINGS {
-            return None;
-        }
-    }
-    while holds(above) {
-        below = above;
-        above *= 2.0;
-        widenings += 1;
-        if widenings > WIDENINGS {
-            return None;
-        }
-    }
-    for _ in 0..HALVINGS {
-        let middle = (below * above).sqrt();
-        if holds(middle) {
-            below = middle;
+    for _ in 0..WIDENINGS {
+        if !holds(below) {
+            (below, above) = (0.5 * below, below);
+        } else if holds(above) {
+            (below, above) = (above, 2.0 * above);
         } else {
-            above = middle;
+            for _ in 0..HALVINGS {
+                let middle = (below * above).sqrt();
+                *(if holds(middle) {
+                    &mut below
+                } else {
+                    &mut above
+                }) = middle;
+            }
+            return Some(below);
         }
     }
-    Some(below)
+    None
 }
 
-/// The growth of what has so many energies.
+/// The growth of a deviation with these energies.
 fn watch(mut energy: impl FnMut() -> Option<f64>) -> Option<f64> {
     let mut watch = Watch::default();
     for _ in 0..STEPS {

@@ -25,9 +25,8 @@ use std::f64::consts::FRAC_PI_2;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, mass_matrix};
-use crate::math::integrator::Method;
+use crate::math::integrator::{Method, increment};
 use crate::math::pid::{Gains, Setpoint};
-use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, gravity_gradient};
 use crate::study::matrix::Matrix;
@@ -190,36 +189,16 @@ impl StiffScene {
     fn march(&self, solver: Solver, steps: u64) -> (Vec<[f64; 2]>, u64) {
         let h = DURATION / in_f64(steps);
         let every = (steps / OUTPUTS).max(1);
-        let mut positions = Vec::new();
-        let mut evaluations = 0;
-        let mut explicit = match solver {
-            Solver::Explicit(method) => Some(ContinuousLoop {
-                control: self.control.with_method(method).with_timestep(h),
-                state: START,
-                integral: [0.0; 2],
-            }),
-            _ => None,
-        };
-        let mut y = [START.position[0], START.position[1], 0.0, 0.0];
+        let (mut positions, mut evaluations) = (Vec::new(), 0);
+        let [a, b] = START.position;
+        let mut y = [a, b, 0.0, 0.0];
         for step in 1..=steps {
-            let finite = match (&mut explicit, solver) {
-                (Some(explicit), Solver::Explicit(method)) => {
-                    evaluations += u64::from(method.evaluations());
-                    let finite = explicit.step();
-                    y = [
-                        explicit.state.position[0],
-                        explicit.state.position[1],
-                        0.0,
-                        0.0,
-                    ];
-                    finite
-                }
-                (_, Solver::Rodas3) => self.rodas3(&mut y, h, &mut evaluations).is_some(),
-                _ => self
-                    .implicit_midpoint(&mut y, h, &mut evaluations)
-                    .is_some(),
+            let finite = match solver {
+                Solver::Explicit(method) => self.explicit(method, &mut y, h, &mut evaluations),
+                Solver::Rodas3 => self.rodas3(&mut y, h, &mut evaluations),
+                Solver::ImplicitMidpoint => self.implicit_midpoint(&mut y, h, &mut evaluations),
             };
-            if !finite {
+            if finite.is_none() {
                 break;
             }
             if step.is_multiple_of(every) {
@@ -227,6 +206,17 @@ impl StiffScene {
             }
         }
         (positions, evaluations)
+    }
+
+    /// A step of the law in every stage.
+    fn explicit(&self, method: Method, y: &mut Whole, h: f64, evaluations: &mut u64) -> Option<()> {
+        let acceleration = |_: f64, q: &[f64; 2], v: &[f64; 2]| {
+            let [.., a, b] = self.slope(&[q[0], q[1], v[0], v[1]], evaluations);
+            [a, b]
+        };
+        let (q, v) = ([y[0], y[1]], [y[2], y[3]]);
+        let (dq, dv) = increment(method, acceleration, 0.0, &q, &v, h);
+        add(y, &[dq[0], dq[1], dv[0], dv[1]])
     }
 
     fn slope(&self, y: &Whole, evaluations: &mut u64) -> Whole {

@@ -1,17 +1,36 @@
-//! One panel: axes, marks and series on paper.
+//! One panel: axes, cells, marks and curves on paper; or horizontal bars.
 //!
 //! **Invariant:** lines end where points are lost; the lost ones are drawn at the upper edge.
 
-use std::fmt::Write;
-
-use super::{Axis, Curve, HEIGHT, Heat, Mark, Marker, Point, Unit, WIDTH, escape, number};
+use super::{Axis, Curve, HEIGHT, Marker, Panel, Point, Unit, WIDTH, escape, number};
+use crate::math::count::length_in_f64;
 
 const LEFT: f64 = 58.0;
-const RIGHT: f64 = 14.0;
+const RIGHT: f64 = WIDTH - 14.0;
 const TOP: f64 = 42.0;
-const BOTTOM: f64 = 46.0;
+const BOTTOM: f64 = HEIGHT - 46.0;
 
-/// One panel.
+/// Coloured cells between edges, row by row from the bottom; neighbours of one class are one rectangle.
+#[derive(Debug, Clone)]
+pub(crate) struct Heat {
+    /// Edges along x and along y, one more than cells.
+    pub(crate) edges: [Vec<f64>; 2],
+    /// One class per cell.
+    pub(crate) rows: Vec<Vec<&'static str>>,
+}
+
+/// Something that explains.
+#[derive(Debug, Clone)]
+pub(crate) enum Mark {
+    /// A line up from an x, its class and its tooltip.
+    Vertical(f64, &'static str, String),
+    /// A line across at a y, its class and its label.
+    Horizontal(f64, &'static str, &'static str),
+    /// Slopes of these orders over a decade, from a corner.
+    Slopes((f64, f64), [f64; 3]),
+}
+
+/// A panel with axes.
 #[derive(Debug, Clone)]
 pub(crate) struct Plot {
     pub(crate) title: String,
@@ -21,7 +40,7 @@ pub(crate) struct Plot {
     pub(crate) above: Option<f64>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
-    pub(crate) series: Vec<Curve>,
+    pub(crate) curves: Vec<Curve>,
 }
 
 impl Plot {
@@ -33,234 +52,231 @@ impl Plot {
             above: None,
             heat: None,
             marks: Vec::new(),
-            series: Vec::new(),
+            curves: Vec::new(),
         }
     }
 
     fn across(&self, value: f64) -> f64 {
-        LEFT + self.x.place(value).clamp(0.0, 1.0) * (WIDTH - LEFT - RIGHT)
+        LEFT + self.x.place(value).clamp(0.0, 1.0) * (RIGHT - LEFT)
     }
 
     fn down(&self, value: f64) -> f64 {
-        HEIGHT - BOTTOM - self.y.place(value).clamp(0.0, 1.0) * (HEIGHT - TOP - BOTTOM)
+        BOTTOM - self.y.place(value).clamp(0.0, 1.0) * (BOTTOM - TOP)
     }
 
-    /// The panel as an `<svg>` element without style.
-    pub(crate) fn render(&self) -> String {
+    /// The panel as it is shown, and its numbers.
+    pub(crate) fn draw(&self) -> Panel {
+        let title = escape(&self.title);
+        let heat = self.heat.as_ref().map(|heat| self.cells(heat));
+        let marks = self.marks.iter().map(|mark| self.mark(mark));
+        let curves = self.curves.iter().map(|curve| self.curve(curve));
+        let drawn: String = marks.chain(curves).collect();
+        let rows = self.curves.iter().flat_map(|curve| {
+            let dashed = if curve.key.dashed { ", dashed" } else { "" };
+            let name = format!("{}: {}{dashed}", self.title, curve.key.class);
+            let points = curve.points.iter();
+            points.map(move |it| (name.clone(), it.x, it.y, it.tooltip.clone()))
+        });
+        Panel {
+            svg: format!(
+                "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
+                 <text class=\"title\" x=\"{LEFT}\" y=\"17\">{title}</text>{}{}{drawn}</svg>",
+                heat.unwrap_or_default(),
+                self.frame()
+            ),
+            keys: self.curves.iter().map(|curve| curve.key.clone()).collect(),
+            rows: rows.chain(self.heat_rows()).collect(),
+        }
+    }
+
+    fn cells(&self, heat: &Heat) -> String {
         let mut out = String::new();
-        // Writing to a string cannot fail.
-        let _ = self.write(&mut out);
+        let [columns, rows] = &heat.edges;
+        for (row, edges) in heat.rows.iter().zip(rows.windows(2)) {
+            let mut from = 0;
+            for cells in row.chunk_by(|one, other| one == other) {
+                let to = from + cells.len();
+                let ends = (columns.get(from), columns.get(to), cells.first());
+                if let ([low, high], (Some(left), Some(right), Some(class))) = (edges, ends) {
+                    let (x, y) = (self.across(*left), self.down(*high));
+                    out += &format!(
+                        "<rect shape-rendering=\"crispEdges\" class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" \
+                         width=\"{:.1}\" height=\"{:.1}\"/>",
+                        self.across(*right) - x,
+                        self.down(*low) - y
+                    );
+                }
+                from = to;
+            }
+        }
         out
     }
 
-    fn write(&self, out: &mut String) -> std::fmt::Result {
-        let title = escape(&self.title);
-        write!(
-            out,
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
-             <text class=\"title\" x=\"{LEFT}\" y=\"17\">{title}</text>"
-        )?;
-        if let Some(heat) = &self.heat {
-            heat.write(out, |x| self.across(x), |y| self.down(y))?;
-        }
-        self.frame(out)?;
-        for mark in &self.marks {
-            self.mark(out, mark)?;
-        }
-        for series in &self.series {
-            self.series(out, series)?;
-        }
-        out.push_str("</svg>");
-        Ok(())
+    fn heat_rows(&self) -> impl Iterator<Item = super::Row> {
+        let cells = self.heat.iter().flat_map(|heat| {
+            let [columns, rows] = &heat.edges;
+            let row = move |(cells, y): (&Vec<&'static str>, &f64)| {
+                let (cells, y) = (cells.clone(), *y);
+                let cells = cells.into_iter().zip(columns.clone());
+                cells
+                    .map(move |(class, x)| (x, y, class))
+                    .collect::<Vec<_>>()
+            };
+            heat.rows.iter().zip(rows).flat_map(row).collect::<Vec<_>>()
+        });
+        let name = format!("{}: cell from", self.title);
+        cells.map(move |(x, y, class)| (name.clone(), x, y, class.to_owned()))
     }
 
-    fn frame(&self, out: &mut String) -> std::fmt::Result {
-        let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
+    fn frame(&self) -> String {
+        let mut out = String::new();
         let grid = if self.heat.is_some() { "tick" } else { "grid" };
         for (value, label) in self.x.ticks(6.0) {
             let x = self.across(value);
             // A label at the very end would leave the paper.
-            let anchor = if x > right - 12.0 { "end" } else { "middle" };
-            let shown = if x > right - 12.0 {
-                right + RIGHT - 3.0
+            let (anchor, shown) = if x > RIGHT - 12.0 {
+                ("end", WIDTH - 3.0)
             } else {
-                x
+                ("middle", x)
             };
-            write!(
-                out,
-                "<path class=\"{grid}\" d=\"M{x:.1} {bottom}V{TOP}\"/>\
-                 <text class=\"label\" x=\"{shown:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{label}</text>",
-                bottom + 15.0
-            )?;
+            let y = BOTTOM + 15.0;
+            out += &format!("<path class=\"{grid}\" d=\"M{x:.1} {BOTTOM}V{TOP}\"/>");
+            out += &text("label", (shown, y), anchor, &label);
         }
         for (value, label) in self.y.ticks(7.0) {
             let y = self.down(value);
-            write!(
-                out,
-                "<path class=\"{grid}\" d=\"M{LEFT} {y:.1}H{right}\"/>\
-                 <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
-                LEFT - 6.0,
-                y + 4.0
-            )?;
+            out += &format!("<path class=\"{grid}\" d=\"M{LEFT} {y:.1}H{RIGHT}\"/>");
+            out += &text("label", (LEFT - 6.0, y + 4.0), "end", &label);
         }
-        self.above(out)?;
-        let (middle_x, middle_y) = (f64::midpoint(LEFT, right), f64::midpoint(TOP, bottom));
-        write!(
-            out,
-            "<path class=\"frame\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>\
-             <text class=\"axis\" x=\"{middle_x}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text class=\"axis\" transform=\"translate(13 {middle_y}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-            HEIGHT - 10.0,
-            self.x.label,
+        if let Some(unit) = self.above {
+            let other = Axis::log("", Unit::Number, (self.x.min / unit, self.x.max / unit));
+            for (value, label) in other.ticks(5.0) {
+                let x = self.across(value * unit);
+                out += &format!("<path class=\"frame\" d=\"M{x:.1} {TOP}v-4\"/>");
+                out += &text("note", (x, TOP - 7.0), "middle", &label);
+            }
+        }
+        let middle = (f64::midpoint(LEFT, RIGHT), HEIGHT - 10.0);
+        out += &format!("<path class=\"frame\" d=\"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}\"/>");
+        out += &text("axis", middle, "middle", self.x.label);
+        out + &format!(
+            "<text class=\"axis\" transform=\"translate(13 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            f64::midpoint(TOP, BOTTOM),
             self.y.label
         )
     }
 
-    fn above(&self, out: &mut String) -> std::fmt::Result {
-        let Some(unit) = self.above else {
-            return Ok(());
-        };
-        let other = Axis::log_between("", Unit::Number, self.x.min / unit, self.x.max / unit);
-        for (value, label) in other.ticks(5.0) {
-            let x = self.across(value * unit);
-            write!(
-                out,
-                "<path class=\"frame\" d=\"M{x:.1} {TOP}v-4\"/>\
-                 <text class=\"note\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
-                TOP - 7.0
-            )?;
-        }
-        Ok(())
-    }
-
-    fn mark(&self, out: &mut String, mark: &Mark) -> std::fmt::Result {
-        let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
+    fn mark(&self, mark: &Mark) -> String {
         match mark {
-            Mark::Vertical { x, class, tooltip } if self.x.holds(*x) => {
-                let x = self.across(*x);
-                write!(
-                    out,
-                    "<path class=\"edge {class}\" d=\"M{x:.1} {bottom}V{TOP}\"><title>{}</title></path>",
-                    escape(tooltip)
-                )
-            }
-            Mark::Horizontal {
-                y,
-                class,
-                label,
-                right: at_right,
-            } if self.y.holds(*y) => {
+            Mark::Vertical(x, class, tooltip) if self.x.holds(*x) => format!(
+                "<path class=\"edge {class}\" d=\"M{:.1} {BOTTOM}V{TOP}\"><title>{}</title></path>",
+                self.across(*x),
+                escape(tooltip)
+            ),
+            Mark::Horizontal(y, class, label) if self.y.holds(*y) => {
                 let y = self.down(*y);
-                let (x, anchor) = if *at_right {
-                    (right - 4.0, "end")
-                } else {
-                    (LEFT + 6.0, "start")
+                format!("<path class=\"edge {class}\" d=\"M{LEFT} {y:.1}H{RIGHT}\"/>")
+                    + &text("note", (LEFT + 6.0, y - 4.0), "start", label)
+            }
+            Mark::Slopes((x, y), orders) => {
+                let slope = |order: f64| {
+                    let (x1, y1) = (self.across(x * 10.0), self.down(y * 10_f64.powf(order)));
+                    let (x0, y0) = (self.across(*x), self.down(*y));
+                    format!("<path class=\"slope\" d=\"M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}\"/>")
+                        + &text("note", (x1 + 3.0, y1 + 4.0), "start", &number(order))
                 };
-                write!(
-                    out,
-                    "<path class=\"edge {class}\" d=\"M{LEFT} {y:.1}H{right}\"/>\
-                     <text class=\"note\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-                    x,
-                    y - 4.0,
-                    escape(label)
-                )
+                orders.map(slope).concat()
             }
-            Mark::Slopes {
-                x,
-                y,
-                decades,
-                orders,
-            } => self.slopes(out, (*x, *y), *decades, orders),
-            Mark::Vertical { .. } | Mark::Horizontal { .. } => Ok(()),
+            Mark::Vertical(..) | Mark::Horizontal(..) => String::new(),
         }
     }
 
-    fn slopes(
-        &self,
-        out: &mut String,
-        corner: (f64, f64),
-        decades: f64,
-        orders: &[f64],
-    ) -> std::fmt::Result {
-        let (x0, y0) = (self.across(corner.0), self.down(corner.1));
-        for order in orders {
-            let end = (
-                corner.0 * 10_f64.powf(decades),
-                corner.1 * 10_f64.powf(decades * order),
-            );
-            let (x1, y1) = (self.across(end.0), self.down(end.1));
-            write!(
-                out,
-                "<path class=\"slope\" d=\"M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}\"/>\
-                 <text class=\"note\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                x1 + 3.0,
-                y1 + 4.0,
-                number(order.abs())
-            )?;
-        }
-        Ok(())
-    }
-
-    fn series(&self, out: &mut String, series: &Curve) -> std::fmt::Result {
-        let dashed = if series.dashed { " dashed" } else { "" };
-        write!(out, "<g class=\"series {}{dashed}\">", series.class)?;
-        if series.line {
+    fn curve(&self, curve: &Curve) -> String {
+        let dashed = if curve.key.dashed { " dashed" } else { "" };
+        let mut out = format!("<g class=\"series {}{dashed}\">", curve.key.class);
+        if curve.has_line {
             let mut path = String::new();
-            let mut pen_down = false;
-            for point in &series.points {
+            let mut letter = 'M';
+            for point in &curve.points {
                 // Lost points break the line: nothing is known between them and their neighbours.
-                if self.lost(point) || !self.x.holds(point.x) {
-                    pen_down = false;
-                    continue;
+                if point.y.is_finite() && self.x.holds(point.x) {
+                    let (x, y) = (self.across(point.x), self.down(point.y));
+                    path += &format!("{letter}{x:.1} {y:.1}");
+                    letter = 'L';
+                } else {
+                    letter = 'M';
                 }
-                let letter = if pen_down { 'L' } else { 'M' };
-                write!(
-                    path,
-                    "{letter}{:.1} {:.1}",
-                    self.across(point.x),
-                    self.down(point.y)
-                )?;
-                pen_down = true;
             }
-            write!(out, "<path class=\"line\" d=\"{path}\"/>")?;
+            out += &format!("<path class=\"line\" d=\"{path}\"/>");
         }
-        for point in series.points.iter().filter(|p| self.x.holds(p.x)) {
-            self.point(out, series.marker, point)?;
-        }
-        out.push_str("</g>");
-        Ok(())
+        let points = curve.points.iter().filter(|point| self.x.holds(point.x));
+        out.extend(points.map(|point| self.point(curve.key.marker, point)));
+        out + "</g>"
     }
 
-    fn lost(&self, point: &Point) -> bool {
-        !point.y.is_finite()
-    }
-
-    fn point(&self, out: &mut String, marker: Marker, point: &Point) -> std::fmt::Result {
+    fn point(&self, marker: Marker, point: &Point) -> String {
         let tooltip = escape(&point.tooltip);
-        let x = self.across(point.x);
-        if self.lost(point) {
-            return write!(
-                out,
-                "<path class=\"lost\" d=\"M{:.1} {:.1}l7 7m0 -7l-7 7\"><title>{tooltip}</title></path>",
-                x - 3.5,
-                TOP + 2.5
+        let (x, y) = (self.across(point.x), self.down(point.y));
+        if !point.y.is_finite() {
+            let (x, y) = (x - 3.5, TOP + 2.5);
+            return format!(
+                "<path class=\"lost\" d=\"M{x:.1} {y:.1}l7 7m0 -7l-7 7\"><title>{tooltip}</title></path>"
             );
         }
-        let y = self.down(point.y);
-        if let Some((from, to)) = point.spread {
+        let spread = point.spread.map(|(from, to)| {
             let (from, to) = (self.across(from), self.across(to));
-            write!(
-                out,
-                "<path class=\"spread\" d=\"M{from:.1} {y:.1}H{to:.1}\"/>"
-            )?;
-        }
-        if marker == Marker::None {
-            return Ok(());
-        }
-        write!(
-            out,
-            "<path class=\"marker\" d=\"{}\"><title>{tooltip}</title></path>",
-            marker.path(x, y)
+            format!("<path class=\"spread\" d=\"M{from:.1} {y:.1}H{to:.1}\"/>")
+        });
+        let marker = match marker.path(x, y).as_str() {
+            "" => String::new(),
+            path => format!("<path class=\"marker\" d=\"{path}\"><title>{tooltip}</title></path>"),
+        };
+        spread.unwrap_or_default() + &marker
+    }
+}
+
+fn text(class: &str, (x, y): (f64, f64), anchor: &str, words: &str) -> String {
+    let words = escape(words);
+    format!(
+        "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>"
+    )
+}
+
+/// A panel of horizontal bars from zero, each with its number; a row without one says so.
+pub(crate) fn bars(title: &str, class: &str, rows: &[(&str, Option<f64>)]) -> Panel {
+    const LEFT: f64 = 176.0;
+    const TOP: f64 = 34.0;
+    let numbers = rows.iter().filter_map(|row| row.1);
+    let largest = numbers.fold(f64::MIN_POSITIVE, f64::max);
+    let pitch = (HEIGHT - TOP - 10.0) / length_in_f64(rows.len().max(1));
+    let thick = (0.68 * pitch).min(26.0);
+    let mut middle = TOP + 0.5 * pitch;
+    let mut out = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
+         <text class=\"title\" x=\"14\" y=\"17\">{title}</text><g class=\"series {class}\">"
+    );
+    for (label, value) in rows {
+        let width = value.unwrap_or(0.0).max(0.0) / largest * (WIDTH - LEFT - 58.0);
+        let said = value.map_or_else(|| "not measured".to_owned(), number);
+        out += &text("label", (LEFT - 6.0, middle + 4.0), "end", label);
+        out += &format!(
+            "<rect class=\"bar\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{thick:.1}\"/>",
+            middle - 0.5 * thick
+        );
+        out += &text("label", (LEFT + width + 5.0, middle + 4.0), "start", &said);
+        middle += pitch;
+    }
+    let row = |(label, value): &(&str, Option<f64>)| {
+        (
+            format!("{title}: {label}"),
+            value.unwrap_or(f64::NAN),
+            f64::NAN,
+            String::new(),
         )
+    };
+    Panel {
+        svg: out + "</g></svg>",
+        keys: Vec::new(),
+        rows: rows.iter().map(row).collect(),
     }
 }

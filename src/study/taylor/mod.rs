@@ -1,4 +1,5 @@
-//! An arm under constant efforts, followed to rounding or within a tolerance.
+//! An arm followed to rounding or within a tolerance: under constant efforts in doubles, and for the report's
+//! references under any drive and in more digits.
 //!
 //! Its motion is expanded in a power series (`series.rs`); a step is as long as the last terms of it are small, and
 //! the series as long as the step. Positions and velocities are summed with compensation.
@@ -18,18 +19,16 @@ use crate::math::count::length_in_f64;
 use crate::math::dynamics::forward_dynamics;
 use crate::math::elementary::{ln, pow};
 use crate::math::integrator::two_sum;
+use crate::math::number::Arithmetic;
 use crate::math::trig;
 use series::PowerSeries;
 
 /// The least tolerance that makes a difference: below it rounding is all that is left.
-pub const ROUNDING: f64 = 1e-16;
+pub const ROUNDING: f64 = f64::LEAST_TOLERANCE;
 
 /// Coefficients after which a span is given up, since the motion is too wild to be followed. They make a thousand
 /// steps.
 const MAX_COEFFICIENTS: u64 = 20_000;
-
-/// Highest order of a series in doubles: beyond it rounding is all that a coefficient adds.
-const HIGHEST: usize = 22;
 
 /// Terms that have to be small before a series is believed to have come to its end. An arm that is let go at rest and
 /// stretched along the horizontal has three in a row that vanish between two that do not.
@@ -43,11 +42,78 @@ const LONGER: f64 = 1.25;
 const SHORTER: [f64; 2] = [0.95, 0.25];
 const MUCH: f64 = 1e9;
 
+/// Numbers in which a motion is followed.
+pub(crate) trait Precision: Arithmetic + Default {
+    /// Relative size of a rounding error.
+    const LEAST_TOLERANCE: f64;
+    /// Highest order of a series: beyond it rounding is all that a coefficient adds.
+    const HIGHEST_ORDER: usize;
+    /// The magnitude as a double.
+    fn magnitude(self) -> f64;
+    /// `sum + change`, and the rounding error of that, for the sum that `carry` is the rounding error of.
+    fn plus_carried(self, carry: Self, change: Self) -> (Self, Self);
+    /// Sines and cosines of angles \[rad\].
+    fn directions<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
+    /// Joint accelerations \[rad/s²\] under joint efforts \[N m\].
+    fn acceleration<const N: usize>(
+        arm: &Arm<N>,
+        position: &[Self; N],
+        velocity: &[Self; N],
+        effort: &[Self; N],
+    ) -> [Self; N];
+}
+
+impl Precision for f64 {
+    const LEAST_TOLERANCE: f64 = 1e-16;
+    const HIGHEST_ORDER: usize = 22;
+
+    fn magnitude(self) -> f64 {
+        self.abs()
+    }
+
+    fn plus_carried(self, carry: Self, change: Self) -> (Self, Self) {
+        two_sum(self, change + carry)
+    }
+
+    fn directions<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]) {
+        trig::sin_cos(angles)
+    }
+
+    fn acceleration<const N: usize>(
+        arm: &Arm<N>,
+        position: &[Self; N],
+        velocity: &[Self; N],
+        effort: &[Self; N],
+    ) -> [Self; N] {
+        forward_dynamics(arm, position, velocity, effort)
+    }
+}
+
+/// The joint efforts of a motion \[N m\], as a series.
+pub(crate) trait Drive<T, const N: usize> {
+    /// The efforts in a state.
+    fn efforts(&self, position: &[T; N], velocity: &[T; N]) -> [T; N];
+    /// Their coefficient of order `k`, above 0, in a step that begins at `position`.
+    fn coefficient(&self, position: &[T; N], series: &PowerSeries<T, N>, k: usize) -> [T; N];
+}
+
+/// Constant efforts.
+impl<T: Precision, const N: usize> Drive<T, N> for [T; N] {
+    fn efforts(&self, _: &[T; N], _: &[T; N]) -> [T; N] {
+        *self
+    }
+
+    fn coefficient(&self, _: &[T; N], _: &PowerSeries<T, N>, _: usize) -> [T; N] {
+        [T::default(); N]
+    }
+}
+
 /// A motion that is followed, rounding errors carried along.
 #[derive(Debug, Clone)]
-pub struct TaylorReference<const N: usize> {
-    state: State<N>,
-    carry: State<N>,
+pub(crate) struct Taylor<T, const N: usize> {
+    pub(crate) position: [T; N],
+    pub(crate) velocity: [T; N],
+    carry: [[T; N]; 2],
     tolerance: f64,
     /// Order of the series where no span ends.
     order: usize,
@@ -61,7 +127,8 @@ pub struct TaylorReference<const N: usize> {
     /// The last length of a step that a series allowed \[s\].
     step: f64,
     ahead: Ahead,
-    series: PowerSeries<f64, N>,
+    /// The series of the last step.
+    pub(crate) series: PowerSeries<T, N>,
 }
 
 /// The rest of a span.
@@ -75,26 +142,13 @@ struct Ahead {
     bound: u64,
 }
 
-impl<const N: usize> TaylorReference<N> {
-    /// An arm in the given state, to be followed to rounding.
-    #[must_use]
-    pub fn new(state: State<N>) -> Self {
-        Self::within(state, ROUNDING)
-    }
-
-    /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
-    /// held between [`ROUNDING`] and 1.
-    #[must_use]
-    pub fn within(state: State<N>, tolerance: f64) -> Self {
-        let tolerance = if tolerance > ROUNDING {
-            tolerance.min(1.0)
-        } else {
-            ROUNDING
-        };
-        let order = order_for(tolerance);
+impl<T: Precision, const N: usize> Taylor<T, N> {
+    /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it.
+    pub(crate) fn new(position: [T; N], velocity: [T; N], tolerance: f64, order: usize) -> Self {
         Self {
-            state,
-            carry: State::rest(),
+            position,
+            velocity,
+            carry: [[T::default(); N]; 2],
             tolerance,
             order,
             shorter: SHORTER.map(|factor| (factor, power(factor, order - LAST))),
@@ -110,36 +164,8 @@ impl<const N: usize> TaylorReference<N> {
         }
     }
 
-    /// Follows the same motion in steps that are so many times shorter than they might be.
-    #[must_use]
-    pub(super) fn cut(self, cuts: u32) -> Self {
-        Self {
-            cuts: f64::from(cuts),
-            ..self
-        }
-    }
-
-    /// The arm's state.
-    #[must_use]
-    pub fn state(&self) -> &State<N> {
-        &self.state
-    }
-
-    /// Coefficients of the series so far. Each takes about as long as an evaluation of the dynamics.
-    #[must_use]
-    pub fn coefficients(&self) -> u64 {
-        self.coefficients
-    }
-
-    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere
-    /// on the way.
-    pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
-        self.begin(span);
-        self.go_on(arm, effort, u64::MAX).unwrap_or(false)
-    }
-
-    /// Begins a span \[s\], to be followed by [`TaylorReference::go_on`].
-    pub(super) fn begin(&mut self, span: f64) {
+    /// Begins a span \[s\].
+    pub(crate) fn begin(&mut self, span: f64) {
         self.ahead = Ahead {
             span,
             rest: (span, 0.0),
@@ -147,43 +173,35 @@ impl<const N: usize> TaylorReference<N> {
         };
     }
 
-    /// Goes on with the span until there have been so many `coefficients` in all, or some more; none while it is not
-    /// over, `false` if it could not be followed.
-    pub(super) fn go_on(
-        &mut self,
-        arm: &Arm<N>,
-        effort: &[f64; N],
-        coefficients: u64,
-    ) -> Option<bool> {
-        while self.ahead.rest.0 > 0.0 {
-            if self.coefficients > self.ahead.bound || !self.state.is_finite() {
-                return Some(false);
-            }
-            if self.coefficients >= coefficients {
-                return None;
-            }
-            self.step(arm, effort);
-        }
-        Some(self.state.is_finite())
+    /// What is left of the span \[s\], and what rounding took from that.
+    pub(crate) fn rest(&self) -> (f64, f64) {
+        self.ahead.rest
     }
 
-    fn step(&mut self, arm: &Arm<N>, effort: &[f64; N]) {
+    /// Goes on with the span by a step.
+    pub(crate) fn step(&mut self, arm: &Arm<N>, drive: &impl Drive<T, N>) {
         let Ahead { span, rest, .. } = self.ahead;
         let whole = (span / self.cuts).min(rest.0);
-        let State { position, velocity } = &self.state;
-        let acceleration = forward_dynamics(arm, position, velocity, effort);
-        let directions = trig::sin_cos(position);
-        self.series.begin(arm, &directions, velocity, &acceleration);
+        let (position, velocity) = (self.position, self.velocity);
+        let effort = drive.efforts(&position, &velocity);
+        let acceleration = T::acceleration(arm, &position, &velocity, &effort);
+        let directions = T::directions(&position);
+        let series = &mut self.series;
+        series.begin(arm, &directions, &velocity, &acceleration);
+        let extend = |series: &mut PowerSeries<T, N>| {
+            let effort = drive.coefficient(&position, series, series.order());
+            series.extend(&series::link_efforts(&effort));
+        };
         let mut small = 0;
         if whole > LONGER * LONGER * self.step {
-            while self.series.order() < self.order {
-                self.series.extend(&[0.0; N]);
+            while series.order() < self.order {
+                extend(series);
             }
         } else {
             // A short step needs no long series.
             let mut power = whole;
             while self.series.order() < self.order && small < LAST {
-                self.series.extend(&[0.0; N]);
+                extend(&mut self.series);
                 power *= whole;
                 let term = self.excess(self.series.order(), whole, power);
                 small = if term <= 1.0 { small + 1 } else { 0 };
@@ -200,15 +218,21 @@ impl<const N: usize> TaylorReference<N> {
             // Two steps of one length are better than a long one and a remnant.
             cut.min(0.5 * rest.0)
         };
-        let (dq, dv) = self.series.change(h);
+        let is_last = h >= rest.0;
+        let real = |value| T::default().like(value);
+        let time = if is_last {
+            real(h) + real(rest.1)
+        } else {
+            real(h)
+        };
+        let (dq, dv) = self.series.change(time);
+        let [position, velocity] = &mut self.carry;
         for i in 0..N {
-            (self.state.position[i], self.carry.position[i]) =
-                two_sum(self.state.position[i], dq[i] + self.carry.position[i]);
-            (self.state.velocity[i], self.carry.velocity[i]) =
-                two_sum(self.state.velocity[i], dv[i] + self.carry.velocity[i]);
+            (self.position[i], position[i]) = self.position[i].plus_carried(position[i], dq[i]);
+            (self.velocity[i], velocity[i]) = self.velocity[i].plus_carried(velocity[i], dv[i]);
         }
         let (left, lost) = two_sum(rest.0, -h);
-        self.ahead.rest = if h >= rest.0 {
+        self.ahead.rest = if is_last {
             (0.0, 0.0)
         } else {
             two_sum(left, rest.1 + lost)
@@ -238,7 +262,7 @@ impl<const N: usize> TaylorReference<N> {
         let PowerSeries { angle, rate, .. } = &self.series;
         let of_angle = self.tolerance * step * (size(&rate[0]) + step * size(&rate[1]));
         let of_rate = self.tolerance * step * (size(&rate[1]) + step * size(&rate[2]))
-            + ROUNDING * size(&rate[0]);
+            + T::LEAST_TOLERANCE * size(&rate[0]);
         let angle = size(&angle[order]) * power / of_angle;
         let rate = size(&rate[order]) * power / of_rate;
         angle.max(rate)
@@ -253,7 +277,7 @@ impl<const N: usize> TaylorReference<N> {
     reason = "clamped to small whole numbers"
 )]
 fn order_for(tolerance: f64) -> usize {
-    ((3.0 - 0.5 * ln(tolerance)).ceil() as usize).clamp(6, HIGHEST)
+    ((3.0 - 0.5 * ln(tolerance)).ceil() as usize).clamp(6, f64::HIGHEST_ORDER)
 }
 
 fn power(base: f64, exponent: usize) -> f64 {
@@ -268,6 +292,90 @@ fn power(base: f64, exponent: usize) -> f64 {
     power
 }
 
-fn size<const N: usize>(x: &[f64; N]) -> f64 {
-    largest(x.iter().map(|x| x.abs()))
+fn size<T: Precision, const N: usize>(x: &[T; N]) -> f64 {
+    largest(x.iter().map(|x| x.magnitude()))
+}
+
+/// An arm under constant efforts, followed in doubles.
+#[derive(Debug, Clone)]
+pub struct TaylorReference<const N: usize> {
+    taylor: Taylor<f64, N>,
+    state: State<N>,
+}
+
+impl<const N: usize> TaylorReference<N> {
+    /// An arm in the given state, to be followed to rounding.
+    #[must_use]
+    pub fn new(state: State<N>) -> Self {
+        Self::within(state, ROUNDING)
+    }
+
+    /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
+    /// held between [`ROUNDING`] and 1.
+    #[must_use]
+    pub fn within(state: State<N>, tolerance: f64) -> Self {
+        let tolerance = if tolerance > ROUNDING {
+            tolerance.min(1.0)
+        } else {
+            ROUNDING
+        };
+        let State { position, velocity } = state;
+        Self {
+            taylor: Taylor::new(position, velocity, tolerance, order_for(tolerance)),
+            state,
+        }
+    }
+
+    /// Follows the same motion in steps that are so many times shorter than they might be.
+    #[must_use]
+    pub(super) fn cut(mut self, cuts: u32) -> Self {
+        self.taylor.cuts = f64::from(cuts);
+        self
+    }
+
+    /// The arm's state.
+    #[must_use]
+    pub fn state(&self) -> &State<N> {
+        &self.state
+    }
+
+    /// Coefficients of the series so far. Each takes about as long as an evaluation of the dynamics.
+    #[must_use]
+    pub fn coefficients(&self) -> u64 {
+        self.taylor.coefficients
+    }
+
+    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere
+    /// on the way.
+    pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
+        self.begin(span);
+        self.go_on(arm, effort, u64::MAX).unwrap_or(false)
+    }
+
+    /// Begins a span \[s\], to be followed by [`TaylorReference::go_on`].
+    pub(super) fn begin(&mut self, span: f64) {
+        self.taylor.begin(span);
+    }
+
+    /// Goes on with the span until there have been so many `coefficients` in all, or some more; none while it is not
+    /// over, `false` if it could not be followed.
+    pub(super) fn go_on(
+        &mut self,
+        arm: &Arm<N>,
+        effort: &[f64; N],
+        coefficients: u64,
+    ) -> Option<bool> {
+        while self.taylor.rest().0 > 0.0 {
+            if self.coefficients() > self.taylor.ahead.bound || !self.state.is_finite() {
+                return Some(false);
+            }
+            if self.coefficients() >= coefficients {
+                return None;
+            }
+            self.taylor.step(arm, effort);
+            self.state.position = self.taylor.position;
+            self.state.velocity = self.taylor.velocity;
+        }
+        Some(self.state.is_finite())
+    }
 }

@@ -81,10 +81,7 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
             sin: [[zeros; N]; ORDER],
             cos: [[zeros; N]; ORDER],
             turning: [[zeros; N]; ORDER],
-            equation: Equation {
-                factors: [zeros; N],
-                eliminated: [zeros; N],
-            },
+            equation: Equation::default(),
         }
     }
 
@@ -98,20 +95,11 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
     pub(crate) fn begin(
         &mut self,
         arm: &Arm<N>,
-        (sin, cos): &([T; N], [T; N]),
+        directions: &([T; N], [T; N]),
         velocity: &[T; N],
         acceleration: &[T; N],
     ) {
-        for i in 0..N {
-            // The joints between two links turn one into the other: no angle is summed, and none loses digits.
-            let (mut s, mut c) = (sin[i], cos[i]);
-            for d in 1..=i {
-                (self.sin[0][d][i], self.cos[0][d][i]) = (s, c);
-                let j = i - d;
-                (s, c) = (s * cos[j] + c * sin[j], c * cos[j] - s * sin[j]);
-            }
-            (self.sin[0][0][i], self.cos[0][0][i]) = (s, c);
-        }
+        (self.sin[0], self.cos[0]) = between(directions);
         self.equation.set(arm, &self.cos[0]);
         self.rate[0] = sums(velocity);
         self.squared_rate[backwards(0)] = self.rate[0].map(|rate| rate * rate);
@@ -222,6 +210,16 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
     }
 }
 
+impl<T: Arithmetic + Default, const N: usize> Default for Equation<T, N> {
+    fn default() -> Self {
+        let zeros = [T::default(); N];
+        Self {
+            factors: [zeros; N],
+            eliminated: [zeros; N],
+        }
+    }
+}
+
 impl<T: Arithmetic + Default, const N: usize> Equation<T, N> {
     fn set(&mut self, arm: &Arm<N>, cos: &[[T; N]; N]) {
         let real = |value| T::default().like(value);
@@ -268,6 +266,59 @@ impl<T: Arithmetic + Default, const N: usize> Equation<T, N> {
         }
         right
     }
+}
+
+/// Sines and cosines of the angle from one link to the other. The joints between two links turn one into the other: no
+/// angle is summed, and none loses digits.
+fn between<T: Arithmetic + Default, const N: usize>(
+    (sin, cos): &([T; N], [T; N]),
+) -> ([[T; N]; N], [[T; N]; N]) {
+    let zeros = [[T::default(); N]; N];
+    let (mut sines, mut cosines) = (zeros, zeros);
+    for i in 0..N {
+        let (mut s, mut c) = (sin[i], cos[i]);
+        for d in 1..=i {
+            (sines[d][i], cosines[d][i]) = (s, c);
+            let j = i - d;
+            (s, c) = (s * cos[j] + c * sin[j], c * cos[j] - s * sin[j]);
+        }
+        (sines[0][i], cosines[0][i]) = (s, c);
+    }
+    (sines, cosines)
+}
+
+/// Joint accelerations \[rad/s²\] by the equation of motion itself, from sine and cosine of the joint angles.
+pub(crate) fn acceleration<T: Arithmetic + Default, const N: usize>(
+    arm: &Arm<N>,
+    directions: &([T; N], [T; N]),
+    velocity: &[T; N],
+    effort: &[T; N],
+) -> [T; N] {
+    let (sin, cos) = between(directions);
+    let mut equation = Equation::default();
+    equation.set(arm, &cos);
+    let rate = sums(velocity);
+    let mut right = link_efforts(effort);
+    for i in 0..N {
+        right[i] = right[i] - equation.factors[0][i] * cos[0][i];
+        for d in 1..=i {
+            let across = equation.factors[d][i] * sin[d][i];
+            right[i] = right[i] - across * rate[i - d] * rate[i - d];
+            right[i - d] = right[i - d] + across * rate[i] * rate[i];
+        }
+    }
+    differences(&equation.solve(right))
+}
+
+/// Effort about each link's angle from the efforts of the joints at both its ends.
+pub(crate) fn link_efforts<T: Arithmetic, const N: usize>(joints: &[T; N]) -> [T; N] {
+    std::array::from_fn(|i| {
+        if i + 1 < N {
+            joints[i] - joints[i + 1]
+        } else {
+            joints[i]
+        }
+    })
 }
 
 fn reciprocal<T: Arithmetic + Default>(count: usize) -> T {

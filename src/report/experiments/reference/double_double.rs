@@ -12,8 +12,10 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
+use crate::math::arm::Arm;
 use crate::math::integrator::two_sum;
 use crate::math::number::Arithmetic;
+use crate::study::taylor::{Precision, series};
 
 /// A number of about 106 bits. Magnitudes beyond 1e300 are not meant to work: splitting overflows there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -190,6 +192,33 @@ impl Arithmetic for DoubleDouble {
     #[inline]
     fn like(self, value: f64) -> Self {
         Self::from(value)
+    }
+}
+
+impl Precision for DoubleDouble {
+    const LEAST_TOLERANCE: f64 = 1e-32;
+    const HIGHEST_ORDER: usize = series::ORDER;
+
+    fn magnitude(self) -> f64 {
+        self.hi.abs()
+    }
+
+    fn plus_carried(self, _: Self, change: Self) -> (Self, Self) {
+        (self + change, Self::ZERO)
+    }
+
+    fn directions<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]) {
+        let both = angles.map(Self::sin_cos);
+        (both.map(|one| one.0), both.map(|one| one.1))
+    }
+
+    fn acceleration<const N: usize>(
+        arm: &Arm<N>,
+        position: &[Self; N],
+        velocity: &[Self; N],
+        effort: &[Self; N],
+    ) -> [Self; N] {
+        series::acceleration(arm, &Self::directions(position), velocity, effort)
     }
 }
 

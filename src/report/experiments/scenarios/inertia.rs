@@ -9,8 +9,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::support::{arm, digits_lost, free, held, short, states, verdict};
-use super::{Observation, Scenario};
+use super::control::MODERATE;
+use super::{
+    Observation, Scenario, arm, digits_lost, each, fastest, free, held, is_near, short, states,
+};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -26,201 +28,147 @@ const DIGITS: f64 = 2.5;
 
 const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured \
                      within 1 % of predicted";
-const HEAVY: &str = "worst of 200 states loses at most 2.5 digits";
+const ANYWHERE: &str = "worst of 200 states loses at most 2.5 digits";
 
 pub(super) const SCENES: [Scenario; 11] = [
-    Scenario {
-        id: "S16",
-        name: "light tip, 1e-3",
-        parameters: "2 links, outer mass 1e-3 kg, kp 200 and 100, kd 30 and 12",
-        expected: LIGHT,
-        slow: false,
-        check: || light_outer_link(1e-3),
-    },
-    Scenario {
-        id: "S17",
-        name: "light tip, 1e-6",
-        parameters: "2 links, outer mass 1e-6 kg, kp 200 and 100, kd 30 and 12",
-        expected: LIGHT,
-        slow: false,
-        check: || light_outer_link(1e-6),
-    },
-    Scenario {
-        id: "S18",
-        name: "light tip, 1e-9",
-        parameters: "2 links, outer mass 1e-9 kg, kp 200 and 100, kd 30 and 12",
-        expected: LIGHT,
-        slow: false,
-        check: || light_outer_link(1e-9),
-    },
-    Scenario {
-        id: "S19",
-        name: "heavy tip, 1e3",
-        parameters: "3 links, outer mass 1e3 kg, anywhere",
-        expected: HEAVY,
-        slow: false,
-        check: || heavy_outer_link(1e3),
-    },
-    Scenario {
-        id: "S20",
-        name: "heavy tip, 1e6",
-        parameters: "3 links, outer mass 1e6 kg, anywhere",
-        expected: HEAVY,
-        slow: false,
-        check: || heavy_outer_link(1e6),
-    },
-    Scenario {
-        id: "S21",
-        name: "heavy tip, 1e9",
-        parameters: "3 links, outer mass 1e9 kg, anywhere",
-        expected: HEAVY,
-        slow: false,
-        check: || heavy_outer_link(1e9),
-    },
-    Scenario {
-        id: "S22",
-        name: "heavy tip, stretched",
-        parameters: "3 links, outer mass 1e9 kg, hanging within 1e-6 rad of straight",
-        expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 \
-                   swings on at 1.6e-5 s and flies apart at 2e-5 s",
-        slow: false,
-        check: heavy_link_stretched,
-    },
-    Scenario {
-        id: "S23",
-        name: "length ratio 1e3 and 1e-3",
-        parameters: "3 links, outer length 1e3 m, then 1e-3 m, anywhere",
-        expected: "worst of 200 states loses at most 2.5 digits",
-        slow: false,
-        check: length_ratio,
-    },
-    Scenario {
-        id: "S24",
-        name: "stretched",
-        parameters: "3 links exactly in line, any direction, rates within 2 rad/s",
-        expected: "accelerations finite, at most 2.5 digits lost",
-        slow: false,
-        check: || in_line([0.0, 0.0, 0.0]),
-    },
-    Scenario {
-        id: "S25",
-        name: "folded",
-        parameters: "3 links folded back at the double next to π, any direction; default gains",
-        expected: "as stretched; and no pose's limit is below the minimum over poses by more than 1 %",
-        slow: false,
-        check: folded,
-    },
-    Scenario {
-        id: "S26",
-        name: "whirl",
-        parameters: "2 and 3 links stretched, no gravity, 1000 rad/s",
-        expected: "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 \
-                   %, predicted and measured",
-        slow: false,
-        check: whirl,
-    },
+    Scenario::new(
+        "S16",
+        "2 links, outer mass 1e-3 kg, kp 200 and 100, kd 30 and 12",
+        LIGHT,
+        || light_outer_link(1e-3),
+    ),
+    Scenario::new(
+        "S17",
+        "2 links, outer mass 1e-6 kg, kp 200 and 100, kd 30 and 12",
+        LIGHT,
+        || light_outer_link(1e-6),
+    ),
+    Scenario::new(
+        "S18",
+        "2 links, outer mass 1e-9 kg, kp 200 and 100, kd 30 and 12",
+        LIGHT,
+        || light_outer_link(1e-9),
+    ),
+    Scenario::new(
+        "S19",
+        "3 links, outer mass 1e3 kg, anywhere",
+        ANYWHERE,
+        || heavy_outer_link(1e3),
+    ),
+    Scenario::new(
+        "S20",
+        "3 links, outer mass 1e6 kg, anywhere",
+        ANYWHERE,
+        || heavy_outer_link(1e6),
+    ),
+    Scenario::new(
+        "S21",
+        "3 links, outer mass 1e9 kg, anywhere",
+        ANYWHERE,
+        || heavy_outer_link(1e9),
+    ),
+    Scenario::new(
+        "S22",
+        "3 links, outer mass 1e9 kg, hanging within 1e-6 rad of straight",
+        "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 swings on \
+         at 1.6e-5 s and flies apart at 2e-5 s",
+        heavy_link_stretched,
+    ),
+    Scenario::new(
+        "S23",
+        "3 links, outer length 1e3 m, then 1e-3 m, anywhere",
+        ANYWHERE,
+        || each([1e3, 1e-3].map(long_outer_link)),
+    ),
+    Scenario::new(
+        "S24",
+        "3 links exactly in line, any direction, rates within 2 rad/s",
+        "accelerations finite, at most 2.5 digits lost",
+        || each([loses_few(&Arm::default(), [0.0; 3], 0.0)]),
+    ),
+    Scenario::new(
+        "S25",
+        "3 links folded back at the double next to π, any direction; default gains",
+        "as stretched; and no pose's limit is below the minimum over poses by more than 1 %",
+        folded,
+    ),
+    Scenario::new(
+        "S26",
+        "2 and 3 links stretched, no gravity, 1000 rad/s",
+        "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 %, \
+         predicted and measured",
+        || {
+            each(
+                [
+                    whirl::<2>([0.76376, 1.0801]),
+                    whirl::<3>([0.42370, 0.59920]),
+                ]
+                .concat(),
+            )
+        },
+    ),
 ];
 
+/// Whether an arm loses few digits around a pose, and how many.
+fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> (bool, String) {
+    let digits = digits_lost(arm, &states(pose, spread));
+    (digits <= DIGITS, format!("{digits:.1} digits lost"))
+}
+
 fn light_outer_link(mass: f64) -> Observation {
-    let Some(arm) = arm([1.0, mass], 9.81) else {
-        return verdict(false, "no such arm".to_owned());
-    };
-    let digits = digits_lost(&arm, &states([0.0, 0.0], PI));
-    let gains = Gains {
-        kp: [200.0, 100.0],
-        ki: [0.0; 2],
-        kd: [30.0, 12.0],
-    };
     let control = ControlLoop {
-        arm,
-        ..held(gains, [0.5, 0.8])
+        arm: arm([1.0, mass], 9.81),
+        ..held(MODERATE, [0.5, 0.8])
     };
     let linear = Linear::at_setpoint(&control);
     let predicted = largest_timestep(&linear, Method::Rk4, Sampling::Held);
-    let measured =
-        predicted.and_then(|limit| measured_limit(&control, Sampling::Held, 0.9 * limit));
-    let ratio = measured
-        .zip(predicted)
-        .map(|(measured, predicted)| measured / predicted);
-    let agree = ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.01);
+    let limit = predicted.unwrap_or(f64::NAN);
+    let measured = measured_limit(&control, Sampling::Held, 0.9 * limit);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
-    let alone = 2.0 * (mass / 3.0) / gains.kd[1];
-    let as_light = predicted.is_some_and(|limit| (limit / alone - 1.0).abs() < 0.01);
-    verdict(
-        digits <= DIGITS && agree && as_light,
-        format!(
-            "{digits:.1} digits lost; limit predicted {} s, measured {} s",
-            short(predicted),
-            short(measured)
-        ),
-    )
+    let alone = 2.0 * (mass / 3.0) / MODERATE.kd[1];
+    let holds = is_near(measured, limit, 0.01) && is_near(predicted, alone, 0.01);
+    let limits = format!(
+        "limit predicted {} s, measured {} s",
+        short(predicted),
+        short(measured)
+    );
+    each([loses_few(&control.arm, [0.0; 2], PI), (holds, limits)])
 }
 
 fn heavy_outer_link(mass: f64) -> Observation {
-    let digits = arm([1.0, 1.0, mass], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
-    verdict(
-        digits.is_some_and(|digits| digits <= DIGITS),
-        digits.map_or_else(String::new, |digits| format!("{digits:.1} digits lost")),
-    )
+    each([loses_few(&arm([1.0, 1.0, mass], 9.81), [0.0; 3], PI)])
+}
+
+fn long_outer_link(length: f64) -> (bool, String) {
+    let arm = Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).unwrap_or_default();
+    let (holds, words) = loses_few(&arm, [0.0; 3], PI);
+    (holds, format!("{words} with a tip of {length} m"))
 }
 
 fn heavy_link_stretched() -> Observation {
-    let Some(arm) = arm([1.0, 1.0, 1e9], 9.81) else {
-        return verdict(false, "no such arm".to_owned());
-    };
-    let digits = digits_lost(&arm, &states([0.0; 3], 1e-6));
+    let arm = arm([1.0, 1.0, 1e9], 9.81);
     let linear = Linear::at_pose(&ControlLoop::free(arm), &[-FRAC_PI_2, 0.0, 0.0]);
-    let limit = |method| largest_timestep(&linear, method, Sampling::Continuous);
-    let (rk4, verlet) = (limit(Method::Rk4), limit(Method::Verlet));
-    let near = |limit: Option<f64>, expected: f64| {
-        limit.is_some_and(|limit| (limit / expected - 1.0).abs() < 0.01)
-    };
-    let flies = |timestep| {
+    let limits = [(Method::Rk4, 1.649e-5), (Method::Verlet, 1.166e-5)].map(|(method, expected)| {
+        let limit = largest_timestep(&linear, method, Sampling::Continuous);
+        (
+            is_near(limit, expected, 0.01),
+            format!("{method} limit {} s", short(limit)),
+        )
+    });
+    let swings = [(1.6e-5, false), (2.0e-5, true)].map(|(timestep, is_apart)| {
         let start = State::at_rest([-FRAC_PI_2, 1e-6, -1e-6]);
         let mut simulation = free(arm, start, Method::Rk4, timestep);
         simulation.advance(20_000);
-        let fastest = largest(simulation.state().velocity.iter().map(|v| v.abs()));
         // The nudge holds 1e-6 rad of a mode of 1.7e5 rad/s: rates of some 0.2 rad/s.
-        simulation.divergence().is_some() || fastest > 10.0
-    };
-    let (within, beyond) = (flies(1.6e-5), flies(2.0e-5));
-    verdict(
-        digits <= DIGITS && near(rk4, 1.649e-5) && near(verlet, 1.166e-5) && !within && beyond,
-        format!(
-            "{digits:.1} digits lost; limits {} and {} s; at 1.6e-5 s it {}, at 2e-5 s it {}",
-            short(rk4),
-            short(verlet),
-            if within { "flies apart" } else { "swings on" },
-            if beyond { "flies apart" } else { "swings on" },
-        ),
-    )
-}
-
-fn length_ratio() -> Observation {
-    let lost = [1e3, 1e-3].map(|length| {
-        Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).map_or(f64::INFINITY, |arm| {
-            digits_lost(&arm, &states([0.0; 3], PI))
-        })
+        let flies = simulation.divergence().is_some() || fastest(&simulation) > 10.0;
+        let words = if flies { "flies apart" } else { "swings on" };
+        (flies == is_apart, format!("at {timestep:e} s it {words}"))
     });
-    verdict(
-        lost.iter().all(|&lost| lost <= DIGITS),
-        format!(
-            "{:.1} digits lost with the long tip, {:.1} with the short one",
-            lost[0], lost[1]
-        ),
-    )
-}
-
-fn in_line(pose: [f64; 3]) -> Observation {
-    let digits = digits_lost(&Arm::default(), &states(pose, 0.0));
-    verdict(
-        digits.is_finite() && digits <= DIGITS,
-        format!("{digits:.1} digits lost"),
-    )
+    let digits = loses_few(&arm, [0.0; 3], 1e-6);
+    each([digits].into_iter().chain(limits).chain(swings))
 }
 
 fn folded() -> Observation {
-    let straight = in_line([0.0, PI, -PI]);
     let control = held(Gains::<3>::default(), [0.0; 3]);
     let smallest = limits(&control).minimum_held;
     let at = |pose: [f64; 3]| {
@@ -229,70 +177,40 @@ fn folded() -> Observation {
     };
     let (stretched, folded) = (at([0.0; 3]), at([0.0, PI, -PI]));
     // Poses between those of the grid.
-    let anywhere = states([0.0; 3], PI)
-        .iter()
-        .take(50)
+    let others = states([0.0; 3], PI).into_iter().take(50);
+    let anywhere = others
         .map(|state| at(state.position))
         .fold(f64::INFINITY, f64::min);
     let least = stretched.min(folded).min(anywhere);
     let covers = smallest.is_some_and(|smallest| least > 0.99 * smallest);
-    verdict(
-        straight.holds && covers,
-        format!(
-            "{}; limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, \
-             minimum over poses {} s",
-            straight.observed,
-            short(smallest)
-        ),
-    )
+    let words = format!(
+        "limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, minimum over \
+         poses {} s",
+        short(smallest)
+    );
+    each([
+        loses_few(&Arm::default(), [0.0, PI, -PI], 0.0),
+        (covers, words),
+    ])
 }
 
-fn whirl() -> Observation {
-    let mut holds = true;
-    let mut observed = vec![];
-    let mut judge = |limits: [(Method, f64, Option<f64>, Option<f64>); 2]| {
-        for (method, expected, predicted, measured) in limits {
-            for limit in [predicted, measured] {
-                holds &= limit.is_some_and(|limit| (limit / expected - 1.0).abs() < 0.01);
-            }
-            observed.push(format!(
-                "{method} {} (measured {})",
-                short(predicted),
-                short(measured)
-            ));
-        }
-    };
-    judge(whirl_limits::<2>([0.76376, 1.0801]));
-    judge(whirl_limits::<3>([0.42370, 0.59920]));
-    verdict(holds, observed.join(", "))
-}
-
-/// Timestep times rate: expected, predicted from the fastest mode of the whirling arm, measured.
-fn whirl_limits<const N: usize>(
-    expected: [f64; 2],
-) -> [(Method, f64, Option<f64>, Option<f64>); 2] {
+/// Limits of Verlet and Runge-Kutta 4 as timestep times rate: predicted from the fastest mode of the whirling arm, and
+/// measured.
+fn whirl<const N: usize>([verlet, rk4]: [f64; 2]) -> [(bool, String); 2] {
     const RATE: f64 = 1000.0;
-    let [verlet, rk4] = expected;
     let methods = [
         (Method::Verlet, verlet, 2.0),
         (Method::Rk4, rk4, 8.0_f64.sqrt()),
     ];
     methods.map(|(method, expected, reach)| {
-        let Some(arm) = arm([1.0; N], 0.0) else {
-            return (method, expected, None, None);
-        };
+        let arm = arm([1.0; N], 0.0);
         let mut start = State::rest();
         start.velocity[0] = RATE;
-        let fastest = largest(
-            jacobian(&arm, &start)
-                .eigenvalues()
-                .iter()
-                .map(|m| m.modulus()),
-        );
-        let mut nudged = start;
-        nudged.position[1] = 1e-9;
+        let modes = jacobian(&arm, &start).eigenvalues();
+        let predicted = reach * RATE / largest(modes.iter().map(|mode| mode.modulus()));
+        start.position[1] = 1e-9;
         let measured = boundary(0.9 * expected, |angle| {
-            let mut simulation = free(arm, nudged, method, angle / RATE);
+            let mut simulation = free(arm, start, method, angle / RATE);
             // At any time: past its limit Runge-Kutta 4 takes spin away until it is within again.
             (0..400).all(|_| {
                 simulation.advance(10);
@@ -300,33 +218,41 @@ fn whirl_limits<const N: usize>(
                 angles.iter().skip(1).all(|q| q.abs() < 1e-6)
             })
         });
-        (method, expected, Some(reach * RATE / fastest), measured)
+        let both = [Some(predicted), measured];
+        let holds = both.iter().all(|limit| is_near(*limit, expected, 0.01));
+        (
+            holds,
+            format!("{method} {predicted:.4e} (measured {})", short(measured)),
+        )
     })
 }
 
 /// The rates of the motion about a whirl, by central differences: positions and velocities of the joints.
 fn jacobian<const N: usize>(arm: &Arm<N>, state: &State<N>) -> Matrix {
-    let acceleration = |column: usize, off: f64| {
-        let mut state = *state;
-        // Rates are differenced at their own scale.
-        if column < N {
-            state.position[column] += off;
+    const OFF: f64 = 1e-5;
+    // Rates are differenced at their own scale.
+    let scale = |column: usize| if column < N { OFF } else { 1000.0 * OFF };
+    let acceleration = |column: usize, side: f64| {
+        let State {
+            mut position,
+            mut velocity,
+        } = *state;
+        let values = if column < N {
+            &mut position
         } else {
-            state.velocity[column - N] += 1000.0 * off;
-        }
-        forward_dynamics(arm, &state.position, &state.velocity, &[0.0; N])
+            &mut velocity
+        };
+        values[column % N] += side * scale(column);
+        forward_dynamics(arm, &position, &velocity, &[0.0; N])
     };
-    let mut jacobian = Matrix::zeros(2 * N);
-    for i in 0..N {
-        jacobian[(i, N + i)] = 1.0;
-    }
-    for column in 0..2 * N {
-        let off = 1e-5;
-        let (above, below) = (acceleration(column, off), acceleration(column, -off));
-        let scale = if column < N { 2.0 * off } else { 2000.0 * off };
-        for i in 0..N {
-            jacobian[(N + i, column)] = (above[i] - below[i]) / scale;
+    let columns: Vec<_> = (0..2 * N)
+        .map(|column| (acceleration(column, 1.0), acceleration(column, -1.0)))
+        .collect();
+    Matrix::from_fn(2 * N, |row, column| {
+        if row < N {
+            return f64::from(u8::from(column == N + row));
         }
-    }
-    jacobian
+        let (above, below) = &columns[column];
+        (above[row - N] - below[row - N]) / (2.0 * scale(column))
+    })
 }

@@ -1,14 +1,13 @@
 //! S36 to S39: the methods themselves.
 //!
-//! **Invariant:** whatever a scene compares starts from the same state.
+//! **Invariant:** runs that a scene compares start from the same state.
 
 #![allow(
     clippy::indexing_slicing,
     reason = "indices name the joints of arrays of that length"
 )]
 
-use super::support::{Noise, apart, free, verdict};
-use super::{Observation, Scenario};
+use super::{Noise, Observation, Scenario, apart, each, free, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
@@ -20,38 +19,30 @@ use crate::study::stability::{Sampling, step_matrix};
 use crate::study::taylor::TaylorReference;
 
 pub(super) const SCENES: [Scenario; 4] = [
-    Scenario {
-        id: "S36",
-        name: "one joint",
-        parameters: "20 000 random oscillators, all methods",
-        expected: "one step is the step matrix to rounding; stable exactly where the closed forms say so",
-        slow: false,
-        check: one_joint,
-    },
-    Scenario {
-        id: "S37",
-        name: "another method, another timestep",
-        parameters: "3 links swinging; method and timestep change between steps",
-        expected: "position, velocity and time keep their bits at the change; a swing changed halfway keeps its order",
-        slow: false,
-        check: changes,
-    },
-    Scenario {
-        id: "S38",
-        name: "there and back",
-        parameters: "2 links, 1 s forward, velocities turned round, 1 s back; at 8, 4 and 2 ms",
-        expected: "comes back to within an error of the method's order; no method is exactly reversible here",
-        slow: false,
-        check: there_and_back,
-    },
-    Scenario {
-        id: "S39",
-        name: "step doubling",
-        parameters: "3 links, 50 random states, 1 ms, all methods",
-        expected: "estimated per true local error, median 0.98 to 1.03",
-        slow: false,
-        check: step_doubling,
-    },
+    Scenario::new(
+        "S36",
+        "20 000 random oscillators, all methods",
+        "one step is the step matrix to rounding; stable exactly where the closed forms say so",
+        one_joint,
+    ),
+    Scenario::new(
+        "S37",
+        "3 links swinging; method and timestep change between steps",
+        "position, velocity and time keep their bits at the change; a swing changed halfway keeps its order",
+        changes,
+    ),
+    Scenario::new(
+        "S38",
+        "2 links, 1 s forward, velocities turned round, 1 s back; at 8, 4 and 2 ms",
+        "comes back to within an error of the method's order; no method is exactly reversible here",
+        there_and_back,
+    ),
+    Scenario::new(
+        "S39",
+        "3 links, 50 random states, 1 ms, all methods",
+        "estimated per true local error, median 0.98 to 1.03",
+        step_doubling,
+    ),
 ];
 
 /// Stable by the closed forms, for `x'' = -ω² x - 2 z ω x'` with `w = (ω h)²`, `d = 2 z ω h`.
@@ -70,10 +61,8 @@ fn closed_form(method: Method, w: f64, d: f64) -> bool {
             let r = |re: f64, im: f64| {
                 let (mut sum, mut power) = ((1.0, 0.0), (1.0, 0.0));
                 for k in (1..=method.order()).map(f64::from) {
-                    power = (
-                        (power.0 * re - power.1 * im) / k,
-                        (power.0 * im + power.1 * re) / k,
-                    );
+                    let (a, b): (f64, f64) = power;
+                    power = ((a * re - b * im) / k, (a * im + b * re) / k);
                     sum = (sum.0 + power.0, sum.1 + power.1);
                 }
                 f64::hypot(sum.0, sum.1)
@@ -97,14 +86,8 @@ fn one_joint() -> Observation {
         for method in Method::ALL {
             let step = step_matrix(&linear, method, Sampling::Continuous, 1.0);
             let (x, v) = (noise.next(), noise.next());
-            let (dx, dv) = increment(
-                method,
-                |_, x: &[f64; 1], v: &[f64; 1]| [-w * x[0] - d * v[0]],
-                0.0,
-                &[x],
-                &[v],
-                1.0,
-            );
+            let acceleration = |_, x: &[f64; 1], v: &[f64; 1]| [-w * x[0] - d * v[0]];
+            let (dx, dv) = increment(method, acceleration, 0.0, &[x], &[v], 1.0);
             // Terms of up to (w + d)² / 2.
             let size = 1.0 + (w + d) * (w + d);
             let error =
@@ -133,19 +116,19 @@ fn swinging() -> State<3> {
 
 fn changes() -> Observation {
     let mut simulation = free(Arm::default(), swinging(), Method::Verlet, 0.001);
-    let mut kept = true;
-    for (method, timestep) in [
+    let changes = [
         (Method::Rk4, 0.001),
         (Method::Rk4, 0.0005),
         (Method::Midpoint, 0.003),
         (Method::Verlet, 0.001),
-    ] {
+    ];
+    let kept = changes.into_iter().all(|(method, timestep)| {
         simulation.advance(100);
         let before = (*simulation.state(), simulation.time());
         simulation.set_method(method);
         simulation.set_timestep(timestep);
-        kept &= before == (*simulation.state(), simulation.time());
-    }
+        before == (*simulation.state(), simulation.time())
+    });
     // Half a second of Verlet, half of Runge-Kutta 4: the error goes with the square of the timestep.
     let error = |steps: u64| {
         let timestep = 0.5 / in_f64(steps);
@@ -155,28 +138,21 @@ fn changes() -> Observation {
         mixed.advance(steps);
         let mut exact = TaylorReference::new(swinging());
         // Spans of a hundredth of a second, as far as the scheme carries.
-        let followed = (0..100).all(|_| exact.follow(mixed.arm(), &[0.0; 3], 0.01));
-        if followed {
-            apart(mixed.state(), exact.state())
-        } else {
-            f64::NAN
-        }
+        let is_followed = (0..100).all(|_| exact.follow(mixed.arm(), &[0.0; 3], 0.01));
+        let error = apart(mixed.state(), exact.state());
+        if is_followed { error } else { f64::NAN }
     };
     let slope = (error(500) / error(1000)).log2();
+    let bits = if kept { "kept" } else { "lost" };
     verdict(
         kept && (slope - 2.0).abs() < 0.2,
-        format!(
-            "bits {}; slope of the mixed swing {slope:.2}",
-            if kept { "kept" } else { "lost" }
-        ),
+        format!("bits {bits}; slope of the mixed swing {slope:.2}"),
     )
 }
 
 fn there_and_back() -> Observation {
-    let mut holds = true;
-    let mut observed = vec![];
-    for method in Method::ALL {
-        let missed = [125, 250, 500].map(|steps| {
+    each(Method::ALL.map(|method| {
+        let [_, coarse, fine] = [125, 250, 500].map(|steps| {
             let start = State {
                 position: [0.5, -0.5],
                 velocity: [0.2, 0.4],
@@ -190,53 +166,46 @@ fn there_and_back() -> Observation {
             }
             apart(simulation.state(), &start)
         });
-        let slope = (missed[1] / missed[2]).log2();
+        let slope = (coarse / fine).log2();
         // Errors there and back cancel in part: the order at least, up to one more.
         let order = f64::from(method.order());
-        holds &= slope > order - 0.3 && slope < order + 1.3 && missed[2] > 1e-13;
-        observed.push(format!("{method} {:.1e} (slope {slope:.1})", missed[2]));
-    }
-    verdict(holds, format!("missed at 2 ms by {}", observed.join(", ")))
+        let holds = slope > order - 0.3 && slope < order + 1.3 && fine > 1e-13;
+        (
+            holds,
+            format!("{method} misses by {fine:.1e} at 2 ms (slope {slope:.1})"),
+        )
+    }))
 }
 
 fn step_doubling() -> Observation {
     let h = 0.001;
     let arm = Arm::<3>::default();
-    let mut holds = true;
-    let mut observed = vec![];
-    for method in Method::ALL {
+    each(Method::ALL.map(|method| {
         let mut noise = Noise::new();
-        let mut ratios: Vec<f64> = (0..50)
-            .map(|_| {
-                let state = State {
-                    position: noise.array(3.0),
-                    velocity: noise.array(3.0),
-                };
-                let effort = noise.array(10.0);
-                let estimate = estimate_step(&arm, &state, &effort, method, h);
-                let true_error = local_error(&arm, &state, &effort, method, h);
-                estimate.map_or(f64::NAN, |estimate| estimate.local_error) / true_error
-            })
-            .collect();
+        let ratios = (0..50).map(|_| {
+            let (position, velocity) = (noise.array(3.0), noise.array(3.0));
+            let (state, effort) = (State { position, velocity }, noise.array(10.0));
+            let estimate = estimate_step(&arm, &state, &effort, method, h);
+            // The error of the step, against the arm followed to rounding.
+            let end = state_after(&arm, method, &state, &effort, h);
+            let mut exact = TaylorReference::new(state);
+            let is_followed = exact.follow(&arm, &effort, h);
+            let exact = exact.state().position;
+            let error = largest((0..3).map(|i| (end.position[i] - exact[i]).abs()));
+            let estimate = estimate.filter(|_| is_followed);
+            estimate.map_or(f64::NAN, |estimate| estimate.local_error / error)
+        });
+        let mut ratios: Vec<f64> = ratios.collect();
         ratios.sort_by(f64::total_cmp);
-        let median = ratios[ratios.len() / 2];
-        holds &= (0.98..=1.03).contains(&median);
-        observed.push(format!(
-            "{method} {median:.4} ({:.3} to {:.3})",
+        let (least, median, most) = (
             ratios[0],
-            ratios[ratios.len() - 1]
-        ));
-    }
-    verdict(holds, observed.join(", "))
-}
-
-/// The error of a step, against the arm followed to rounding \[rad\].
-fn local_error(arm: &Arm<3>, state: &State<3>, effort: &[f64; 3], method: Method, h: f64) -> f64 {
-    let end = state_after(arm, method, state, effort, h);
-    let mut exact = TaylorReference::new(*state);
-    if !exact.follow(arm, effort, h) {
-        return f64::NAN;
-    }
-    let exact = exact.state().position;
-    largest((0..3).map(|i| (end.position[i] - exact[i]).abs()))
+            ratios[ratios.len() / 2],
+            ratios[ratios.len() - 1],
+        );
+        let holds = (0.98..=1.03).contains(&median);
+        (
+            holds,
+            format!("{method} {median:.4} ({least:.3} to {most:.3})"),
+        )
+    }))
 }

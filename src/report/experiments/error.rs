@@ -1,0 +1,446 @@
+//! Error against cost: the same scenes for every method, each against one reference.
+//!
+//! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration. A run
+//! takes any number of equal steps. Its error is the largest, over joints and over its steps (or [`MOST_LOOKS`] or so
+//! of them), of the angles' distances to the reference, which is known at any instant. Cost is counted in evaluations
+//! of the dynamics here. For seconds, time [`Scene::replay`], which takes the same steps and does no more.
+//!
+//! **Invariant:** nothing is chosen per method: same starts, same timesteps, same reference, same measure.
+
+use super::reference::{DoubleDouble, Law, ReferencePath, largest_difference};
+use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
+use crate::math::dynamics::forward_dynamics;
+use crate::math::expression::Expression;
+use crate::math::integrator::{Method, increment, two_sum};
+use crate::math::particle::{MAX_STEPS, Particle};
+use crate::math::pid::{Gains, Pid, Setpoint};
+use crate::study::control_loop::{ControlLoop, no_control};
+use crate::study::linear::Linear;
+use crate::study::stability::{Sampling, largest_timestep};
+
+/// Steps of the coarsest run of a row: a power of two, so that the timesteps of a duration that is one too are exact.
+pub const OUTPUTS: u64 = 64;
+
+/// Steps after which a run is compared, at most twice as many: a millisecond apart in two seconds, where no peak of an
+/// error hides in between.
+pub const MOST_LOOKS: u64 = 2048;
+
+/// A run whose angles are off by a whole turn \[rad\] shows nothing any more, and counts as diverged.
+pub const LOST: f64 = std::f64::consts::TAU;
+
+/// Gains of the reach: soft enough that timesteps of tens of milliseconds are on both sides of the stability edge.
+pub const REACH_GAINS: Gains<2> = Gains {
+    kp: [200.0, 100.0],
+    ki: [0.0; 2],
+    kd: [30.0, 12.0],
+};
+
+/// Target of the reach, from the starting pose.
+pub const REACH_SETPOINT: Setpoint<2> = Setpoint {
+    position: [0.8, -0.6],
+    velocity: [0.0; 2],
+};
+
+/// The reach in words.
+pub const REACH: &str = "a reach of 2 links to (0.8, -0.6) with kp 200, 100 and kd 30, 12";
+
+/// The outcome of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunOutcome {
+    /// Steps that were to be taken.
+    pub steps: u64,
+    /// Length of each \[s\].
+    pub timestep: f64,
+    /// Evaluations of the dynamics, counted.
+    pub evaluations: u64,
+    /// Largest angle error over all comparisons and joints \[rad\] (\[m\] for the particle).
+    pub error: f64,
+    /// The last angles, summed \[rad\].
+    pub end: f64,
+    /// The time at which the run was lost or left the finite numbers \[s\], if it was.
+    pub diverged: Option<f64>,
+}
+
+impl RunOutcome {
+    fn new(steps: u64, duration: f64) -> Self {
+        Self {
+            steps,
+            timestep: duration / in_f64(steps),
+            evaluations: 0,
+            error: 0.0,
+            end: f64::NAN,
+            diverged: None,
+        }
+    }
+
+    /// Takes in the error after a step; `false` once it exceeds `most`, where the run is lost.
+    fn take(&mut self, step: u64, error: f64, most: f64) -> bool {
+        // NaN is lost too.
+        let is_known = error <= most;
+        if is_known {
+            self.error = self.error.max(error);
+        } else {
+            self.error = f64::INFINITY;
+            self.diverged = Some(self.timestep * in_f64(step));
+        }
+        is_known
+    }
+}
+
+/// Something to be computed by every method.
+pub trait Scene {
+    /// Short name, as files and tables use it.
+    fn name(&self) -> &'static str;
+    /// The scene in words, for a heading.
+    fn title(&self) -> &'static str;
+    /// Parameters in one line.
+    fn about(&self) -> String;
+    /// Number of links; 0 for the particle.
+    fn links(&self) -> usize;
+    /// How the effort is found: `none`, `continuous` or `held`.
+    fn control(&self) -> &'static str;
+    /// Simulated time \[s\].
+    fn duration(&self) -> f64;
+    /// How far the reference itself may be off \[rad\].
+    fn uncertainty(&self) -> f64;
+    /// Runs `steps` steps and compares.
+    fn run(&self, method: Method, steps: u64) -> RunOutcome {
+        self.run_within(method, steps, LOST)
+    }
+    /// As [`Scene::run`], but a run whose error exceeds `most` ends there and counts as diverged.
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome;
+    /// The same steps without counting or comparing: [`RunOutcome::end`].
+    fn replay(&self, method: Method, steps: u64) -> f64;
+    /// The largest stable timestep \[s\] as predicted for the scene's control at its setpoint, if it has one.
+    fn predicted_limit(&self, method: Method) -> Option<f64>;
+    /// Most steps of one run.
+    fn most_steps(&self) -> u64 {
+        u64::MAX
+    }
+}
+
+/// All scenes, in the order in which they are shown.
+#[must_use]
+pub fn scenes() -> Vec<Box<dyn Scene>> {
+    let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap_or_default();
+    let whirling = State {
+        position: [0.0, 0.5],
+        velocity: [10.0, 0.0],
+    };
+    let reach = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
+    let (two, three) = (Arm::<2>::default(), Arm::<3>::default());
+    let free = Drive::Held;
+    vec![
+        Box::new(ParticleScene),
+        Box::new(ArmScene::new(
+            "swing-2",
+            "Free swing, 2 links",
+            ControlLoop::free(two),
+            State::rest(),
+            free,
+        )),
+        Box::new(ArmScene::new(
+            "swing-3",
+            "Free swing, 3 links",
+            ControlLoop::free(three),
+            State::rest(),
+            free,
+        )),
+        Box::new(ArmScene::new(
+            "whirl-2",
+            "Whirl at 10 rad/s, no gravity",
+            ControlLoop::free(weightless),
+            whirling,
+            free,
+        )),
+        Box::new(ArmScene::new(
+            "reach-continuous",
+            "PD reach, law in every stage",
+            reach,
+            State::rest(),
+            Drive::Continuous,
+        )),
+        Box::new(ArmScene::new(
+            "reach-held",
+            "PD reach, effort held for the step",
+            reach,
+            State::rest(),
+            Drive::Held,
+        )),
+    ]
+}
+
+/// How the effort of an arm's scene is found. The reference is the law at every instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Drive {
+    /// The law in every stage of every step; its integral gains are 0.
+    Continuous,
+    /// As shipped: the law at the start of a step, its effort held for the step.
+    Held,
+}
+
+/// An arm in motion. The steps are those of the live arm, bit for bit, wherever the live arm can take them.
+struct ArmScene<const N: usize> {
+    name: &'static str,
+    title: &'static str,
+    control: ControlLoop<N>,
+    start: State<N>,
+    drive: Drive,
+    reference: ReferencePath<N>,
+}
+
+/// Simulated time of an arm's scene \[s\].
+const ARM_DURATION: f64 = 2.0;
+
+impl<const N: usize> ArmScene<N> {
+    fn new(
+        name: &'static str,
+        title: &'static str,
+        control: ControlLoop<N>,
+        start: State<N>,
+        drive: Drive,
+    ) -> Self {
+        let law = Law::Continuous(control.gains, control.setpoint);
+        let reference = ReferencePath::new(&control.arm, &start, &law, ARM_DURATION);
+        Self {
+            name,
+            title,
+            control,
+            start,
+            drive,
+            reference,
+        }
+    }
+
+    /// Takes steps and shows the state after each, until told to stop; `count` is called at every evaluation.
+    fn march(
+        &self,
+        method: Method,
+        steps: u64,
+        mut count: impl FnMut(),
+        mut show: impl FnMut(u64, &State<N>) -> bool,
+    ) {
+        let h = ARM_DURATION / in_f64(steps);
+        let mut pid = Pid::new(self.control.gains);
+        pid.set_setpoint(self.control.setpoint);
+        let law = |position: &[f64; N], velocity: &[f64; N]| {
+            let (position, velocity) = (*position, *velocity);
+            pid.control(&State { position, velocity }, 0.0).effort
+        };
+        let mut state = self.start;
+        let mut carry = State::<N>::rest();
+        for step in 1..=steps {
+            let held = law(&state.position, &state.velocity);
+            let acceleration = |_: f64, q: &[f64; N], v: &[f64; N]| {
+                count();
+                let effort = match self.drive {
+                    Drive::Continuous => law(q, v),
+                    Drive::Held => held,
+                };
+                forward_dynamics(&self.control.arm, q, v, &effort)
+            };
+            let State { position, velocity } = &state;
+            let (dq, dv) = increment(method, acceleration, 0.0, position, velocity, h);
+            add(&mut state.position, &mut carry.position, &dq);
+            add(&mut state.velocity, &mut carry.velocity, &dv);
+            if !show(step, &state) {
+                return;
+            }
+        }
+    }
+}
+
+fn add<const N: usize>(value: &mut [f64; N], carry: &mut [f64; N], increment: &[f64; N]) {
+    for ((value, carry), increment) in value.iter_mut().zip(carry).zip(increment) {
+        (*value, *carry) = two_sum(*value, increment + *carry);
+    }
+}
+
+impl<const N: usize> Scene for ArmScene<N> {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn title(&self) -> &'static str {
+        self.title
+    }
+
+    fn about(&self) -> String {
+        let ControlLoop {
+            arm,
+            gains,
+            setpoint,
+            ..
+        } = &self.control;
+        let law = match self.control() {
+            "none" => "no control".to_owned(),
+            kind => format!(
+                "effort {kind}, kp {:?}, kd {:?}, to {:?} rad, error against the law at every instant",
+                gains.kp, gains.kd, setpoint.position
+            ),
+        };
+        let State { position, velocity } = self.start;
+        format!(
+            "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
+             {ARM_DURATION} s",
+            arm.lengths(),
+            arm.masses(),
+            arm.gravity(),
+        )
+    }
+
+    fn links(&self) -> usize {
+        N
+    }
+
+    fn control(&self) -> &'static str {
+        match self.drive {
+            _ if self.control.gains == no_control() => "none",
+            Drive::Continuous => "continuous",
+            Drive::Held => "held",
+        }
+    }
+
+    fn duration(&self) -> f64 {
+        ARM_DURATION
+    }
+
+    fn uncertainty(&self) -> f64 {
+        self.reference.uncertainty()
+    }
+
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
+        let mut outcome = RunOutcome::new(steps, ARM_DURATION);
+        let timestep = outcome.timestep;
+        let every = steps.div_ceil(MOST_LOOKS).max(1);
+        let mut evaluations = 0;
+        let count = || evaluations += 1;
+        self.march(method, steps, count, |step, state| {
+            outcome.end = state.position.iter().sum();
+            if !step.is_multiple_of(every) && step < steps {
+                return true;
+            }
+            let exact = self.reference.after(step, timestep);
+            outcome.take(step, largest_difference(&exact, &state.position), most)
+        });
+        RunOutcome {
+            evaluations,
+            ..outcome
+        }
+    }
+
+    fn replay(&self, method: Method, steps: u64) -> f64 {
+        if self.drive == Drive::Continuous {
+            let mut end = f64::NAN;
+            let show = |_, state: &State<N>| {
+                end = state.position.iter().sum();
+                true
+            };
+            self.march(method, steps, || (), show);
+            return end;
+        }
+        let control = self.control.with_method(method);
+        let timestep = ARM_DURATION / in_f64(steps);
+        let mut simulation = control.with_timestep(timestep).simulation(self.start);
+        simulation.advance(steps);
+        simulation.state().position.iter().sum()
+    }
+
+    fn predicted_limit(&self, method: Method) -> Option<f64> {
+        let sampling = match self.drive {
+            _ if self.control.is_free() => return None,
+            Drive::Continuous => Sampling::Continuous,
+            Drive::Held => Sampling::Held,
+        };
+        largest_timestep(&Linear::at_setpoint(&self.control), method, sampling)
+    }
+}
+
+/// The 1-DOF service, expression and all, against its closed form with 106 bits: `ẍ = cos 2t`, so `x = x₀ + v₀ t + sin²
+/// t / 2`.
+struct ParticleScene;
+
+const FUNCTION: &str = "cos(2*t)";
+const X0: f64 = 0.5;
+const V0: f64 = -0.25;
+const DURATION: f64 = 8.0;
+
+impl ParticleScene {
+    fn particle(method: Method, steps: u64) -> Option<Particle> {
+        let function = Expression::parse(FUNCTION).ok()?;
+        Particle::new(function, X0, V0, DURATION / in_f64(steps), steps, method).ok()
+    }
+}
+
+fn exact(t: f64) -> DoubleDouble {
+    let real = DoubleDouble::from;
+    let (sin, _) = real(t).sin_cos();
+    real(X0) + real(V0) * real(t) + real(0.5) * sin * sin
+}
+
+impl Scene for ParticleScene {
+    fn name(&self) -> &'static str {
+        "particle"
+    }
+
+    fn title(&self) -> &'static str {
+        "1-DOF service, closed form"
+    }
+
+    fn about(&self) -> String {
+        format!("ẍ = {FUNCTION} from x = {X0} m, ẋ = {V0} m/s; {DURATION} s")
+    }
+
+    fn links(&self) -> usize {
+        0
+    }
+
+    fn control(&self) -> &'static str {
+        "none"
+    }
+
+    fn duration(&self) -> f64 {
+        DURATION
+    }
+
+    fn uncertainty(&self) -> f64 {
+        // Rounding of a closed form of a few operations at 106 bits.
+        1e-30
+    }
+
+    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
+        let mut outcome = RunOutcome::new(steps, DURATION);
+        let every = usize::try_from(steps.div_ceil(MOST_LOOKS)).unwrap_or(1);
+        let Some(mut particle) = Self::particle(method, steps) else {
+            return outcome;
+        };
+        let mut is_known = true;
+        while is_known && particle.advance(every.max(1)) > 0 {
+            let done = particle.done();
+            outcome.end = particle.positions().last().copied().unwrap_or(f64::NAN);
+            let error = exact(particle.time(done)).minus(outcome.end).abs();
+            is_known = outcome.take(done as u64, error, most);
+        }
+        RunOutcome {
+            evaluations: particle.evaluations(),
+            ..outcome
+        }
+    }
+
+    fn replay(&self, method: Method, steps: u64) -> f64 {
+        let Some(mut particle) = Self::particle(method, steps) else {
+            return f64::NAN;
+        };
+        particle.advance(usize::MAX);
+        particle.positions().last().copied().unwrap_or(f64::NAN)
+    }
+
+    fn predicted_limit(&self, _: Method) -> Option<f64> {
+        None
+    }
+
+    fn most_steps(&self) -> u64 {
+        MAX_STEPS
+    }
+}

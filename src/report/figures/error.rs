@@ -1,0 +1,447 @@
+//! Error against time and timestep, in every scene and for every method.
+//!
+//! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
+//! nothing is interpolated between two runs.
+
+use super::{slope, worst};
+use crate::math::count::in_f64;
+use crate::math::integrator::Method;
+use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
+use crate::report::section::{Cell, Section, Table, by_method};
+use crate::report::svg::{
+    Axis, Curve, Key, Mark, Plot, Point, Unit, number, power, scientific, seconds,
+};
+use crate::report::timing::{Effort, Timing, time};
+use crate::study::fewest::StepSearch;
+
+/// Errors between which a slope is fitted \[rad\]: above, higher orders still show; below, rounding does.
+const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
+
+/// The fewest steps for an error are found to this part of them.
+const RESOLUTION: u64 = 256;
+
+/// No search tries more steps than this: a method that needs more is far from the cheapest.
+const MOST_SEARCHED: u64 = 1 << 17;
+
+const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
+
+/// A scene with its runs.
+struct Data {
+    scene: Box<dyn Scene>,
+    /// Runs of ever half the timestep.
+    runs: Vec<Run>,
+    /// The run of each method that reaches each of [`TARGETS`] with the fewest steps.
+    reached: Vec<(f64, Run)>,
+}
+
+#[derive(Clone, Copy)]
+struct Run {
+    method: Method,
+    outcome: RunOutcome,
+    timing: Timing,
+}
+
+pub(super) fn make(section: &mut Section) {
+    let halvings = section.choose(15, 9);
+    let effort = section.choose(Effort::new(3, 25, 0.05), Effort::new(3, 7, 0.01));
+    let scenes = scenes().into_iter();
+    let data: Vec<Data> = scenes
+        .map(|scene| Data::new(scene, halvings, effort))
+        .collect();
+    findings(section, &data);
+    verdicts(section, &data);
+    section.table(&cheapest(&data));
+    against_time(section, &data);
+    against_timestep(section, &data);
+    section.table(&orders(&data));
+    section.table(&scene_list(&data));
+}
+
+impl Data {
+    fn new(scene: Box<dyn Scene>, halvings: u32, effort: Effort) -> Self {
+        let run = |method, outcome: RunOutcome| Run {
+            method,
+            outcome,
+            timing: time(effort, || scene.replay(method, outcome.steps)),
+        };
+        let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
+        let steps = steps.filter(|steps| *steps <= scene.most_steps());
+        let both = steps.flat_map(|steps| Method::ALL.map(|method| (method, steps)));
+        let runs: Vec<Run> = both
+            .map(|(method, steps)| run(method, scene.run(method, steps)))
+            .collect();
+        let mut reached = Vec::new();
+        for method in Method::ALL {
+            // A smaller error takes no fewer steps.
+            let mut least = 1;
+            for target in TARGETS {
+                let enough = runs
+                    .iter()
+                    .map(|run| (run.method, run.outcome))
+                    .find(|(of, it)| {
+                        *of == method && it.error <= target && it.steps <= MOST_SEARCHED
+                    });
+                let steps = enough.map(|(_, outcome)| (least, outcome.steps));
+                let fewest = steps.and_then(|steps| fewest(&*scene, method, target, steps));
+                least = fewest.map_or(least, |outcome| outcome.steps);
+                reached.extend(fewest.map(|outcome| (target, run(method, outcome))));
+            }
+        }
+        Self {
+            scene,
+            runs,
+            reached,
+        }
+    }
+
+    fn of(&self, method: Method) -> impl Iterator<Item = &Run> {
+        self.runs.iter().filter(move |run| run.method == method)
+    }
+
+    /// The runs that reach `target` with the fewest steps of their methods.
+    fn reaching(&self, target: f64) -> impl Iterator<Item = &Run> {
+        let is_near = move |one: &&(f64, Run)| (one.0 / target - 1.0).abs() < 0.1;
+        self.reached.iter().filter(is_near).map(|one| &one.1)
+    }
+
+    fn cost(&self, method: Method, target: f64) -> Option<&Run> {
+        self.reaching(target).find(|run| run.method == method)
+    }
+
+    fn order(&self, method: Method) -> Option<f64> {
+        let inside = self
+            .of(method)
+            .map(|run| (run.outcome.timestep, run.outcome.error));
+        let inside: Vec<_> = inside.filter(|run| ASYMPTOTIC.contains(&run.1)).collect();
+        // The four finest of them: near the stability edge an error falls faster than its order.
+        slope(inside.into_iter().rev().take(4))
+    }
+
+    /// Runs long enough to time a step.
+    fn long_runs(&self) -> impl Iterator<Item = &Run> {
+        self.runs.iter().filter(|run| run.outcome.steps >= 1000)
+    }
+
+    /// Time of one step \[s\]: the least that any long run shows.
+    fn step_time(&self, method: Method) -> Option<f64> {
+        let runs = self.long_runs().filter(|run| run.method == method);
+        runs.filter(|run| run.outcome.diverged.is_none())
+            .map(|run| run.timing.minimum / in_f64(run.outcome.steps))
+            .min_by(f64::total_cmp)
+    }
+
+    /// Median time of an evaluation \[s\] in long runs.
+    fn evaluation_time(&self) -> Option<f64> {
+        let times = self
+            .long_runs()
+            .map(|run| run.timing.minimum / in_f64(run.outcome.evaluations));
+        let mut times: Vec<f64> = times.collect();
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied()
+    }
+
+    fn unit(&self) -> &'static str {
+        if self.scene.links() == 0 { "m" } else { "rad" }
+    }
+
+    fn is_held(&self) -> bool {
+        self.scene.control() == "held"
+    }
+}
+
+/// The run that keeps within `target` with the fewest steps between the two, found to a part of [`RESOLUTION`].
+fn fewest(
+    scene: &dyn Scene,
+    method: Method,
+    target: f64,
+    (least, most): (u64, u64),
+) -> Option<RunOutcome> {
+    let mut search = StepSearch::new(least, most).to_part(RESOLUTION);
+    let mut best = None;
+    while let Some(steps) = search.wanted() {
+        let outcome = scene.run_within(method, steps, target);
+        search.tell(outcome.error <= target);
+        best = Some(outcome)
+            .filter(|outcome| outcome.error <= target)
+            .or(best);
+    }
+    best
+}
+
+fn evaluations(run: &Run) -> f64 {
+    in_f64(run.outcome.evaluations)
+}
+
+fn of<'a>(data: &'a [Data], name: &str) -> Option<&'a Data> {
+    data.iter().find(|data| data.scene.name() == name)
+}
+
+fn cheapest(data: &[Data]) -> Table {
+    let heads = TARGETS.map(|target| format!("{} rad", power(target.log10())));
+    let mut table = Table::new(
+        "cheapest",
+        "At a glance: the cheapest method for each error",
+        "Fewest evaluations. Under it: the timestep, evaluations and computing time for one simulated second, and how \
+         many times as many evaluations the next best method needs. Every cell is a run: that of the fewest steps found \
+         to keep the error. The particle's errors are in m.",
+        ["Scene"]
+            .into_iter()
+            .chain(heads.iter().map(String::as_str)),
+    );
+    for data in data {
+        let cells = TARGETS.map(|target| {
+            let mut reached: Vec<&Run> = data.reaching(target).collect();
+            reached.sort_by_key(|run| run.outcome.evaluations);
+            let Some(run) = reached.first() else {
+                return Cell::new("not reached").class("soft");
+            };
+            let next = reached.get(1).map(|next| {
+                let more = number(evaluations(next) / evaluations(run));
+                format!("; {} ×{more}", next.method)
+            });
+            let per_second = (evaluations(run) / data.scene.duration()).round();
+            Cell::method(run.method).detail(format!(
+                "dt {}; {} evaluations, {} per s{}",
+                seconds(run.outcome.timestep),
+                number(per_second),
+                seconds(run.timing.minimum / data.scene.duration()),
+                next.unwrap_or_default()
+            ))
+        });
+        let title = Cell::new(data.scene.title());
+        table.rows.push([title].into_iter().chain(cells).collect());
+    }
+    table
+}
+
+fn orders(data: &[Data]) -> Table {
+    let mut table = Table::new(
+        "orders",
+        "Fitted orders",
+        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad. Under it: the \
+         smallest error that any timestep gave.",
+        by_method(&["Scene"]),
+    );
+    for data in data {
+        let cells = Method::ALL.map(|method| {
+            let errors = data.of(method).map(|run| run.outcome.error);
+            let order = data.order(method).map(|order| format!("{order:.2}"));
+            let least = scientific(errors.fold(f64::INFINITY, f64::min));
+            let order = Cell::new(order.unwrap_or_else(|| "too few points".to_owned()));
+            order.detail(format!("down to {least}"))
+        });
+        let title = Cell::new(data.scene.title());
+        table.rows.push([title].into_iter().chain(cells).collect());
+    }
+    table
+}
+
+fn scene_list(data: &[Data]) -> Table {
+    let mut table = Table::new(
+        "scenes",
+        "The scenes",
+        "Uncertainty: how far the reference itself may be off.",
+        ["Scene", "Parameters", "Uncertainty"],
+    );
+    let row = |Data { scene, .. }: &Data| {
+        let uncertainty = scientific(scene.uncertainty());
+        vec![
+            Cell::new(scene.title()),
+            Cell::new(scene.about()),
+            Cell::new(uncertainty),
+        ]
+    };
+    table.rows.extend(data.iter().map(row));
+    table
+}
+
+/// A panel for each scene. All share the error axis, so that scenes can be compared.
+fn plots(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
+    let plot = |data: &Data| {
+        let label = match data.unit() {
+            "m" => "largest error [m]",
+            _ => "largest error [rad]",
+        };
+        let y = Axis::log(label, Unit::Number, (1e-17, 10.0));
+        let mut plot = Plot::new(data.scene.title(), x.clone(), y);
+        plot.curves.extend(Method::ALL.map(|method| {
+            let points = data.of(method).map(|run| {
+                let RunOutcome {
+                    timestep,
+                    error,
+                    evaluations,
+                    ..
+                } = run.outcome;
+                let outcome = match error.is_finite() {
+                    true => format!("error {} {}", scientific(error), data.unit()),
+                    false => "diverged".to_owned(),
+                };
+                let times = [seconds(timestep), seconds(run.timing.minimum)].join(" in ");
+                let tooltip = format!("{method}: dt {times}, {evaluations} evaluations: {outcome}");
+                // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
+                Point::new(of(run), error.max(1e-17), tooltip)
+            });
+            Curve::line(Key::of(method), points)
+        }));
+        plot.marks
+            .push(Mark::Horizontal(f64::EPSILON, "soft", "rounding"));
+        plot
+    };
+    data.iter().map(plot).collect()
+}
+
+fn against_time(section: &mut Section, data: &[Data]) {
+    let all = data.iter().flat_map(|data| &data.runs);
+    let times = all.map(|run| run.timing.minimum);
+    let x = Axis::around("time for the whole run", Unit::Seconds, times);
+    let mut plots = plots(data, &x, |run| run.timing.minimum);
+    for (plot, data) in plots.iter_mut().zip(data) {
+        plot.above = data.evaluation_time();
+        let points = plot.curves.iter_mut().flat_map(|curve| &mut curve.points);
+        let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
+        for (point, run) in points.zip(runs) {
+            point.spread = Some(run.timing.quartiles);
+        }
+    }
+    let swing = of(data, "swing-2");
+    let cost = |method| swing.and_then(|data| data.cost(method, 1e-6));
+    let title = match (cost(Method::Rk4), cost(Method::Verlet), swing) {
+        (Some(rk4), Some(verlet), Some(data)) => format!(
+            "An error of 10⁻⁶ rad costs RK4 {} and Verlet {} of computing time for {} s of a free swing",
+            seconds(rk4.timing.minimum),
+            seconds(verlet.timing.minimum),
+            number(data.scene.duration())
+        ),
+        _ => "Error against time".to_owned(),
+    };
+    section.figure(
+        "work-precision-time",
+        &title,
+        "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is \
+         the minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
+         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. Dotted \
+         line: one unit in the last place of 1 rad. The error of a reach is the distance from a law that acts at every \
+         instant. The distance from the loop whose law runs once a period is the truncation in the figure of the \
+         error's parts. Each mark's tooltip has its own evaluations.",
+        &plots.iter().map(Plot::draw).collect::<Vec<_>>(),
+    );
+}
+
+fn against_timestep(section: &mut Section, data: &[Data]) {
+    let all = data.iter().flat_map(|data| &data.runs);
+    let timesteps = all.map(|run| run.outcome.timestep);
+    let x = Axis::around("timestep", Unit::Seconds, timesteps);
+    let mut plots = plots(data, &x, |run| run.outcome.timestep);
+    for (plot, data) in plots.iter_mut().zip(data) {
+        plot.marks
+            .extend(Method::ALL.into_iter().filter_map(|method| {
+                let limit = data.scene.predicted_limit(method)?;
+                let tooltip = format!("{method}: predicted stability limit {}", seconds(limit));
+                Some(Mark::Vertical(limit, method.name(), tooltip))
+            }));
+        plot.marks
+            .push(Mark::Slopes((x.max / 60.0, 1e-14), [1.0, 2.0, 4.0]));
+    }
+    let held = data.iter().find(|data| data.is_held());
+    let order = |method| {
+        let order = held.and_then(|data| data.order(method));
+        order.map_or_else(|| "?".to_owned(), |order| format!("{order:.2}"))
+    };
+    section.figure(
+        "convergence",
+        &format!(
+            "Every method shows its order, until the effort is held: then RK4's is {} and Verlet's {}",
+            order(Method::Rk4),
+            order(Method::Verlet)
+        ),
+        "The runs of the figure before, by timestep: the slope is the order of the method. Dotted upright lines: the \
+         predicted largest stable timestep at the setpoint, one per method. The three strokes show orders 1, 2 and 4.",
+        &plots.iter().map(Plot::draw).collect::<Vec<_>>(),
+    );
+}
+
+fn findings(section: &mut Section, data: &[Data]) {
+    let swing = of(data, "swing-2");
+    let cost = |method| swing.and_then(|swing| swing.cost(method, 1e-4));
+    if let (Some(swing), Some(rk4), Some(verlet)) = (swing, cost(Method::Rk4), cost(Method::Verlet))
+    {
+        let times = |other: f64| number(other / evaluations(rk4));
+        // Euler takes an evaluation a step.
+        let euler = cost(Method::Euler).map(|euler| times(evaluations(euler)));
+        let euler = euler.unwrap_or_else(|| format!("over {}", times(in_f64(MOST_SEARCHED))));
+        section.find(format!(
+            "**To stay within 10⁻⁴ rad of the true motion on a free 2-link swing of {} s RK4 takes steps of {}**, and \
+             {} evaluations per simulated second. Verlet needs {} times as many and Euler {euler} times.",
+            number(swing.scene.duration()),
+            seconds(rk4.outcome.timestep),
+            number((evaluations(rk4) / swing.scene.duration()).round()),
+            times(evaluations(verlet)),
+        ));
+    }
+    let held = of(data, "reach-held");
+    // 2 s in 2048 steps: the power of two next to the default timestep.
+    let at = |method| held.and_then(|held| held.of(method).find(|run| run.outcome.steps == 2048));
+    if let (Some(rk4), Some(verlet)) = (at(Method::Rk4), at(Method::Verlet)) {
+        section.find(format!(
+            "**Against a law that acts at every instant RK4 is no better than Verlet, once the effort is held for each \
+             step**. On {REACH} they are {} and {} rad off at a timestep of {}. The control period decides there.",
+            scientific(rk4.outcome.error),
+            scientific(verlet.outcome.error),
+            seconds(rk4.outcome.timestep)
+        ));
+    }
+    let step = |name| of(data, name).and_then(|data| data.step_time(Method::Rk4));
+    if let (Some(two), Some(three)) = (step("swing-2"), step("swing-3")) {
+        section.find(format!(
+            "**One RK4 step takes {} with 2 links and {} with 3**. At the default 1 ms the arm runs {} and {} times \
+             faster than the clock.",
+            seconds(two),
+            seconds(three),
+            number(1e-3 / two),
+            number(1e-3 / three),
+        ));
+    }
+}
+
+fn verdicts(section: &mut Section, data: &[Data]) {
+    let all = data
+        .iter()
+        .flat_map(|data| Method::ALL.map(|method| (data, method)));
+    let fitted = all.filter_map(|(data, method)| {
+        let expected = if data.is_held() {
+            1.0
+        } else {
+            f64::from(method.order())
+        };
+        let order = data.order(method)?;
+        let title = data.scene.title();
+        Some((
+            (order - expected).abs(),
+            format!("{method} in {title}, {order:.2} for {expected:.0}"),
+        ))
+    });
+    let furthest = fitted.max_by(|one, other| one.0.total_cmp(&other.0));
+    let (off, seen) = furthest.unwrap_or((f64::INFINITY, "no slope fitted".to_owned()));
+    section.claim(
+        "Every method converges at its order, and at order 1 where the effort is held (slopes within 0.35)",
+        format!("furthest off: {seen}"),
+        off <= 0.35,
+    );
+    let errors = data
+        .iter()
+        .flat_map(|data| &data.runs)
+        .map(|run| run.outcome.error);
+    let smallest = errors
+        .filter(|error| *error > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let uncertainty = worst(data.iter().map(|data| data.scene.uncertainty()));
+    section.claim(
+        "References are at least 100 times better known than the smallest error shown",
+        format!(
+            "uncertainty at most {}, smallest error {}",
+            scientific(uncertainty),
+            scientific(smallest)
+        ),
+        uncertainty * 100.0 <= smallest,
+    );
+}

@@ -1,0 +1,504 @@
+//! The largest stable timestep and control period: predicted, measured, mapped over gains, and why.
+//!
+//! **Invariant:** prediction and measurement share the arm and the gains, and nothing else.
+
+use std::f64::consts::TAU;
+
+use super::{centres, edges, worst};
+use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::report::experiments::growth::growth_per_period;
+use crate::report::experiments::measure::{STEPS, decays, growths, measured_limit, stiffened};
+use crate::report::section::{Cell, Section, Table, by_method};
+use crate::report::svg::{
+    Axis, Curve, Key, Mark, Marker, Panel, Plot, Point, Unit, number, seconds,
+};
+use crate::study::control_loop::ControlLoop;
+use crate::study::linear::Linear;
+use crate::study::stability::{
+    Limits, Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix,
+    step_matrix,
+};
+
+pub(super) fn make(section: &mut Section) {
+    let lines = [two_links(), three_links()].concat();
+    findings(section, &lines);
+    map(section);
+    regions(section);
+    control_period(section);
+    section.table(&limits_table(&lines));
+}
+
+/// Predicted and measured limit of a loop, the smallest of all poses, and the advice.
+#[derive(Clone)]
+struct LimitRow {
+    loop_name: String,
+    method: Method,
+    sampling: Sampling,
+    predicted: f64,
+    measured: Option<f64>,
+    others: [Option<f64>; 2],
+}
+
+impl LimitRow {
+    /// How far the measured limit is from the predicted one, as a part of it.
+    fn off(&self) -> f64 {
+        let measured = self.measured.unwrap_or(f64::INFINITY);
+        (measured / self.predicted - 1.0).abs()
+    }
+}
+
+fn two_links() -> Vec<LimitRow> {
+    let gains = |kp, kd| Gains {
+        kp,
+        ki: [0.0; 2],
+        kd,
+    };
+    let at = [0.4, 0.8];
+    [
+        rows("mild", gains([200.0, 100.0], [30.0, 12.0]), at),
+        rows("default", Gains::default(), at),
+        rows("stiff", gains([1e4; 2], [200.0, 60.0]), at),
+        rows("overdamped", gains([200.0; 2], [500.0; 2]), at),
+    ]
+    .concat()
+}
+
+fn three_links() -> Vec<LimitRow> {
+    let gains = |kp, kd| Gains {
+        kp,
+        ki: [0.0; 3],
+        kd,
+    };
+    let at = [0.4, 0.8, -0.5];
+    [
+        rows("default", Gains::default(), at),
+        rows("stiff", gains([1e4; 3], [300.0, 100.0, 30.0]), at),
+        rows("overdamped", gains([200.0; 3], [500.0; 3]), at),
+    ]
+    .concat()
+}
+
+/// A row for each method and sampling at which the loop is stable at some timestep.
+fn rows<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> Vec<LimitRow> {
+    let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
+    let of_method = |method| {
+        let control = control.with_method(method);
+        let limits = limits(&control);
+        Sampling::ALL.map(|sampling| row(name, &control, &limits, sampling))
+    };
+    Method::ALL
+        .into_iter()
+        .flat_map(of_method)
+        .flatten()
+        .collect()
+}
+
+fn row<const N: usize>(
+    name: &str,
+    control: &ControlLoop<N>,
+    limits: &Limits<N>,
+    sampling: Sampling,
+) -> Option<LimitRow> {
+    let (predicted, others) = match sampling {
+        Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
+        Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
+    };
+    let predicted = predicted.filter(|limit| *limit > 0.0)?;
+    Some(LimitRow {
+        loop_name: format!("{N} links, {name} gains"),
+        method: control.method,
+        sampling,
+        predicted,
+        measured: measured_limit(control, sampling, predicted),
+        others,
+    })
+}
+
+fn limits_table(lines: &[LimitRow]) -> Table {
+    let mut table = Table::new(
+        "limits",
+        "Largest stable timesteps",
+        "At (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5). Predicted from the loop linearised where it rests; measured by \
+         nudging the arm itself and watching whether it settles. Then the smallest limit of all poses, bounded where \
+         it can be, and 0.8 times that as advice. Held for the step, the limit belongs to the control period: the \
+         effort answers a state that is up to a step old. In every stage it belongs to the method.",
+        by_method(&["Loop", "Control"]),
+    );
+    let mut rest = lines;
+    while let Some(first) = rest.first() {
+        let (of_loop, others) = rest.split_at(
+            rest.iter()
+                .take_while(|it| it.loop_name == first.loop_name)
+                .count(),
+        );
+        rest = others;
+        for sampling in Sampling::ALL {
+            let words = match sampling {
+                Sampling::Held => "effort held for the step (as the live arm does)",
+                Sampling::Continuous => "law in every stage",
+            };
+            let mut row = vec![Cell::new(&first.loop_name), Cell::new(words)];
+            row.extend(Method::ALL.map(|method| {
+                let mut of = of_loop.iter();
+                let of = of.find(|it| it.method == method && it.sampling == sampling);
+                of.map_or_else(|| Cell::new("none").class("bad"), limit_cell)
+            }));
+            table.rows.push(row);
+        }
+    }
+    table
+}
+
+fn limit_cell(line: &LimitRow) -> Cell {
+    let said = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), seconds);
+    let mut details = vec![format!("measured {}", said(line.measured))];
+    for (name, limit) in ["all poses", "advised"].into_iter().zip(line.others) {
+        details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
+    }
+    Cell::new(seconds(line.predicted)).detail(details.join(", "))
+}
+
+fn findings(section: &mut Section, lines: &[LimitRow]) {
+    let at = |sampling, method| {
+        lines.iter().find(|line| {
+            (line.sampling, line.method) == (sampling, method)
+                && line.loop_name == "2 links, default gains"
+        })
+    };
+    if let (Some(verlet), Some(rk4), Some(continuous)) = (
+        at(Sampling::Held, Method::Verlet),
+        at(Sampling::Held, Method::Rk4),
+        at(Sampling::Continuous, Method::Rk4),
+    ) {
+        section.find(format!(
+            "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
+             Verlet**. Both limits are the same, since the effort is held for the step. With the law in every stage \
+             RK4 would be stable up to {}. That limit belongs to the simulation. The first one belongs to the \
+             controller, and a real arm would show it. The smallest limit of all poses is {}.",
+            seconds(rk4.predicted),
+            seconds(verlet.predicted),
+            seconds(continuous.predicted),
+            seconds(rk4.others.first().copied().flatten().unwrap_or(f64::NAN)),
+        ));
+    }
+    let furthest = worst(lines.iter().map(LimitRow::off));
+    section.find(format!(
+        "**The linearised loop predicts the arm's own limit to {} %** in {} cases: 2 and 3 links, mild to overdamped \
+         gains, all methods, both kinds of control.",
+        number(100.0 * furthest),
+        lines.len()
+    ));
+    section.claim(
+        format!(
+            "Predicted and measured limits agree to 1 % in all {} cases",
+            lines.len()
+        ),
+        format!("furthest apart {} %", number(100.0 * furthest)),
+        furthest <= 0.01,
+    );
+}
+
+/// Ends of the map's axes: timestep \[s\], factor on the default gains.
+const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
+const FACTORS: (f64, f64) = (1e-2, 1e2);
+
+/// Does a nudge of the arm die out or grow, by timestep and stiffness, beside the predicted line.
+fn map(section: &mut Section) {
+    let columns = section.choose(48, 16);
+    let timestep_edges = edges(TIMESTEPS, columns);
+    let timesteps = centres(&timestep_edges);
+    let factors = centres(&edges(FACTORS, columns * 3 / 4));
+    let mut plot = Plot::new(
+        "All methods",
+        Axis::log("timestep", Unit::Seconds, TIMESTEPS),
+        Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
+    );
+    let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
+    let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
+    for (method, sampling) in all.into_iter().flatten() {
+        let control = |factor| stiffened(factor).with_method(method);
+        let all = factors.iter().flat_map(|factor| {
+            let timesteps = timesteps.iter();
+            timesteps.map(|h| control(*factor).with_timestep(*h))
+        });
+        let growth = growths(&all.collect::<Vec<_>>(), sampling);
+        let (mut predicted, mut measured) = (Vec::new(), Vec::new());
+        for (factor, growth) in factors.iter().zip(growth.chunks(columns)) {
+            let linear = Linear::at_setpoint(&control(*factor));
+            let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
+            predicted.push((limit, *factor));
+            for (h, growth) in timesteps.iter().zip(growth) {
+                // The watch is too short to tell where the slowest mode changes its energy by less than a factor e.
+                // Measurements have no part in this.
+                let radius = step_matrix(&linear, method, sampling, *h).spectral_radius();
+                if 2.0 * in_f64(STEPS) * radius.ln().abs() < 1.0 {
+                    undecided += 1;
+                } else {
+                    cells += 1;
+                    disagreeing += usize::from(decays(*growth) != (*h < limit));
+                }
+            }
+            // The edge below the first cell in which a nudge grew.
+            let first = growth.iter().position(|growth| !decays(*growth));
+            let edge = first.filter(|first| *first > 0 && limit > 0.0);
+            measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
+                let said = [seconds(*h), seconds(limit)].join(", predicted ");
+                let kind = sampling.name();
+                Point::new(
+                    *h,
+                    *factor,
+                    format!("{method}, {kind}: unstable from {said}"),
+                )
+            }));
+        }
+        let key = Key::of(method).marked(Marker::None);
+        let is_held = sampling == Sampling::Held;
+        let key = if is_held { key } else { key.dashed() };
+        plot.curves.push(Curve::line(key, predicted));
+        plot.curves.push(Curve::dots(Key::of(method), measured));
+    }
+    section.claim(
+        "At most 1 % of the map's cells that can be judged disagree with the prediction",
+        format!("{disagreeing} of {cells}; {undecided} more, agreeing or not, change too slowly to judge"),
+        disagreeing * 100 <= cells,
+    );
+    let agreeing = cells - disagreeing;
+    section.figure(
+        "stability-map",
+        &format!(
+            "Predicted and measured stability agree in {agreeing} of {cells} cells; {undecided} change too slowly to judge"
+        ),
+        "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power of \
+         3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as the \
+         live arm has it. Dashed lines: with the law in every stage. Marks: the shortest timestep at which a nudge of \
+         the arm itself grew. In the lowest rows the gains are too weak to carry the arm against gravity, and no \
+         timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
+         energy by less than a factor e in the 4000 steps watched.",
+        &[plot.draw()],
+    );
+}
+
+/// Timesteps of the eigenvalues, in parts of the limit, and how many are shown.
+const PARTS: (f64, f64) = (0.05, 1.25);
+const SHOWN: u32 = 25;
+/// Timesteps of the runs, in parts of the limit.
+const RUNS: [f64; 2] = [0.97, 1.03];
+/// How far a run begins from the setpoint \[rad\].
+const NUDGE: f64 = 1e-6;
+
+/// The looks below the limit and beyond it.
+fn sides() -> [Key; 2] {
+    [
+        Key::line("c1", "below the limit").marked(Marker::Circle),
+        Key::line("c2", "beyond it").marked(Marker::Square),
+    ]
+}
+
+/// Why a loop goes unstable: the eigenvalues of one step as the timestep grows, and the run that diverges.
+fn regions(section: &mut Section) {
+    let limited = Method::ALL.into_iter().filter_map(|method| {
+        let control = stiffened(1.0).with_method(method);
+        Some((control, limit_held(&control)?))
+    });
+    let limited: Vec<_> = limited.collect();
+    let circles = limited
+        .iter()
+        .map(|(control, limit)| eigenvalues(control, *limit));
+    let runs = limited.iter().map(|(control, limit)| runs(control, *limit));
+    section.figure(
+        "regions",
+        "Why: beyond the limit one eigenvalue leaves the unit circle, and the arm flips at every step",
+        &format!(
+            "2 links held at (0.4, 0.8) with the default gains. Top: the eigenvalues of one step of the linearised loop, \
+             and the unit circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they begin near \
+             1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
+            PARTS.0, PARTS.1, RUNS[0], RUNS[1]
+        ),
+        &circles.chain(runs).collect::<Vec<Panel>>(),
+    );
+}
+
+fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Panel {
+    let method = control.method;
+    // As wide as it is high, on the paper.
+    let mut plot = Plot::new(
+        format!("{method}: stable up to {}", seconds(limit)),
+        Axis::linear("real part", (-1.7, 1.7)),
+        Axis::linear("imaginary part", (-1.2, 1.2)),
+    );
+    let angles = (0..=120).map(|part| TAU * f64::from(part) / 120.0);
+    let circle = angles.map(|angle| (angle.cos(), angle.sin()));
+    plot.curves
+        .push(Curve::line(Key::line("ink", "the unit circle"), circle));
+    let linear = Linear::at_setpoint(control);
+    let mut points = [Vec::new(), Vec::new()];
+    for index in 0..SHOWN {
+        let part = PARTS.0 + (PARTS.1 - PARTS.0) * f64::from(index) / f64::from(SHOWN - 1);
+        let h = part * limit;
+        let values = step_matrix(&linear, method, Sampling::Held, h).eigenvalues();
+        let [below, beyond] = &mut points;
+        let side = if part <= 1.0 { below } else { beyond };
+        side.extend(values.into_iter().map(|value| {
+            let words = format!("{}: {:.3} {:+.3} i", seconds(h), value.re, value.im);
+            Point::new(value.re, value.im, words)
+        }));
+    }
+    let dots = sides().into_iter().zip(points);
+    plot.curves
+        .extend(dots.map(|(key, points)| Curve::dots(key, points)));
+    plot.draw()
+}
+
+fn runs(control: &ControlLoop<2>, limit: f64) -> Panel {
+    const DURATION: f64 = 3.0;
+    let y = "distance from the setpoint [rad]";
+    let mut plot = Plot::new(
+        format!("{}: the arm at both sides of it", control.method),
+        Axis::linear("simulated time [s]", (0.0, DURATION)),
+        Axis::log(y, Unit::Number, (1e-12, 1e2)),
+    );
+    let setpoint = control.setpoint.position;
+    for (part, key) in RUNS.into_iter().zip(sides()) {
+        let h = part * limit;
+        // At rest at its setpoint, its integral carrying the load, brought there with short steps.
+        let settling = control.with_method(Method::Rk4).with_timestep(1e-3);
+        let mut live = settling.simulation(State::at_rest(setpoint));
+        live.advance(30_000);
+        live.set_method(control.method);
+        live.set_timestep(h);
+        live.set_state(State::at_rest(setpoint.map(|position| position + NUDGE)));
+        let mut points = Vec::new();
+        let mut time = 0.0;
+        while time < DURATION && live.step() {
+            time += h;
+            let off = live.state().position.iter().zip(&setpoint);
+            let off = off.map(|(one, other)| (one - other).abs());
+            points.push((time, off.fold(1e-12, f64::max)));
+        }
+        plot.curves
+            .push(Curve::line(key.marked(Marker::None), points));
+    }
+    plot.marks.push(Mark::Horizontal(NUDGE, "soft", ""));
+    plot.draw()
+}
+
+/// Ends of the axis of control periods \[s\], and the growth up to which curves are drawn.
+const PERIODS: (f64, f64) = (5e-4, 2e-2);
+const GROWTH: (f64, f64) = (0.85, 1.15);
+
+/// Steps per control period with their looks.
+const SUBSTEPS: [(u32, &str, &str, Marker); 3] = [
+    (1, "1 step per period", "c2", Marker::Square),
+    (10, "10 steps per period", "c3", Marker::Triangle),
+    (100, "100 steps per period", "c1", Marker::Circle),
+];
+
+/// Growth of a nudge per control period, predicted and measured.
+#[derive(Default)]
+struct Growth {
+    dots: u32,
+    /// How far the furthest dot lies from its curve, as a part of the growth.
+    furthest: f64,
+    /// How far curves of 1, 10 and 100 steps are apart at most, for methods of order 2 and more, and their limits.
+    apart: f64,
+    limits: Vec<f64>,
+}
+
+fn control_period(section: &mut Section) {
+    let dots = section.choose(12, 4);
+    let mut growth = Growth::default();
+    let panels = Method::ALL.map(|method| growth.panel(method, dots));
+    let Growth {
+        dots,
+        furthest,
+        apart,
+        limits,
+    } = growth;
+    let smallest = limits.iter().copied().fold(f64::INFINITY, f64::min);
+    let spread = worst(limits) / smallest - 1.0;
+    section.claim(
+        "With a held effort midpoint, Verlet and RK4 share one limit of the control period, however many steps it is \
+         cut into (within 0.1 %)",
+        format!("{} % between the smallest and the largest", number(100.0 * spread)),
+        spread <= 1e-3,
+    );
+    let (apart, furthest_percent) = (number(100.0 * apart), number(100.0 * furthest));
+    section.claim(
+        "A deviation of the arm grows per control period as the spectral radius says (within 0.1 %)",
+        format!("furthest off {furthest_percent} % in {dots} measurements with 1, 10 and 100 steps per period"),
+        furthest <= 1e-3,
+    );
+    section.figure(
+        "control-period",
+        &format!(
+            "1, 10 and 100 steps per control period give the same growth to {apart} % from order 2 on; {dots} \
+             measurements lie on their curves to {furthest_percent} %"
+        ),
+        "2 links, default gains, effort held over the period. Curves: spectral radius of one control period of the \
+         linearised loop. Dots: the growth of a nudge of the arm itself per period, over 4000 periods. The largest \
+         stable control period is where a curve crosses 1: shorter steps buy nothing. Only Euler with one step per \
+         period has a curve of its own.",
+        &panels,
+    );
+}
+
+impl Growth {
+    fn panel(&mut self, method: Method, dots: u32) -> Panel {
+        let control = stiffened(1.0).with_method(method);
+        let linear = Linear::at_setpoint(&control);
+        let x = Axis::log("control period", Unit::Seconds, PERIODS);
+        let y = Axis::linear("growth per control period", GROWTH);
+        let mut plot = Plot::new(method.name(), x, y);
+        plot.marks
+            .push(Mark::Horizontal(1.0, "ink", "unstable above"));
+        for (turn, (substeps, label, class, marker)) in (0..).zip(SUBSTEPS) {
+            let predicted = |substeps, period| {
+                period_matrix(&linear, method, substeps, period).spectral_radius()
+            };
+            let curve = (0..=200).map(|index| along(index, 200));
+            let curve = curve.map(|period| (period, predicted(substeps, period)));
+            let key = Key::line(class, label).marked(marker);
+            let is_shown = |growth: f64| growth <= GROWTH.1;
+            plot.curves.push(Curve::line(
+                key.clone().marked(Marker::None),
+                curve.filter(|it| is_shown(it.1)),
+            ));
+            // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
+            let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
+            let limit = largest_period(&linear, method, substeps);
+            let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
+            let steep =
+                around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * f64::from(turn)));
+            let mut points = Vec::new();
+            for period in even
+                .chain(steep)
+                .filter(|period| is_shown(predicted(substeps, *period)))
+            {
+                let expected = predicted(substeps, period);
+                let measured = growth_per_period(&control.with_timestep(period), substeps);
+                let measured = measured.unwrap_or(f64::INFINITY);
+                if method != Method::Euler {
+                    self.apart = self
+                        .apart
+                        .max((expected / predicted(1, period) - 1.0).abs());
+                }
+                self.dots += 1;
+                self.furthest = self.furthest.max((measured / expected - 1.0).abs());
+                let said = format!("{measured:.5} measured, {expected:.5} predicted");
+                let tooltip = format!("{substeps} steps in {}: {said}", seconds(period));
+                points.push(Point::new(period, measured, tooltip));
+            }
+            plot.curves.push(Curve::dots(key, points));
+            self.limits
+                .extend(limit.filter(|_| method != Method::Euler));
+        }
+        plot.draw()
+    }
+}
+
+fn along(index: u32, count: u32) -> f64 {
+    PERIODS.0 * (PERIODS.1 / PERIODS.0).powf(f64::from(index) / f64::from(count))
+}

@@ -1,0 +1,502 @@
+//! Work that a scene does not need, and whether it is left out.
+//!
+//! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page. A missing count is said to be
+//! unmeasured.
+//!
+//! **Invariant:** no number in here that was not measured for this report.
+
+use std::collections::HashMap;
+use std::hint::black_box;
+
+use crate::math::arm::State;
+use crate::math::count::in_f64;
+use crate::math::dynamics::forward_dynamics;
+use crate::math::expression::Expression;
+use crate::math::integrator::{Method, increment};
+use crate::math::particle::Particle;
+use crate::math::pid::Gains;
+use crate::math::simulation::{Simulation, step_under};
+use crate::report::experiments::step_scene::{ready, undamped};
+use crate::report::section::{Cell, Section, Table};
+use crate::report::svg::{bars, number, seconds};
+use crate::report::timing::{Effort, time};
+use crate::study::control_loop::no_control;
+
+/// Steps of a run.
+const STEPS: u64 = 20_000;
+
+/// Counts by the names that `scripts/measure-work.sh` knows them by, and seconds per step by the same.
+struct Measured {
+    counts: HashMap<String, f64>,
+    times: Vec<(&'static str, f64)>,
+}
+
+pub(super) fn make(section: &mut Section) {
+    let text = std::fs::read_to_string(section.out.join("work.csv")).unwrap_or_default();
+    let counts = text.lines().skip(1).filter_map(|line| {
+        let (name, rest) = line.split_once(',')?;
+        Some((name.to_owned(), rest.split(',').next()?.parse().ok()?))
+    });
+    let effort = section.choose(Effort::new(15, 60, 0.5), Effort::new(5, 10, 0.02));
+    let measured = Measured {
+        counts: counts.collect(),
+        times: times(effort),
+    };
+    measured.figure(section);
+    section.table(&measured.table());
+    measured.findings(section);
+    measured.verdicts(section);
+}
+
+fn times(effort: Effort) -> Vec<(&'static str, f64)> {
+    let mut times = Vec::new();
+    let mut add = |name, work: &dyn Fn() -> f64| {
+        times.push((name, time(effort, work).minimum / in_f64(STEPS)));
+    };
+    let free = |method| ready::<2>(9.81, true, false, method);
+    add("step-2-euler-free", &|| run(&free(Method::Euler)));
+    add("step-2-midpoint-free", &|| run(&free(Method::Midpoint)));
+    add("step-2-verlet-free", &|| run(&free(Method::Verlet)));
+    add("step-2-rk4-free", &|| run(&free(Method::Rk4)));
+    let two = |gravity, integral, control| ready::<2>(gravity, integral, control, Method::Rk4);
+    add("step-2-rk4-weightless", &|| run(&two(0.0, true, false)));
+    add("step-2-rk4-pd", &|| run(&two(9.81, false, true)));
+    let mut without_damping = two(9.81, true, true);
+    without_damping.set_gains(undamped());
+    add("step-2-rk4-pi", &|| run(&without_damping));
+    let mut pushed = two(9.81, true, true);
+    pushed.disturb([0.0; 2], 1e9);
+    add("step-2-rk4-pushed", &|| run(&pushed));
+    add("step-2-rk4-pid", &|| run(&two(9.81, true, true)));
+    let three = |gravity, control| ready::<3>(gravity, true, control, Method::Rk4);
+    add("step-3-rk4-free", &|| run(&three(9.81, false)));
+    add("step-3-rk4-weightless", &|| run(&three(0.0, false)));
+    add("step-3-rk4-pid", &|| run(&three(9.81, true)));
+    add("particle-rk4-constant", &|| particle("1"));
+    add("particle-rk4-cosine", &|| particle("cos(2*t)"));
+    times
+}
+
+fn run<const N: usize>(ready: &Simulation<N>) -> f64 {
+    let mut simulation = ready.clone();
+    simulation.advance(STEPS);
+    black_box(simulation.state().position.iter().sum())
+}
+
+fn particle(function: &str) -> f64 {
+    let function = Expression::parse(function).ok();
+    let particle = function
+        .and_then(|function| Particle::new(function, 0.5, -0.25, 1e-4, STEPS, Method::Rk4).ok());
+    particle.map_or(f64::NAN, |mut particle| {
+        particle.advance(usize::MAX);
+        particle.positions().last().copied().unwrap_or(f64::NAN)
+    })
+}
+
+/// A quantity of the table: its count, a factor, its unit and a detail.
+type Quantity = (&'static str, f64, &'static str, &'static str);
+
+/// Work, the place where it is left out, the quantities with it and without it, and whether their difference is saved.
+type Row = (&'static str, &'static str, Quantity, Quantity, bool);
+
+const STEP: &str = "instructions";
+const RATE: &str = "million instructions a second";
+const NOTHING: Quantity = ("", 0.0, "", "");
+
+const fn step(
+    work: &'static str,
+    place: &'static str,
+    with: &'static str,
+    without: &'static str,
+) -> Row {
+    (
+        work,
+        place,
+        (with, 1.0, STEP, ""),
+        (without, 1.0, STEP, ""),
+        true,
+    )
+}
+
+const ROWS: [Row; 17] = [
+    step(
+        "Control law with the controller off",
+        "math::simulation asks the law only while it is on",
+        "step-2-rk4-pid",
+        "step-2-rk4-free",
+    ),
+    step(
+        "Integral with ki = 0",
+        "kept: an integral that gathers at ki = 0 acts as soon as ki is set; one product and one clamp a joint",
+        "step-2-rk4-pid",
+        "step-2-rk4-pd",
+    ),
+    step(
+        "Damping with kd = 0",
+        "kept: asking whether it is zero would cost as much as its product",
+        "step-2-rk4-pid",
+        "step-2-rk4-pi",
+    ),
+    step(
+        "A disturbance of zeros",
+        "kept: there is none until somebody sends one, and one of zeros ends by itself",
+        "step-2-rk4-pushed",
+        "step-2-rk4-pid",
+    ),
+    step(
+        "First joint's sine and cosine at gravity 0, 2 links",
+        "kept: both angles are taken in one pass, and leaving out the first was worth some 4 %",
+        "step-2-rk4-free",
+        "step-2-rk4-weightless",
+    ),
+    step(
+        "First joint's sine and cosine at gravity 0, 3 links",
+        "math::simulation takes the recursion that does not look at the first angle; the same bits",
+        "step-3-rk4-free",
+        "step-3-rk4-weightless",
+    ),
+    step(
+        "Third link of a 2-link arm",
+        "links are a compile-time constant: each arm has its own code",
+        "step-3-rk4-free",
+        "step-2-rk4-free",
+    ),
+    step(
+        "Mass matrix in the 1-DOF service (instructions of the arm's code)",
+        "math::particle knows no arm: none of the arm's functions runs",
+        "arm-in-step-2-rk4-free",
+        "arm-in-particle-rk4-constant",
+    ),
+    (
+        "Stepping while paused",
+        "actors::arm::sim asks the pacer for no steps",
+        ("server-running", 1e-6, RATE, "running, nobody subscribed"),
+        ("server-paused", 1e-6, RATE, "paused"),
+        true,
+    ),
+    (
+        "JSON that nobody subscribes to",
+        "the registry tells the arm which topics are wanted",
+        (
+            "server-1-subscriber-encoded",
+            1.0,
+            "messages encoded a second",
+            "one subscriber of /joint_states",
+        ),
+        (
+            "server-running-encoded",
+            1.0,
+            "messages encoded a second",
+            "none",
+        ),
+        true,
+    ),
+    (
+        "Encoding once more for each further subscriber",
+        "one frame of shared bytes goes to every outbox",
+        (
+            "server-11-subscribers-json",
+            1e-6,
+            RATE,
+            "JSON for eleven subscribers",
+        ),
+        ("server-1-subscriber-json", 1e-6, RATE, "JSON for one"),
+        false,
+    ),
+    (
+        "Allocations for each further subscriber of a message",
+        "counting allocator, 10 against 110 subscribers",
+        ("allocations-per-subscriber", 1.0, "allocations", ""),
+        NOTHING,
+        false,
+    ),
+    (
+        "Goal and trial timers",
+        "a timer lives as long as its goal, or as a client watches a trial; wake-ups of the gateway's thread",
+        (
+            "wakes-trial",
+            1.0,
+            "wake-ups a second",
+            "a trial runs, its status is watched",
+        ),
+        ("wakes-idle", 1.0, "wake-ups a second", "nothing asked for"),
+        true,
+    ),
+    (
+        "Local error estimate, ten a second (2 links, RK4)",
+        "study::error_estimate is asked only for a subscriber of /arm_sim/error_estimate",
+        (
+            "estimate-2-rk4",
+            1e-5,
+            RATE,
+            "one subscriber or a hundred, beside the encoding",
+        ),
+        NOTHING,
+        false,
+    ),
+    (
+        "Web, record, report and commands without their features",
+        "cargo build --no-default-features --features runtime",
+        ("program-size", 1e-6, "MB", ""),
+        ("program-size-bare", 1e-6, "MB", ""),
+        true,
+    ),
+    (
+        "Allocation in the loop",
+        "every state is an array of constant length",
+        NOTHING,
+        (
+            "allocations-in-steps",
+            1.0,
+            "allocations",
+            "in 16 million steps",
+        ),
+        false,
+    ),
+    (
+        "A locked joint",
+        "there is none: every joint of this arm turns, and a link less is an arm of its own",
+        NOTHING,
+        NOTHING,
+        false,
+    ),
+];
+
+/// Claims about a count: its name, its unit, and a bound. Whole numbers below one half are none.
+const BELOW: [(&str, &str, &str, f64); 5] = [
+    (
+        "A physics step allocates nothing",
+        "allocations-in-steps",
+        "allocations",
+        0.5,
+    ),
+    (
+        "The 1-DOF service runs none of the arm's code",
+        "arm-in-particle-rk4-constant",
+        "instructions a step",
+        0.5,
+    ),
+    (
+        "Nothing is encoded while nobody subscribes",
+        "server-running-json",
+        "instructions of JSON a second",
+        0.5,
+    ),
+    (
+        "The gateway does not wake while nothing is asked of it (less than once a second)",
+        "wakes-idle",
+        "wake-ups a second",
+        1.0,
+    ),
+    (
+        "Without its feature no web code is in the program",
+        "web-symbols-bare",
+        "symbols of HTTP and WebSocket",
+        0.5,
+    ),
+];
+
+impl Measured {
+    fn count(&self, name: &str) -> Option<f64> {
+        self.counts.get(name).copied()
+    }
+
+    fn cell(&self, (name, factor, unit, detail): Quantity) -> Cell {
+        if name.is_empty() {
+            return Cell::default();
+        }
+        let Some(count) = self.count(name) else {
+            return Cell::new("not measured in this run").class("soft");
+        };
+        let time = self.times.iter().find(|(one, _)| *one == name);
+        let time = time.map(|(_, time)| seconds(*time));
+        let count = if unit == STEP { count.round() } else { count };
+        Cell::new(format!("{} {unit}", number(factor * count)))
+            .detail(time.as_deref().unwrap_or(detail))
+    }
+
+    fn table(&self) -> Table {
+        let mut table = Table::new(
+            "left-out",
+            "What is left out, and the proof",
+            "Instructions are counted by callgrind over the same number of steps on both sides, without the start of \
+             the program. Times are the minimum of repeats on this machine. They follow the instructions only loosely, \
+             since a step is one chain of dependent operations.",
+            [
+                "Work",
+                "Where it is left out",
+                "With it",
+                "Without it",
+                "Saved",
+            ],
+        );
+        for (work, place, with, without, is_saved) in ROWS {
+            let both = self
+                .count(with.0)
+                .zip(self.count(without.0))
+                .filter(|_| is_saved);
+            let saved = both.map(|(with, without)| (100.0 * (1.0 - without / with)).round());
+            let saved = saved.map(|percent| Cell::new(format!("{} %", number(percent))));
+            let cells = [
+                self.cell(with),
+                self.cell(without),
+                saved.unwrap_or_default(),
+            ];
+            let words = [work, place].map(Cell::new);
+            table.rows.push(words.into_iter().chain(cells).collect());
+        }
+        table
+    }
+
+    /// Bars of the instructions of a step and of the server, and of the time of a step.
+    fn figure(&self, section: &mut Section) {
+        let names = || self.times.iter().map(|(name, _)| *name);
+        let counts = names().map(|name| (name, self.count(name).map(f64::round)));
+        let times = self
+            .times
+            .iter()
+            .map(|(name, time)| (*name, Some(1e9 * time)));
+        let server = [
+            ("paused", "server-paused"),
+            ("running, nobody listens", "server-running"),
+            ("1 subscriber", "server-1-subscriber"),
+            ("11 subscribers", "server-11-subscribers"),
+        ];
+        let server = server.map(|(label, name)| (label, self.count(name).map(|n| n / 1e6)));
+        let allocations = self.count("allocations-in-steps").map_or_else(
+            || "Allocations were not counted.".to_owned(),
+            |count| format!("Allocations in these steps: {}.", number(count)),
+        );
+        section.figure(
+            "left-out",
+            "Work of a step and of the server, scene by scene",
+            &format!("Instructions by callgrind, time as the minimum of repeats. {allocations}"),
+            &[
+                bars("Instructions per step", "c1", &counts.collect::<Vec<_>>()),
+                bars("Time per step [ns]", "c2", &times.collect::<Vec<_>>()),
+                bars("The server: million instructions per second", "c3", &server),
+            ],
+        );
+    }
+
+    /// Messages encoded a second, and the instructions of one.
+    fn encoded(&self, server: &str) -> Option<(f64, f64)> {
+        let messages = self.count(&format!("{server}-encoded"))?;
+        let json = self.count(&format!("{server}-json"))?;
+        Some((messages, (json / messages.max(1.0)).round()))
+    }
+
+    fn findings(&self, section: &mut Section) {
+        if let (Some(none), Some(one), Some(eleven)) = (
+            self.encoded("server-running"),
+            self.encoded("server-1-subscriber"),
+            self.encoded("server-11-subscribers"),
+        ) {
+            section.find(format!(
+                "**While nobody listens the server encodes {} messages a second**. For one subscriber it encodes {} at \
+                 {} instructions each, for eleven {} at {}.",
+                number(none.0),
+                number(one.0),
+                number(one.1),
+                number(eleven.0),
+                number(eleven.1)
+            ));
+        }
+        let [off, on] = ["step-2-rk4-free", "step-2-rk4-pid"].map(|name| self.count(name));
+        if let (Some(off), Some(on)) = (off, on) {
+            section.find(format!(
+                "**The arm is the cost of a step**: without the control law a 2-link RK4 step is {} instructions \
+                 instead of {}.",
+                number(off.round()),
+                number(on.round())
+            ));
+        }
+    }
+
+    fn verdicts(&self, section: &mut Section) {
+        for (work, holds) in [
+            (
+                "the control law",
+                off_is_zero_gains::<2>() && off_is_zero_gains::<3>(),
+            ),
+            (
+                "the first angle at gravity 0",
+                weightless_is_gravity_zero::<2>() && weightless_is_gravity_zero::<3>(),
+            ),
+        ] {
+            let seen = "5000 steps of every method, 2 and 3 links";
+            section.claim(format!("Leaving out {work} changes no bit"), seen, holds);
+        }
+        for (claim, name, unit, bound) in BELOW {
+            if let Some(count) = self.count(name) {
+                section.claim(claim, format!("{} {unit}", number(count)), count < bound);
+            }
+        }
+        let each = ["server-1-subscriber", "server-11-subscribers"].map(|name| self.encoded(name));
+        if let [Some((_, one)), Some((_, eleven))] = each {
+            section.claim(
+                "A message is encoded once, for eleven subscribers as for one (within 1 %)",
+                format!(
+                    "{} and {} instructions of JSON a message",
+                    number(eleven),
+                    number(one)
+                ),
+                (eleven / one - 1.0).abs() <= 0.01,
+            );
+        }
+        let rates = ["server-running", "server-paused"].map(|name| self.count(name));
+        if let [Some(running), Some(paused)] = rates {
+            section.claim(
+                "A paused server executes less than half the instructions of a running one",
+                format!(
+                    "{} against {} million a second",
+                    number(paused / 1e6),
+                    number(running / 1e6)
+                ),
+                paused < 0.5 * running,
+            );
+        }
+    }
+}
+
+/// Whether an arm without control takes the same steps, bit for bit, as one under control with gains of zero.
+fn off_is_zero_gains<const N: usize>() -> bool
+where
+    Gains<N>: Default,
+{
+    Method::ALL.into_iter().all(|method| {
+        let mut off = ready::<N>(9.81, true, false, method);
+        let mut zero = ready::<N>(9.81, true, true, method);
+        zero.set_gains(no_control());
+        off.advance(5000);
+        zero.advance(5000);
+        let bits = |simulation: &Simulation<N>| simulation.state().position.map(f64::to_bits);
+        bits(&off) == bits(&zero)
+    })
+}
+
+/// Whether a live arm at gravity 0, which does not look at its first angle, moves by the same bits as steps that do.
+fn weightless_is_gravity_zero<const N: usize>() -> bool
+where
+    Gains<N>: Default,
+{
+    Method::ALL.into_iter().all(|method| {
+        let mut live = ready::<N>(0.0, true, false, method);
+        let mut state = State::at_rest([0.4; N]);
+        state.velocity = [1.5; N];
+        live.set_state(state);
+        let (arm, h) = (*live.arm(), live.timestep());
+        (0..5000).all(|_| {
+            // From the same state each: the live arm carries its rounding, these steps do not.
+            let State { position, velocity } = &state;
+            let acceleration =
+                |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&arm, q, v, &[0.0; N]);
+            let looked_at = increment(method, acceleration, 0.0, position, velocity, h);
+            let left_out = step_under(&arm, method, &state, &[0.0; N], h);
+            live.advance(1);
+            state = *live.state();
+            looked_at == left_out
+        })
+    })
+}
