@@ -29,17 +29,17 @@ pub struct LiveScene {
     start: Vec<f64>,
     #[serde(default)]
     velocity: Vec<f64>,
-    settings: Settings,
-    watch: Option<Watch>,
+    settings: LiveSettings,
+    watch: Option<PictureWindow>,
     hidden: Option<String>,
 }
 
-/// Settings as the page has them; the defaults are the runtime's.
+/// The settings as the page has them; the defaults are the runtime's.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
-struct Settings {
-    integrator: Option<Integrator>,
-    params: Option<Params>,
+struct LiveSettings {
+    integrator: Option<LiveIntegrator>,
+    params: Option<LiveParams>,
     gains: Option<LiveGains>,
     period: Period,
     servo: bool,
@@ -47,13 +47,13 @@ struct Settings {
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct Integrator {
+struct LiveIntegrator {
     method: String,
     timestep: f64,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct Params {
+struct LiveParams {
     gravity: f64,
     masses: Vec<f64>,
     lengths: Vec<f64>,
@@ -75,7 +75,7 @@ struct Period {
 
 /// The picture: its length, and where it differs from the page.
 #[derive(Debug, Clone, Deserialize)]
-struct Watch {
+struct PictureWindow {
     seconds: f64,
     timestep: Option<f64>,
     start: Option<Vec<f64>>,
@@ -122,7 +122,7 @@ impl LiveScene {
     }
 
     fn control<const N: usize>(&self, gains: Gains<N>) -> Result<ControlLoop<N>, String> {
-        let Settings {
+        let LiveSettings {
             params, setpoint, ..
         } = &self.settings;
         let arm = params.as_ref().map_or(Ok(Arm::default()), |params| {

@@ -309,7 +309,8 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
     });
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>{head}{}</svg>\n",
+         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
+         {head}{}</svg>\n",
         placed.collect::<String>()
     )
 }

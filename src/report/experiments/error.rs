@@ -130,7 +130,7 @@ pub fn scenes() -> Vec<Box<dyn Scene>> {
     };
     let reach = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
     let (two, three) = (Arm::<2>::default(), Arm::<3>::default());
-    let free = Drive::Held;
+    let free = Actuation::Held;
     vec![
         Box::new(ParticleScene),
         Box::new(ArmScene::new(
@@ -159,21 +159,21 @@ pub fn scenes() -> Vec<Box<dyn Scene>> {
             "PD reach, law in every stage",
             reach,
             State::rest(),
-            Drive::Continuous,
+            Actuation::Continuous,
         )),
         Box::new(ArmScene::new(
             "reach-held",
             "PD reach, effort held for the step",
             reach,
             State::rest(),
-            Drive::Held,
+            Actuation::Held,
         )),
     ]
 }
 
 /// How the effort of an arm's scene is found. The reference is the law at every instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Drive {
+enum Actuation {
     /// The law in every stage of every step; its integral gains are 0.
     Continuous,
     /// As shipped: the law at the start of a step, its effort held for the step.
@@ -186,7 +186,7 @@ struct ArmScene<const N: usize> {
     title: &'static str,
     control: ControlLoop<N>,
     start: State<N>,
-    drive: Drive,
+    drive: Actuation,
     reference: ReferencePath<N>,
 }
 
@@ -199,7 +199,7 @@ impl<const N: usize> ArmScene<N> {
         title: &'static str,
         control: ControlLoop<N>,
         start: State<N>,
-        drive: Drive,
+        drive: Actuation,
     ) -> Self {
         let law = Law::Continuous(control.gains, control.setpoint);
         let reference = ReferencePath::new(&control.arm, &start, &law, ARM_DURATION);
@@ -235,8 +235,8 @@ impl<const N: usize> ArmScene<N> {
             let acceleration = |_: f64, q: &[f64; N], v: &[f64; N]| {
                 count();
                 let effort = match self.drive {
-                    Drive::Continuous => law(q, v),
-                    Drive::Held => held,
+                    Actuation::Continuous => law(q, v),
+                    Actuation::Held => held,
                 };
                 forward_dynamics(&self.control.arm, q, v, &effort)
             };
@@ -297,8 +297,8 @@ impl<const N: usize> Scene for ArmScene<N> {
     fn control(&self) -> &'static str {
         match self.drive {
             _ if self.control.gains == no_control() => "none",
-            Drive::Continuous => "continuous",
-            Drive::Held => "held",
+            Actuation::Continuous => "continuous",
+            Actuation::Held => "held",
         }
     }
 
@@ -331,7 +331,7 @@ impl<const N: usize> Scene for ArmScene<N> {
     }
 
     fn replay(&self, method: Method, steps: u64) -> f64 {
-        if self.drive == Drive::Continuous {
+        if self.drive == Actuation::Continuous {
             let mut end = f64::NAN;
             let show = |_, state: &State<N>| {
                 end = state.position.iter().sum();
@@ -350,8 +350,8 @@ impl<const N: usize> Scene for ArmScene<N> {
     fn predicted_limit(&self, method: Method) -> Option<f64> {
         let sampling = match self.drive {
             _ if self.control.is_free() => return None,
-            Drive::Continuous => Sampling::Continuous,
-            Drive::Held => Sampling::Held,
+            Actuation::Continuous => Sampling::Continuous,
+            Actuation::Held => Sampling::Held,
         };
         largest_timestep(&Linear::at_setpoint(&self.control), method, sampling)
     }

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** the parts are measured each on its own; their sum bounds the whole.
 
-use super::{slope, worst};
+use super::fit::{slope, worst};
 use crate::math::integrator::Method;
 use crate::report::experiments::budget::{Budget, Parts};
 use crate::report::experiments::error::{OUTPUTS, REACH};
@@ -15,9 +15,9 @@ const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
 
 /// A part of the error: class, marker, name and value.
-type Part = (&'static str, Marker, &'static str, fn(&Parts) -> f64);
+type ErrorPart = (&'static str, Marker, &'static str, fn(&Parts) -> f64);
 
-const PARTS: [Part; 3] = [
+const PARTS: [ErrorPart; 3] = [
     ("c1", Marker::Diamond, "truncation (the method)", |parts| {
         parts.truncation
     }),

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** the truth behind the digits is known to at least ten more of them.
 
-use super::worst;
+use super::fit::worst;
 use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, power};

@@ -3,7 +3,7 @@
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
 //! nothing is interpolated between two runs.
 
-use super::{slope, worst};
+use super::fit::{slope, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
@@ -182,8 +182,8 @@ fn cheapest(data: &[Data]) -> Table {
         "cheapest",
         "At a glance: the cheapest method for each error",
         "Fewest evaluations. Under it: the timestep, evaluations and computing time for one simulated second, and how \
-         many times as many evaluations the next best method needs. Every cell is a run: that of the fewest steps found \
-         to keep the error. The particle's errors are in m.",
+         many times as many evaluations the next best method needs. Every cell is a run: that of the fewest steps \
+         found to keep the error. The particle's errors are in m.",
         ["Scene"]
             .into_iter()
             .chain(heads.iter().map(String::as_str)),

@@ -6,6 +6,7 @@ mod budget;
 mod conditioning;
 mod drift;
 mod error;
+mod fit;
 mod nonlinear;
 mod scenarios;
 mod stability;
@@ -13,7 +14,6 @@ mod stiff;
 mod work;
 
 use super::section::Section;
-use crate::math::count::length_in_f64;
 
 /// How a section is made.
 #[derive(Debug, Clone, Copy)]
@@ -79,37 +79,3 @@ pub(crate) const SECTIONS: &[Maker] = &[
     )
     .timed(),
 ];
-
-/// Slope of the least-squares line through `(log x, log y)` of positive numbers; `None` for fewer than two.
-fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = points.into_iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let count = length_in_f64(logs.len());
-    let mean_x = logs.iter().map(|p| p.0).sum::<f64>() / count;
-    let mean_y = logs.iter().map(|p| p.1).sum::<f64>() / count;
-    let along: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
-    let spread: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
-    (logs.len() > 1).then(|| along / spread)
-}
-
-/// The edges of `count` cells from `low` to `high`, each as many times as large as the one before.
-fn edges((low, high): (f64, f64), count: usize) -> Vec<f64> {
-    let part = |index: usize| length_in_f64(index) / length_in_f64(count);
-    let edges = (0..=count).map(|index| low * (high / low).powf(part(index)));
-    edges.collect()
-}
-
-/// The geometric middle of each cell.
-fn centres(edges: &[f64]) -> Vec<f64> {
-    let pairs = edges.windows(2);
-    pairs
-        .map(|pair| pair.iter().product::<f64>().sqrt())
-        .collect()
-}
-
-/// The largest of `values`; infinite if one is not a number.
-fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, |worst, value| match value {
-        value if value.is_nan() => f64::INFINITY,
-        value => worst.max(value),
-    })
-}

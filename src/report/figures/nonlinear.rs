@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every cell is measured; predictions are drawn over them and nothing is filled in.
 
-use super::{centres, edges};
+use super::fit::{centres, edges};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::report::experiments::nonlinear::{PeriodicSwing, are_carried, arrive, move_of, spun};
@@ -186,8 +186,8 @@ fn floquet(section: &mut Section) {
         .filter(|it| matches!(it.0, Method::Euler | Method::Midpoint));
     section.claim(
         format!(
-            "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under Euler \
-             and midpoint at every timestep"
+            "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under \
+             Euler and midpoint at every timestep"
         ),
         format!("at 128 steps a period: {}", seen.join(", ")),
         growing.all(|(_, off)| off.iter().all(|off| *off > -1e-9)),

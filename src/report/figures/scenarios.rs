@@ -5,7 +5,7 @@
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveRun, LiveScene, live_scenes};
 use crate::report::section::{Cell, Section, Table};
-use crate::report::svg::{HEIGHT, Key, Panel, Row, WIDTH, escape, number, plain, seconds};
+use crate::report::svg::{HEIGHT, Key, Panel, PlotNumber, WIDTH, escape, number, plain, seconds};
 
 pub(super) fn make(section: &mut Section) {
     let all = scenarios::all();
@@ -135,7 +135,7 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
     }
 }
 
-fn rows(name: &str, watched: &LiveRun) -> Vec<Row> {
+fn rows(name: &str, watched: &LiveRun) -> Vec<PlotNumber> {
     let samples = watched.samples.iter();
     let row = |(time, angles): &(f64, Vec<f64>)| {
         let angles = angles.iter().zip(JOINTS);

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{centres, edges, worst};
+use super::fit::{centres, edges, worst};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -121,10 +121,10 @@ fn limits_table(lines: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
-        "At (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5). Predicted from the loop linearised where it rests; measured by \
-         nudging the arm itself and watching whether it settles. Then the smallest limit of all poses, bounded where \
-         it can be, and 0.8 times that as advice. Held for the step, the limit belongs to the control period: the \
-         effort answers a state that is up to a step old. In every stage it belongs to the method.",
+        "At (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5). Predicted from the loop linearised where it rests; \
+         measured by nudging the arm itself and watching whether it settles. Then the smallest limit of all poses, \
+         bounded where it can be, and 0.8 times that as advice. Held for the step, the limit belongs to the control \
+         period: the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         by_method(&["Loop", "Control"]),
     );
     let mut rest = lines;
@@ -269,7 +269,8 @@ fn map(section: &mut Section) {
     section.figure(
         "stability-map",
         &format!(
-            "Predicted and measured stability agree in {agreeing} of {cells} cells; {undecided} change too slowly to judge"
+            "Predicted and measured stability agree in {agreeing} of {cells} cells; {undecided} change too slowly to \
+             judge"
         ),
         "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power of \
          3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as the \
@@ -312,9 +313,9 @@ fn regions(section: &mut Section) {
         "regions",
         "Why: beyond the limit one eigenvalue leaves the unit circle, and the arm flips at every step",
         &format!(
-            "2 links held at (0.4, 0.8) with the default gains. Top: the eigenvalues of one step of the linearised loop, \
-             and the unit circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they begin near \
-             1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
+            "2 links held at (0.4, 0.8) with the default gains. Top: the eigenvalues of one step of the linearised \
+             loop, and the unit circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they \
+             begin near 1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
             PARTS.0, PARTS.1, RUNS[0], RUNS[1]
         ),
         &circles.chain(runs).collect::<Vec<Panel>>(),

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a run that would take too many steps is shown as a prediction, and said to be one.
 
-use super::worst;
+use super::fit::worst;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};

@@ -98,7 +98,7 @@ fn particle(function: &str) -> f64 {
 type Quantity = (&'static str, f64, &'static str, &'static str);
 
 /// Work, the place where it is left out, the quantities with it and without it, and whether their difference is saved.
-type Row = (&'static str, &'static str, Quantity, Quantity, bool);
+type WorkRow = (&'static str, &'static str, Quantity, Quantity, bool);
 
 const STEP: &str = "instructions";
 const RATE: &str = "million instructions a second";
@@ -109,7 +109,7 @@ const fn step(
     place: &'static str,
     with: &'static str,
     without: &'static str,
-) -> Row {
+) -> WorkRow {
     (
         work,
         place,
@@ -119,7 +119,7 @@ const fn step(
     )
 }
 
-const ROWS: [Row; 17] = [
+const ROWS: [WorkRow; 17] = [
     step(
         "Control law with the controller off",
         "math::simulation asks the law only while it is on",

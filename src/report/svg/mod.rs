@@ -167,11 +167,11 @@ impl Curve {
 pub(crate) struct Panel {
     pub(crate) svg: String,
     pub(crate) keys: Vec<Key>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<PlotNumber>,
 }
 
 /// A number of a panel: curve, x, y and the rest in words.
-pub(crate) type Row = (String, f64, f64, String);
+pub(crate) type PlotNumber = (String, f64, f64, String);
 
 /// Text for use between tags and in attributes.
 pub(crate) fn escape(text: &str) -> String {

@@ -112,7 +112,7 @@ impl Plot {
         out
     }
 
-    fn heat_rows(&self) -> impl Iterator<Item = super::Row> {
+    fn heat_rows(&self) -> impl Iterator<Item = super::PlotNumber> {
         let cells = self.heat.iter().flat_map(|heat| {
             let [columns, rows] = &heat.edges;
             let row = move |(cells, y): (&Vec<&'static str>, &f64)| {

@@ -134,7 +134,7 @@ fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
 }
 
 /// A step of a motion: when it begins \[s\], the joint angles then \[rad\], and the coefficients of their change.
-type Piece<const N: usize> = (Real, [Real; N], Vec<[Real; N]>);
+type PathPiece<const N: usize> = (Real, [Real; N], Vec<[Real; N]>);
 
 /// A motion that is followed.
 struct Followed<'a, const N: usize> {
@@ -300,7 +300,7 @@ fn whole_periods(interval: f64, period: f64) -> u64 {
 /// A reference motion at any instant: the series of its steps, kept.
 #[derive(Debug, Clone)]
 pub struct ReferencePath<const N: usize> {
-    pieces: Vec<Piece<N>>,
+    pieces: Vec<PathPiece<N>>,
     uncertainty: f64,
 }
 
@@ -311,7 +311,7 @@ impl<const N: usize> ReferencePath<N> {
         /// Instants at which two settings are compared.
         const COMPARED: u64 = 64;
         let [fine, coarse] = SETTINGS.map(|setting| {
-            let mut pieces: Vec<Piece<N>> = Vec::new();
+            let mut pieces: Vec<PathPiece<N>> = Vec::new();
             let mut followed = Followed::new(arm, start, law, setting);
             followed.advance(law, duration, |begins, position, Taylor { series, .. }| {
                 let angles = series.angle[1..=series.order()].iter();
@@ -342,7 +342,7 @@ impl<const N: usize> ReferencePath<N> {
 }
 
 /// The joint angles at `time` \[s\].
-fn position<const N: usize>(pieces: &[Piece<N>], time: Real) -> [Real; N] {
+fn position<const N: usize>(pieces: &[PathPiece<N>], time: Real) -> [Real; N] {
     let after = pieces.partition_point(|piece| (piece.0 - time).to_f64() <= 0.0);
     let Some((begins, position, angles)) = pieces.get(after.saturating_sub(1)) else {
         return [Real::from(f64::NAN); N];

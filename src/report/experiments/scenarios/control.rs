@@ -9,7 +9,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Observation, Scenario, arm, each, held, is_near, short, verdict};
+use super::support::{Observation, Scenario, arm, each, held, is_near, short, verdict};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
@@ -73,7 +73,8 @@ pub(super) const SCENES: [Scenario; 9] = [
     ),
     Scenario::new(
         "S14",
-        "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a setpoint in reach",
+        "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a setpoint \
+         in reach",
         "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after release the \
          arm comes back",
         windup,

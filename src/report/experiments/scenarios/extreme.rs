@@ -10,7 +10,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Observation, Scenario, apart, arm, each, fastest, free, held, is_near, verdict};
+use super::support::{
+    Observation, Scenario, apart, arm, each, fastest, free, held, is_near, verdict,
+};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;

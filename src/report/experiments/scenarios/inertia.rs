@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::control::MODERATE;
-use super::{
+use super::support::{
     Observation, Scenario, arm, digits_lost, each, fastest, free, held, is_near, short, states,
 };
 use crate::math::arm::{Arm, State};

@@ -7,7 +7,7 @@
     reason = "indices name the joints of arrays of that length"
 )]
 
-use super::{Noise, Observation, Scenario, apart, each, free, verdict};
+use super::support::{Noise, Observation, Scenario, apart, each, free, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};

@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Observation, Scenario, apart, arm, each, free, is_near, verdict};
+use super::support::{Observation, Scenario, apart, arm, each, free, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;

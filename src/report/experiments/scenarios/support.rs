@@ -1,0 +1,165 @@
+//! A named scene and its outcome, and the settings, states and comparisons that scenes share.
+//!
+//! **Invariant:** a seed in the source gives what is random, so a scene does the same every time.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
+use crate::math::arm::{Arm, State};
+use crate::math::dynamics::forward_dynamics;
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::Simulation;
+use crate::report::experiments::reference::{DoubleDouble, exact_acceleration, largest_difference};
+use crate::study::control_loop::ControlLoop;
+use crate::study::matrix::largest;
+
+/// A named scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Scenario {
+    /// `S01` to `S39`.
+    pub id: &'static str,
+    /// The arm, its motion and its control.
+    pub parameters: &'static str,
+    /// The behaviour of a correct arm.
+    pub expected: &'static str,
+    /// Whether it takes seconds.
+    pub slow: bool,
+    check: fn() -> Observation,
+}
+
+impl Scenario {
+    pub(super) const fn new(
+        id: &'static str,
+        parameters: &'static str,
+        expected: &'static str,
+        check: fn() -> Observation,
+    ) -> Self {
+        Self {
+            id,
+            parameters,
+            expected,
+            slow: false,
+            check,
+        }
+    }
+
+    pub(super) const fn slow(self) -> Self {
+        Self { slow: true, ..self }
+    }
+
+    /// Runs the scene.
+    #[must_use]
+    pub fn run(&self) -> Observation {
+        (self.check)()
+    }
+}
+
+/// The outcome of a scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Observation {
+    /// The observation, with its figures.
+    pub observed: String,
+    /// Whether that is what was expected.
+    pub holds: bool,
+}
+
+pub(super) fn verdict(holds: bool, observed: impl Into<String>) -> Observation {
+    let observed = observed.into();
+    Observation { observed, holds }
+}
+
+/// The verdict of several cases: each must hold, and says what was seen.
+pub(super) fn each(cases: impl IntoIterator<Item = (bool, String)>) -> Observation {
+    let (holds, words): (Vec<bool>, Vec<String>) = cases.into_iter().unzip();
+    verdict(holds.into_iter().all(|holds| holds), words.join(", "))
+}
+
+/// A number as a table shows it.
+pub(super) fn short(value: Option<f64>) -> String {
+    value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4e}"))
+}
+
+/// Whether `value` is there, and within `part` of `expected`.
+pub(super) fn is_near(value: Option<f64>, expected: f64, part: f64) -> bool {
+    value.is_some_and(|value| (value / expected - 1.0).abs() < part)
+}
+
+/// Links of 1 m and 1 kg, held with these gains in this pose, by Runge-Kutta 4 at a millisecond.
+pub(super) fn held<const N: usize>(gains: Gains<N>, pose: [f64; N]) -> ControlLoop<N> {
+    ControlLoop::new(Arm::default(), gains, Setpoint::at(pose))
+}
+
+/// An arm of links of 1 m.
+pub(super) fn arm<const N: usize>(masses: [f64; N], gravity: f64) -> Arm<N> {
+    Arm::new([1.0; N], masses, gravity).unwrap_or_default()
+}
+
+/// An arm left to itself, through the live loop.
+pub(super) fn free<const N: usize>(
+    arm: Arm<N>,
+    start: State<N>,
+    method: Method,
+    timestep: f64,
+) -> Simulation<N> {
+    let control = ControlLoop::free(arm).with_method(method);
+    control.with_timestep(timestep).simulation(start)
+}
+
+/// Largest difference of positions \[rad\] and velocities \[rad/s\].
+pub(super) fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
+    let positions = (0..N).map(|i| (a.position[i] - b.position[i]).abs());
+    let velocities = (0..N).map(|i| (a.velocity[i] - b.velocity[i]).abs());
+    largest(positions.chain(velocities))
+}
+
+/// Speed of the fastest joint \[rad/s\].
+pub(super) fn fastest<const N: usize>(simulation: &Simulation<N>) -> f64 {
+    largest(simulation.state().velocity.iter().map(|v| v.abs()))
+}
+
+/// Repeatable numbers from -1 to 1.
+pub(super) struct Noise(fastrand::Rng);
+
+impl Noise {
+    pub(super) fn new() -> Self {
+        Self(fastrand::Rng::with_seed(7))
+    }
+
+    pub(super) fn next(&mut self) -> f64 {
+        2.0 * self.0.f64() - 1.0
+    }
+
+    pub(super) fn array<const N: usize>(&mut self, scale: f64) -> [f64; N] {
+        std::array::from_fn(|_| scale * self.next())
+    }
+}
+
+/// Decimal digits that the worst of `states` loses in its joint accelerations, against the same in twice the digits.
+pub(super) fn digits_lost<const N: usize>(arm: &Arm<N>, states: &[State<N>]) -> f64 {
+    let mut noise = Noise::new();
+    largest(states.iter().map(|state| {
+        let effort = noise.array(10.0);
+        let found = forward_dynamics(arm, &state.position, &state.velocity, &effort);
+        let exact = exact_acceleration(arm, state, &effort);
+        let size = largest(exact.map(DoubleDouble::to_f64).iter().map(|it| it.abs()));
+        let roundings = largest_difference(&exact, &found) / size / (0.5 * f64::EPSILON);
+        roundings.max(1.0).log10()
+    }))
+}
+
+/// Two hundred random states around a pose, angles within `spread` \[rad\], rates within 2 rad/s. The first joint turns
+/// everywhere.
+pub(super) fn states<const N: usize>(pose: [f64; N], spread: f64) -> Vec<State<N>> {
+    let mut noise = Noise::new();
+    let state = |_| State {
+        position: std::array::from_fn(|i| {
+            let spread = if i == 0 { 3.0 } else { spread };
+            pose[i] + spread * noise.next()
+        }),
+        velocity: noise.array(2.0),
+    };
+    (0..200).map(state).collect()
+}
