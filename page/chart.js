@@ -217,6 +217,9 @@ export function drawMap(chart, rows, at, factor) {
     chart.area([[across.low, lowest], ...edge("limit"), [across.low, highest]], colors.stable);
     chart.path(edge("continuous"), colors.ink, { width: 1.25, dash: DASHED });
     chart.path(edge("limit"), colors.ink, { width: 2 });
+    context.strokeStyle = colors.muted;
+    context.lineWidth = 1;
+    context.strokeRect(left, top, right - left, bottom - top);
     chart.words("stable", left + 10, chart.y(1) - 14, "left"); // the very low gains of the lower edge hold the arm at no timestep
     chart.words("shakes", right - 10, top + 16, "right");
   }

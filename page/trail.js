@@ -1,6 +1,6 @@
 // @ts-check
 // The way of the end effector through the last seconds, fading towards the past.
-// Invariant: between two states it goes where the arm would have gone, as the replay shows it: no polygon, and never out of reach.
+// Invariant: between two states it goes where the replay shows the arm: no polygon while the arm can be followed, and never out of reach.
 
 import { POSITION, TIME, between, firstAfter, record } from "./history.js";
 import { joints } from "./mechanics.js";
@@ -11,9 +11,10 @@ export const SECONDS = 5;
 /** It fades in this many pieces. */
 const PIECES = 6;
 const BRIGHTEST = 0.7;
-/** How far joints turn, all together, from one point to the next, but for an arm that shakes [rad]. */
-const TURN = 0.1;
-const MOST_POINTS = 12;
+/** How far joints turn, all together, from one point to the next [rad]. */
+const TURN = 0.15;
+/** Where they turn further between two records the way is not known: it goes straight [rad]. */
+const FAR = Math.PI;
 
 const q = new Float64Array(MOST_LINKS);
 const v = new Float64Array(MOST_LINKS);
@@ -45,7 +46,7 @@ function extend(context, n, lengths, px, py, i) {
   const [a, b] = [record.at(i), record.at(i + 1)];
   let turned = 0;
   for (let k = 0; k < n; k += 1) turned += Math.abs(data[b + POSITION + k] - data[a + POSITION + k]);
-  const points = Math.min(MOST_POINTS, Math.ceil(turned / TURN) || 1);
+  const points = turned < FAR ? Math.ceil(turned / TURN) || 1 : 1;
   for (let point = 0; point <= points; point += 1) {
     between(a, b, data[a + TIME] + (point / points) * (data[b + TIME] - data[a + TIME]), q, v);
     joints(n, q, lengths, x, y);
