@@ -110,11 +110,7 @@ fn admission(settings: u8) -> Admission {
     let named = Authority::parse("arm.example:80").expect("a host");
     let access = Access {
         token: token.clone(),
-        hosts: if is_set(2) {
-            vec![named]
-        } else {
-            Vec::new()
-        },
+        hosts: if is_set(2) { vec![named] } else { Vec::new() },
         origins: if is_set(4) {
             vec!["null".into()]
         } else {

@@ -120,9 +120,9 @@ def test_a_report_can_be_read(tmp_path):
     table = report["conditioning"]
     lines = (folder / "conditioning.csv").read_text().splitlines()
     assert list(table) == lines[0].split(",")
-    assert len(table["mass_ratio"]) == len(lines) - 1
-    assert table["mass_ratio"][0] == 1e-9
-    assert table["pose"][0] == "3 links, bent"
+    assert len(table["x"]) == len(lines) - 1
+    assert table["x"][0] == 1e-9
+    assert table["curve"][0] == "3 links, bent: c2"
 
 
 @pytest.mark.parametrize(

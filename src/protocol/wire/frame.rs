@@ -430,7 +430,7 @@ pub enum FrameError {
     /// Something stood behind the object of a message that holds one.
     #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
     MoreBehind,
-    /// Longer than the limit, which it holds: [`MAX_FRAME`](crate::protocol::limits::MAX_FRAME) unless the reader has
+    /// Longer than the limit, which it holds: [`MAX_FRAME`] unless the reader has
     /// another.
     #[error("frame longer than {0} bytes, skipped")]
     TooLong(usize),

@@ -287,6 +287,7 @@ fn between<T: Arithmetic + Default, const N: usize>(
     (sines, cosines)
 }
 
+#[cfg(feature = "report")]
 /// Joint accelerations \[rad/s²\] by the equation of motion itself, from sine and cosine of the joint angles.
 pub(crate) fn acceleration<T: Arithmetic + Default, const N: usize>(
     arm: &Arm<N>,
