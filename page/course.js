@@ -105,7 +105,7 @@ export const STEPS = [
   },
   {
     id: "timestep", title: "A finer timestep?",
-    text: "The simulation has a clock of its own, the timestep. A shorter one makes the computed motion more exact. The period stays the same.",
+    text: "The simulation has a clock of its own, the timestep. A shorter one makes the computed motion more exact. The method and the control period, above the chart, stay the same.",
     scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },

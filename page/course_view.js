@@ -103,6 +103,15 @@ export function stepInLink() {
   return state.view === "course" ? `step=${at + 1}&` : "";
 }
 
+/** Loads the page anew, at the same step, with an arm of so many links. */
+export function chooseLinks(links) {
+  const address = new URL(location.href);
+  address.searchParams.delete("links");
+  address.hash = `${stepInLink()}links=${links}`;
+  setAddress(address);
+  location.reload();
+}
+
 /** Ten times a second at most, while something changes. */
 export function moveCourse() {
   if (state.view === "course" && stripTime !== newest()) surface.redraw();
@@ -220,11 +229,17 @@ function gallery(links) {
   galleries[links] ??= el("div", { class: "pictures" }, ...SCENES.map((scene) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const fits = scene.links === links;
+    const isOther = !fits && scene.links > 0;
     const picture = new Surface(canvas, () => drawPicture(picture, scene));
-    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: !fits, onclick: () => runScene(scene) },
-      canvas, el("span", {}, scene.name), el("small", {}, fits || scene.links === 0 ? scene.expected : `Needs ${scene.links} links.`));
+    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: !fits && !(isOther && isAlone), onclick: () => (fits ? runScene(scene) : chooseLinks(scene.links)) },
+      canvas, el("span", {}, scene.name), el("small", {}, isOther ? otherArm(scene.links) : scene.expected));
   }));
   return galleries[links];
+}
+
+/** How to get an arm of so many links: a click where the arm is in this page, else an option of the server. */
+function otherArm(links) {
+  return isAlone ? `Click for an arm of ${links} links.` : `Needs ${links} links: start pendularm with --links ${links}.`;
 }
 
 async function runScene(scene) {
@@ -276,6 +291,12 @@ function partOfPeriod(ms) {
   return Number((whole / Math.max(1, Math.round(whole / (ms / 1e3)))).toPrecision(9));
 }
 
+/** The errors' chart, with the method and the control period that they are of. */
+function errorsCaption() {
+  const { caption } = CHARTS.errors;
+  return state.integrator ? `${caption}: ${shortName(state.integrator.method)}, control period ${Number((1e3 * period()).toPrecision(3))} ms` : caption;
+}
+
 function showBig() {
   const one = STEPS[at];
   const { label, value, limit } = clock(one);
@@ -285,6 +306,7 @@ function showBig() {
   byId("course-big").hidden = hidden;
   setText(byId("course-figure"), hidden ? "" : ofLimit(value(), unknown ? NaN : limit()));
   setText(byId("course-what"), label);
+  if (one.chart === "errors") setText(byId("course-caption"), errorsCaption());
   byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
   if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm flew apart. Press “Restart step”.");
 }

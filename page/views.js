@@ -6,7 +6,7 @@
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
-import { stepInLink } from "./course_view.js";
+import { chooseLinks, stepInLink } from "./course_view.js";
 import { announce, byId, el, setAddress, setText } from "./dom.js";
 import { isAlone } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
@@ -36,13 +36,7 @@ function startLinks() {
   if (!isAlone) return;
   byId("links-choice").hidden = false;
   watch("links", (links) => { byId("links").value = String(links); });
-  byId("links").addEventListener("change", ({ target }) => {
-    const address = new URL(location.href);
-    address.searchParams.delete("links");
-    address.hash = `${stepInLink()}links=${target.value}`;
-    setAddress(address);
-    location.reload();
-  });
+  byId("links").addEventListener("change", ({ target }) => chooseLinks(target.value));
 }
 
 /** @param {"course" | "workbench"} view */
