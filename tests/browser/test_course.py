@@ -183,3 +183,13 @@ class AccessDark(Access):
 class AccessPhone(Access):
     view = PHONE
     links = 3
+
+
+class WidthPhone(CourseTest):
+    view = PHONE
+
+    def test_no_step_is_wider_than_the_screen(self):
+        for number in range(1, STEPS + 1):
+            self.step(number)
+            time.sleep(0.3)
+            self.assertLessEqual(self.page.run("document.documentElement.scrollWidth"), PHONE["width"], f"step {number}")
