@@ -122,7 +122,7 @@ def test_a_report_can_be_read(tmp_path):
     assert list(table) == lines[0].split(",")
     assert len(table["x"]) == len(lines) - 1
     assert table["x"][0] == 1e-9
-    assert table["curve"][0] == "3 links, bent: c2"
+    assert table["curve"][0] == "3 links, bent: elimination of M(q)"
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** lines end where points are lost; the lost ones are drawn at the upper edge.
 
-use super::{Axis, Curve, HEIGHT, Marker, Panel, Point, Unit, WIDTH, escape, number};
+use super::{Axis, Curve, HEIGHT, Key, Marker, Panel, Point, Unit, WIDTH, escape, number};
 use crate::math::count::length_in_f64;
 
 const LEFT: f64 = 58.0;
@@ -72,8 +72,7 @@ impl Plot {
         let curves = self.curves.iter().map(|curve| self.curve(curve));
         let drawn: String = marks.chain(curves).collect();
         let rows = self.curves.iter().flat_map(|curve| {
-            let dashed = if curve.key.dashed { ", dashed" } else { "" };
-            let name = format!("{}: {}{dashed}", self.title, curve.key.class);
+            let name = format!("{}: {}", self.title, self.name(&curve.key));
             let points = curve.points.iter();
             points.map(move |it| (name.clone(), it.x, it.y, it.tooltip.clone()))
         });
@@ -87,6 +86,16 @@ impl Plot {
             keys: self.curves.iter().map(|curve| curve.key.clone()).collect(),
             rows: rows.chain(self.heat_rows()).collect(),
         }
+    }
+
+    /// What the legend calls a curve, or one of the same colour; a curve that no legend names is called by its style.
+    fn name<'a>(&'a self, key: &'a Key) -> &'a str {
+        let keys = self.curves.iter().map(|curve| &curve.key);
+        let alike = keys.filter(|it| it.class == key.class && it.dashed == key.dashed);
+        let mut labels = std::iter::once(key)
+            .chain(alike)
+            .map(|it| it.label.as_str());
+        labels.find(|label| !label.is_empty()).unwrap_or(key.class)
     }
 
     fn cells(&self, heat: &Heat) -> String {
