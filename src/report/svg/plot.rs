@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** lines end where points are lost; the lost ones are drawn at the upper edge.
 
-use super::{Axis, Curve, HEIGHT, Key, Marker, Panel, Point, Unit, WIDTH, escape, number};
+use super::{Axis, Curve, HEIGHT, Marker, Panel, Point, Unit, WIDTH, escape, number};
 use crate::math::count::length_in_f64;
 
 const LEFT: f64 = 58.0;
@@ -72,7 +72,7 @@ impl Plot {
         let curves = self.curves.iter().map(|curve| self.curve(curve));
         let drawn: String = marks.chain(curves).collect();
         let rows = self.curves.iter().flat_map(|curve| {
-            let name = format!("{}: {}", self.title, self.name(&curve.key));
+            let name = format!("{}: {}", self.title, self.name(curve));
             let points = curve.points.iter();
             points.map(move |it| (name.clone(), it.x, it.y, it.tooltip.clone()))
         });
@@ -88,14 +88,17 @@ impl Plot {
         }
     }
 
-    /// What the legend calls a curve, or one of the same colour; a curve that no legend names is called by its style.
-    fn name<'a>(&'a self, key: &'a Key) -> &'a str {
+    /// What the legend calls a curve, or one of the same colour, and how it is drawn where it is no whole line.
+    fn name(&self, curve: &Curve) -> String {
+        let key = &curve.key;
         let keys = self.curves.iter().map(|curve| &curve.key);
         let alike = keys.filter(|it| it.class == key.class && it.dashed == key.dashed);
-        let mut labels = std::iter::once(key)
-            .chain(alike)
-            .map(|it| it.label.as_str());
-        labels.find(|label| !label.is_empty()).unwrap_or(key.class)
+        let labels = std::iter::once(key).chain(alike);
+        let mut labels = labels.map(|it| it.label.as_str());
+        let label = labels.find(|label| !label.is_empty()).unwrap_or(key.class);
+        let dashed = if key.dashed { ", dashed" } else { "" };
+        let points = if curve.has_line { "" } else { ", points" };
+        format!("{label}{dashed}{points}")
     }
 
     fn cells(&self, heat: &Heat) -> String {
@@ -287,5 +290,30 @@ pub(crate) fn bars(title: &str, class: &str, rows: &[(&str, Option<f64>)]) -> Pa
         svg: out + "</g></svg>",
         keys: Vec::new(),
         rows: rows.iter().map(row).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::svg::Key;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn curves_that_look_different_have_different_names() {
+        let axis = || Axis::linear("x", (0.0, 1.0));
+        let mut plot = Plot::new("panel", axis(), axis());
+        let key = || Key::line("euler", "Euler");
+        let points = [(0.0, 1.0)];
+        let unnamed = Key::line("rk4", "").dashed();
+        plot.curves = vec![
+            Curve::line(key(), points),
+            Curve::line(key().dashed(), points),
+            Curve::dots(key(), points),
+            Curve::line(Key::line("rk4", "rk4"), points),
+            Curve::line(unnamed, points),
+        ];
+        let names: BTreeSet<String> = plot.draw().rows.into_iter().map(|row| row.0).collect();
+        assert_eq!(names.len(), plot.curves.len(), "{names:?}");
     }
 }
