@@ -103,7 +103,7 @@ export function stepInLink() {
   return state.view === "course" ? `step=${at + 1}&` : "";
 }
 
-/** Loads the page anew, at the same step, with an arm of so many links. */
+/** Reloads the page at the same step, for an arm with this number of links. */
 export function chooseLinks(links) {
   const address = new URL(location.href);
   address.searchParams.delete("links");
@@ -237,7 +237,7 @@ function gallery(links) {
   return galleries[links];
 }
 
-/** How to get an arm of so many links: a click where the arm is in this page, else an option of the server. */
+/** Says how to get an arm with this number of links: by a click in the file, by an option at a server. */
 function otherArm(links) {
   return isAlone ? `Click for an arm of ${links} links.` : `Needs ${links} links: start pendularm with --links ${links}.`;
 }

@@ -430,8 +430,7 @@ pub enum FrameError {
     /// Something stood behind the object of a message that holds one.
     #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
     MoreBehind,
-    /// Longer than the limit, which it holds: [`MAX_FRAME`] unless the reader has
-    /// another.
+    /// Longer than the limit, which it holds: [`MAX_FRAME`] unless the reader has another.
     #[error("frame longer than {0} bytes, skipped")]
     TooLong(usize),
     /// Not UTF-8.

@@ -88,7 +88,7 @@ impl Plot {
         }
     }
 
-    /// What the legend calls a curve, or one of the same colour, and how it is drawn where it is no whole line.
+    /// The legend's name of a curve, or of one with the same style. Dashes and bare points are added to it.
     fn name(&self, curve: &Curve) -> String {
         let key = &curve.key;
         let keys = self.curves.iter().map(|curve| &curve.key);

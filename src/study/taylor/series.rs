@@ -287,8 +287,8 @@ fn between<T: Arithmetic + Default, const N: usize>(
     (sines, cosines)
 }
 
-#[cfg(feature = "report")]
 /// Joint accelerations \[rad/s²\] by the equation of motion itself, from sine and cosine of the joint angles.
+#[cfg(feature = "report")]
 pub(crate) fn acceleration<T: Arithmetic + Default, const N: usize>(
     arm: &Arm<N>,
     directions: &([T; N], [T; N]),
