@@ -16,7 +16,7 @@
 //! the multiples of π/2 up to it, at most 0.50 ulp. So it is never more than one floating-point number from the C
 //! library's. The sine of -0 is 0.
 //!
-//! **Invariant:** the same angle gives the same bits, whatever stands beside it.
+//! **Invariant:** the same angle gives the same bits in every lane.
 
 #![allow(
     clippy::indexing_slicing,

@@ -170,7 +170,7 @@ impl Handled {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<Census>")]
 pub struct TakeCensus {
-    /// The answer may have at most so many of them.
+    /// Most topics and services of the answer.
     pub at_most: usize,
 }
 

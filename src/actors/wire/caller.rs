@@ -132,7 +132,7 @@ impl Caller {
         self.gone.load(Ordering::Relaxed)
     }
 
-    /// Takes room for an answer of at most so many bytes, beside the echo of the caller's `id`, before it is computed.
+    /// Takes room for an answer of at most `bytes` bytes, beside the echo of the caller's `id`, before it is computed.
     /// Short ones need none to be taken.
     ///
     /// # Errors

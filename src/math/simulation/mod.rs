@@ -170,7 +170,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// Takes so many steps; breaks with the number of those that were taken where it ends before.
+    /// Takes `steps` steps. Breaks with the number of steps taken where the run ends early.
     fn take_steps<const HAS_GRAVITY: bool>(
         &mut self,
         steps: u64,

@@ -346,7 +346,7 @@ impl Trial {
         matches!(&self.pursuit, Pursuit::InFlight { goal_id: ours } if ours == goal_id)
     }
 
-    /// Drops whatever is pursued and goes for `target`.
+    /// Drops the present goal and pursues `target`.
     fn replace(&mut self, target: Target) -> Vec<TrialCommand> {
         // The new goal would preempt the old one, but not if it is refused.
         let mut commands = self.abandon();

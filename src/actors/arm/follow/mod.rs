@@ -235,7 +235,7 @@ impl<const N: usize> PathFollower<N> {
         ctx.wait(self.go_on());
     }
 
-    /// The same, for whoever waits for it.
+    /// The same, for an asker that waits for it.
     fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         motion.map(|motion, node, ctx| match motion {

@@ -54,7 +54,7 @@ pub(super) struct Opened<S> {
     pub(super) first: BytesMut,
 }
 
-/// The place of a client that the registry knows; whoever drops it gives it back.
+/// The place of a client that the registry knows. Dropping it gives it back.
 pub(super) struct HeldPlace {
     id: ConnectionId,
     registry: Addr<Registry>,

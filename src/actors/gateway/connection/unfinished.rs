@@ -22,7 +22,7 @@ impl Unfinished {
         self.received = 0;
     }
 
-    /// Notes that the client was waited for so long, and sent so many bytes.
+    /// Notes how long the client was waited for, and how many bytes it sent.
     pub(super) fn wait(&mut self, time: Duration, received: usize) {
         self.waited += time;
         self.received += received;

@@ -50,7 +50,7 @@ impl Served {
     }
 }
 
-/// The names, each with all that is known of it. Listed entries are shared with whoever asks for them.
+/// The names, each with all that is known of it. Listed entries are shared with each census.
 #[derive(Default)]
 pub(crate) struct Directory {
     topics: BTreeMap<Arc<str>, Users>,

@@ -154,7 +154,7 @@ impl Registry {
         }
     }
 
-    /// A registry without nodes, for at most so many clients at once.
+    /// A registry without nodes, for at most `clients` clients at once.
     #[must_use]
     pub fn serving_at_most(self, clients: usize) -> Self {
         let places = Places::of(clients);
