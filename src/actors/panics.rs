@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
-/// Longest part of a panic's own words that is told.
+/// Longest part of a panic's message that is reported.
 const MAX_WORDS: usize = 200;
 
 thread_local! {
@@ -28,7 +28,7 @@ thread_local! {
 #[error("{0}")]
 pub struct Contained(String);
 
-/// From now on a panic that nothing contains is told to `end`, on the thread where it happened; `end` should not
+/// From now on a panic that nothing contains is passed to `end`, on the thread where it happened; `end` should not
 /// return.
 pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     set_hook(Box::new(move |info| {

@@ -1,4 +1,4 @@
-//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name has it.
+//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name serves it.
 //!
 //! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and sees how the arm
 //! follows; the rules are `math::trajectory`'s. A goal ends where its setpoint is not the arm's any more: another

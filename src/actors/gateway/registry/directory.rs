@@ -1,7 +1,7 @@
 //! The names that clients have registered: topics that they use, services and actions that they serve. They are kept in
 //! order, so that telling them costs no search.
 //!
-//! **Invariant:** a name stands here as long as a client has it registered, and no longer.
+//! **Invariant:** a name is here exactly as long as a client has it registered.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
