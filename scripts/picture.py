@@ -20,7 +20,7 @@ from chromium import Browser  # noqa: E402
 from runtime import Runtime  # noqa: E402
 
 PICTURE = ROOT / (os.environ.get("OUT") or "docs/page.png")
-LIMIT = 150_000  # bytes: whoever opens the README loads it
+LIMIT = 150_000  # bytes: every reader of the README loads it
 
 
 def take():

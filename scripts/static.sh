@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the release program for every Linux of this processor, whatever C library it has: linked against musl, by Zig, which
+# Builds the release program for every Linux of this processor, with any C library: linked against musl, by Zig, which
 # comes from PyPI into python/.venv. The last line of standard output is the program's path.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -31,12 +31,12 @@ use pendularm::report;
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 
-/// How long freed memory is kept for whoever asks next, in milliseconds. The allocator's own ten seconds are enough to
+/// How long freed memory is kept for reuse, in milliseconds. The allocator's own ten seconds are enough to
 /// fill it with what one client held, and then as much again with what the next one does: beyond what README promises.
 #[cfg(unix)]
 const FREED_KEPT_MS: isize = 500;
 
-/// Exit status for whatever else fails.
+/// Exit status for every other failure.
 const FAILED: u8 = 1;
 /// Exit status for a bad option or a bad environment variable.
 const BAD_USAGE: u8 = 2;

@@ -24,7 +24,7 @@ pub fn print(text: &str) -> io::Result<bool> {
     }
 }
 
-/// Text on one line for a terminal, whoever its words come from.
+/// Text on one line for a terminal, escaped.
 #[must_use]
 pub fn line(text: &dyn Display) -> String {
     shortened(&text.to_string(), MAX_LINE)

@@ -40,7 +40,7 @@ pub struct PlanOptions {
 /// The motion for which method and timestep are planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlannedMotion {
-    /// The arm swings freely for so long \[s\].
+    /// Time for which the arm swings freely \[s\].
     Swing(f64),
     /// The arm is under control, with the default gains.
     Servo,

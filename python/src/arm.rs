@@ -17,7 +17,7 @@ pub(crate) enum Chain {
     Three(Rods<3>),
 }
 
-/// Does the same with an arm, a simulation, or whatever else there is for 2 and for 3 links.
+/// Does the same for both numbers of links, with an arm, a simulation or another type.
 macro_rules! for_either {
     ($kind:ident, $value:expr, $one:ident => $body:expr) => {
         match $value {

@@ -176,7 +176,7 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
     flags.getattr(intern!(py, "writeable"))?.is_truthy()
 }
 
-/// Converts whatever NumPy can make doubles of; complex numbers, text and `None` are none.
+/// Converts all that NumPy can make doubles of; complex numbers, text and `None` are none.
 fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let numpy = py.import("numpy")?;

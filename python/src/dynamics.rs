@@ -42,7 +42,7 @@ fn each_row<'py, const N: usize, const K: usize>(
     })
 }
 
-/// As [`each_row`], for an arm of so many `links`, with a `function` that takes all rows at once, and how many they are.
+/// As [`each_row`], for an arm of `links` links, with a `function` that takes all rows at once, and how many they are.
 fn all_rows<'py, const K: usize>(
     py: Python<'py>,
     links: usize,

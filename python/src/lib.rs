@@ -3,7 +3,7 @@
 //! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every
 //! arm is stepped by. `package/pendularm/` is what users import; it words what this module answers.
 //!
-//! **Invariant:** whatever takes longer than a moment runs with the interpreter's lock released, and ends when a
+//! **Invariant:** work of more than some milliseconds runs with the interpreter's lock released, and ends when a
 //! signal asks for it.
 
 mod arm;

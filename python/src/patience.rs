@@ -1,6 +1,6 @@
 //! Long computations, and waiting for them: without the interpreter's lock, and in pieces, so that Ctrl-C ends them.
 //!
-//! **Invariant:** a signal is heard within a fraction of a second, whatever is computed.
+//! **Invariant:** every computation notices a signal within a fraction of a second.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};

@@ -130,7 +130,7 @@ impl Simulation {
         Ok(Self { own })
     }
 
-    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The
+    /// Takes up to `steps` steps and returns how many: all unless the simulation has diverged. The
     /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps. With an `effort` [N m], (links,),
     /// the controller does not run in these steps, and that effort is applied instead.
     #[pyo3(signature = (steps=Whole::Is(1), effort=None), text_signature = "($self, steps=1, effort=None)")]
@@ -429,7 +429,7 @@ impl Simulation {
     }
 }
 
-/// Takes up to so many steps, with this effort or the controller's, and answers how many.
+/// Takes up to `steps` steps with this effort or the controller's, and returns how many.
 fn take<const N: usize>(
     py: Python<'_>,
     one: &Mutex<Loop<N>>,

@@ -3,7 +3,7 @@
 //! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
 //! a client or another node, is behind the [`Reply`]: the node does not know it.
 //!
-//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that
+//! **Invariant:** every [`Call`] is answered exactly once, even if the node that has it fails: a [`Reply`] that
 //! is dropped unanswered says so itself.
 
 use std::sync::Arc;
@@ -56,7 +56,7 @@ pub enum Unserved {
     /// Nobody waits for the answer.
     #[error("the caller is gone")]
     CallerGone,
-    /// No question is taken, or not so many.
+    /// Too many questions wait, or none is taken.
     #[error("{0}")]
     Refused(
         /// Why.
@@ -99,7 +99,7 @@ pub trait Asker<T>: Send {
     /// Takes the one answer. The news of the call's end, where it is there, travels with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Takes an answer of megabytes, which is written by whoever has it.
+    /// Takes an answer of megabytes, which is written by its receiver.
     fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
         self.answer(Ok(answer), None);
         Box::new(AlreadyGiven)
@@ -118,7 +118,7 @@ pub trait Asker<T>: Send {
     /// Hears, before the answer, why what it asked for has no effect yet. A node finds that in the answer.
     fn warn(&self, _why: &str) {}
 
-    /// Takes room for an answer of at most so many bytes before it is computed.
+    /// Takes room for an answer of at most `bytes` bytes before it is computed.
     ///
     /// # Errors
     /// While there is none.
@@ -127,7 +127,7 @@ pub trait Asker<T>: Send {
     }
 }
 
-/// The way back to whoever asked: one answer, then the end of the call.
+/// The way back to the asker: one answer, then the end of the call.
 ///
 /// A client that called is read no further until this value is dropped. So a call that has effects after its
 /// answer (a goal's setpoint) has had them before the client's next request is looked at.
@@ -159,7 +159,7 @@ impl<T> Reply<T> {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Takes room for an answer of at most so many bytes before it is computed. Small ones need none to be taken.
+    /// Takes room for an answer of at most `bytes` bytes before it is computed. Small ones need none to be taken.
     ///
     /// # Errors
     /// While there is none.

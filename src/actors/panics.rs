@@ -4,7 +4,7 @@
 //! computation that computation. Anywhere else, in a node or the registry, others would wait for ever. There the
 //! process ends at once, with one line that says where, so that its supervisor can start it again.
 //!
-//! **Invariant:** a panic is contained by whoever called [`contain`], or it is the last thing that the process does.
+//! **Invariant:** a panic is contained by the caller of [`contain`], or it is the last thing that the process does.
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
-/// Longest part of a panic's own words that is told.
+/// Longest part of a panic's message that is reported.
 const MAX_WORDS: usize = 200;
 
 thread_local! {
@@ -28,7 +28,7 @@ thread_local! {
 #[error("{0}")]
 pub struct Contained(String);
 
-/// From now on a panic that nothing contains is told to `end`, on the thread where it happened; `end` should not
+/// From now on a panic that nothing contains is passed to `end`, on the thread where it happened; `end` should not
 /// return.
 pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     set_hook(Box::new(move |info| {
@@ -76,7 +76,7 @@ impl<F: Future> Future for Contain<F> {
 /// One line: where, and the panic's own words, escaped and cut.
 fn describe(info: &PanicHookInfo<'_>) -> String {
     let mut line = String::from("panicked");
-    // A `String` takes whatever is written to it.
+    // Writing to a `String` cannot fail.
     if let Some(place) = info.location() {
         let _ = write!(line, " at {place}");
     }

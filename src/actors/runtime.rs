@@ -206,7 +206,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
     }
 }
 
-/// The ways by which the nodes that know the number of links are told of the end.
+/// The channels that tell the nodes of an arm about the end.
 struct NodeEnds {
     /// The nodes that have something under way for clients.
     busy: Vec<Recipient<ShutDown>>,
@@ -364,7 +364,7 @@ fn announce_page(address: SocketAddr, asks_token: bool) {
     }
 }
 
-/// Refuses what waits, lets every connection send what it owes, for a bounded time.
+/// Refuses waiting calls, and gives every connection a bounded time to send its queue.
 async fn shut_down(
     registry: &Addr<Registry>,
     busy: &[Recipient<ShutDown>],

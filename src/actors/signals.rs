@@ -1,4 +1,4 @@
-//! Signals, awaited on a thread that does nothing else, so that they are heard whatever the other threads do.
+//! Signals, awaited on a thread that does nothing else, so that no other thread delays them.
 //!
 //! An orderly end answers what waits, and asks every thread to take part. One that is busy with what a client has sent
 //! might not in time: then the last resort ends the process all the same.

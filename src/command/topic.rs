@@ -44,7 +44,7 @@ ends it with status 0.")]
         /// Print one message and end
         #[arg(long, conflicts_with = "times")]
         once: bool,
-        /// Print so many messages and end
+        /// Print N messages and end
         #[arg(short = 'n', long, value_name = "N", value_parser = ValueReader(read_count))]
         times: Option<usize>,
     },
@@ -78,7 +78,7 @@ Without --once or --times it publishes until a signal ends it.")]
         /// Publish one message and end
         #[arg(short = '1', long, conflicts_with = "times")]
         once: bool,
-        /// Publish so many messages and end
+        /// Publish N messages and end
         #[arg(short = 't', long, value_name = "N", value_parser = ValueReader(read_count))]
         times: Option<usize>,
         /// How many a second

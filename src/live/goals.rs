@@ -1,6 +1,6 @@
 //! The active goal as the arm sees it, and the arm's memory of goals. The rules are `math::goal`'s.
 //!
-//! **Invariant:** every goal ends once, and whoever asks about the latest end hears the same.
+//! **Invariant:** every goal ends once, and every query about the latest end gives the same.
 
 use glam::DVec2;
 
@@ -116,7 +116,7 @@ impl Past {
     /// lead there soon.
     const LONGEST: f64 = 1e9;
 
-    /// A reset comes, so long after the one before \[s\].
+    /// A reset comes, with the time since the one before \[s\].
     pub(super) fn end(&mut self, time: f64) {
         let time = self.time + time;
         self.time = if time < Self::LONGEST { time } else { 0.0 };

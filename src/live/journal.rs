@@ -1,4 +1,4 @@
-//! Everything that the arm's steps depend on, for whoever records it, with the number of steps before it.
+//! Everything that the arm's steps depend on, for a record, with the number of steps before it.
 //!
 //! **Invariant:** a listener that has not taken an input hears nothing more but the whole simulation, until it has
 //! taken that.
@@ -6,7 +6,7 @@
 use crate::math::arm::State;
 use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
 
-/// News of the arm for whoever records it.
+/// An event of the arm, for a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmNews<const N: usize> {
     /// Steps taken so far; goes on through resets.
@@ -59,7 +59,7 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// An input has taken effect, after so many steps.
+    /// An input has taken effect, after that many steps.
     pub(crate) fn change(&mut self, steps: u64, input: ArmInput<N>) {
         self.tell(steps, ArmEvent::Changed(input));
         if matches!(input, ArmInput::Reset) {

@@ -3,7 +3,7 @@
 //!
 //! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It
 //! is looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the
-//! controller off the loop in force is the arm left to itself, whatever gains and setpoint wait to be switched on.
+//! controller off the loop in force is the arm alone. Gains and setpoint have no effect on it.
 //!
 //! **Invariant:** nothing is ever refused or changed because of a limit or an error; they are only published.
 

@@ -3,8 +3,8 @@
 //! A parent process that never reads the pipe on our standard error must not stop the arm. A bounded queue therefore
 //! feeds the thread, and lines that find it full are dropped and counted.
 //!
-//! **Invariant:** logging never blocks, a broken standard error never fails anything, and an event is one line,
-//! whatever its text.
+//! **Invariant:** logging never blocks, a broken standard error never fails anything, and every event is one
+//! line.
 
 pub mod repeats;
 
@@ -49,7 +49,7 @@ pub type Warning = (&'static Metadata<'static>, String);
 
 static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
 
-/// Sends warnings and errors to `listener` too from now on, whatever the log's level. `None` ends that. A warning that
+/// Sends warnings and errors to `listener` too from now on, at every level of the log. `None` ends that. A warning that
 /// finds the channel full is dropped.
 pub fn hear_warnings(listener: Option<Sender<Warning>>) {
     *LISTENER.lock().unwrap_or_else(PoisonError::into_inner) = listener;
@@ -112,7 +112,7 @@ pub fn start(level: LevelFilter, format: LogFormat) -> io::Result<Log> {
     Ok(log)
 }
 
-/// Decides which events are printed, and passes warnings on to their listener, whatever the log's level.
+/// Decides which events are printed, and passes warnings on to their listener, at every level of the log.
 impl<S: Subscriber> Layer<S> for Log {
     fn max_level_hint(&self) -> Option<LevelFilter> {
         Some(self.level.max(LevelFilter::WARN))
@@ -139,7 +139,7 @@ impl<S: Subscriber> Layer<S> for Log {
 }
 
 impl Log {
-    /// Puts a line into the log, whatever the log's level is: an error.
+    /// Puts a line into the log as an error, at every level of the log.
     pub fn say(&self, line: &str) {
         self.put(self.own(Level::ERROR, OWN_TARGET, line));
     }
@@ -248,7 +248,7 @@ fn escape(line: &str) -> String {
     let mut escaped = String::with_capacity(line.len() + 1);
     for character in line.chars() {
         if acts(character) {
-            // A `String` takes whatever is written to it.
+            // Writing to a `String` cannot fail.
             let _ = write!(escaped, "\\u{:04x}", u32::from(character));
         } else {
             escaped.push(character);

@@ -68,7 +68,7 @@ fn take(until: &mut Instant, held: &mut Option<Repeated>, now: Instant) -> Optio
 /// An event as one line: the message, then the fields.
 fn text(event: &Event<'_>) -> String {
     let mut text = String::new();
-    // A `String` takes whatever is written to it.
+    // Writing to a `String` cannot fail.
     let _ = DefaultFields::new().format_fields(Writer::new(&mut text), event);
     text
 }

@@ -1,7 +1,7 @@
 //! A goal over time: whether the end effector has come near enough and stayed, and when its progress is due to be
 //! reported.
 //!
-//! Both are told the simulation time and the end effector's position after every step, while a goal is active.
+//! Both get the simulation time and the end effector's position after every step, while a goal is active.
 //!
 //! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the end effector farther
 //! than `epsilon` from the target.
@@ -35,7 +35,7 @@ pub(super) fn rounding(time: f64) -> f64 {
 pub struct Criteria {
     /// Greatest distance between end effector and target that counts as there \[m\], greater than 0.
     pub epsilon: f64,
-    /// Simulation time that the end effector must stay there without interruption \[s\]; 0 is content with the first
+    /// Simulation time that the end effector must stay there without interruption \[s\]; 0 accepts the first
     /// entry.
     pub success_hold: f64,
 }

@@ -1,4 +1,4 @@
-//! The physics and the control of the arm: plain values and pure functions that are told the time.
+//! The physics and the control of the arm: plain values and pure functions that get the time.
 //!
 //! **Invariant:** no clock, no I/O, no JSON, no threads, no actors in here.
 

@@ -1,14 +1,14 @@
 //! How many whole steps are due now, so that simulation time runs at wall time.
 //!
-//! The pacer is told the time and keeps two numbers: the moment from which it counts (the anchor) and the steps taken
+//! The pacer gets the time and keeps two numbers: the moment from which it counts (the anchor) and the steps taken
 //! since. `T` seconds after the anchor, `⌊T / timestep⌋` steps must have been taken in all; missing steps are due.
 //!
 //! ```text
 //! anchor ├──step──┼──step──┼──step──┼──step──┼─── now        taken = 2, due = 2
 //! ```
 //!
-//! A machine that falls behind owes at most [`CATCH_UP`] and the step in progress. Steps beyond that are dropped,
-//! by moving the anchor, so that a stall, however long, is not followed by a burst. It uses plain arithmetic only.
+//! A machine that falls behind catches up with at most [`CATCH_UP`] and the step in progress. Steps beyond that are
+//! dropped by moving the anchor, so that no burst follows a long stall. It uses plain arithmetic only.
 //!
 //! **Invariant:** the steps due come from one division of the time since the anchor, never from a running sum, so
 //! that 1 ms stays exact for days. No call returns more than `⌊CATCH_UP / timestep⌋ + 1`.
@@ -27,7 +27,7 @@ const NANOSECONDS: f64 = 1e9;
 /// the division's. Four are granted; that brings a step forward by less than a nanosecond for the first ten days.
 const SLACK: f64 = 1.0 + 2.0 * f64::EPSILON;
 
-/// Counts whole steps against a clock that it is told.
+/// Counts whole steps against a clock that its caller reads.
 ///
 /// ```
 /// use pendularm::math::pacer::Pacer;
@@ -67,7 +67,7 @@ impl Pacer {
     }
 
     /// Steps due at `now`. They stay due until they are reported by [`Pacer::took`], except for those that are dropped
-    /// because more than [`CATCH_UP`] and the step in progress was owed. A `now` before the last one owes nothing.
+    /// because more than [`CATCH_UP`] and the step in progress was due. No step is due at a `now` before the last one.
     pub fn due(&mut self, now: Duration) -> u64 {
         let most = self.whole_steps(CATCH_UP).saturating_add(1);
         let due = self.owed(now);

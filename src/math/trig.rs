@@ -2,7 +2,7 @@
 //!
 //! Every stage is done for all angles before the next begins, so that the compiler can put two of them into one
 //! register. Nothing branches on the angle, but for arms that have turned more than 30,000 times. The same
-//! operations in the same order on every platform: the physics does not hang on the C library.
+//! operations in the same order on every platform. Results do not depend on the platform's libm.
 //!
 //! The angle is reduced to `r = angle - k π/2`, `|r| <= π/4`, with π/2 in three parts, the first two of 36 bits, so
 //! that their products with `k < 2¹⁷` are exact (Cody and Waite). The rounding error of `r` is kept as `tail`. Then
@@ -16,7 +16,7 @@
 //! the multiples of π/2 up to it, at most 0.50 ulp. So it is never more than one floating-point number from the C
 //! library's. The sine of -0 is 0.
 //!
-//! **Invariant:** the same angle gives the same bits, whatever stands beside it.
+//! **Invariant:** the same angle gives the same bits in every lane.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,5 +1,5 @@
-//! Runs on record: an MCAP file with every topic as ROS 2 has it, with calls and answers, and with the inputs that make
-//! the run repeatable.
+//! Runs on record: an MCAP file with every topic in the format of ROS 2, with calls and answers, and with the inputs
+//! that make the run repeatable.
 //!
 //! It is pure: entries in, bytes out, and back. The [recorder](crate::actors::recorder) makes the entries and takes the
 //! bytes.

@@ -28,7 +28,7 @@ pub(super) const INPUT: Type = Type {
     constants: &[],
 };
 
-/// The arm's state after so many steps.
+/// The arm's state after that many steps.
 pub(super) const STATE: Type = Type {
     name: "pendularm_interfaces/msg/RecordedState",
     fields: &[

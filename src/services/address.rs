@@ -14,7 +14,7 @@ pub struct Address {
     service: Service,
     name: Box<str>,
     id: Option<Payload>,
-    /// How the caller is told why the call failed.
+    /// The form in which the caller gets the reason of a failed call.
     error_form: ErrorForm,
 }
 
@@ -30,7 +30,7 @@ impl Address {
         }
     }
 
-    /// The caller is told in this form why the call failed.
+    /// The form in which the caller gets the reason of a failed call.
     #[must_use]
     pub fn with_errors(self, error_form: ErrorForm) -> Self {
         Self { error_form, ..self }

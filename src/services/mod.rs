@@ -49,7 +49,7 @@ pub trait Answered: Callable {
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
 }
 
-/// A question whose answer may be long: the thread that has it writes the response, a piece at a time.
+/// A question whose answer may be long: the thread that computes it writes the response, a piece at a time.
 pub trait Streamed: Callable {
     /// A response that is being written.
     type Writer: Send + 'static;

@@ -48,7 +48,7 @@ impl Host {
         }
     }
 
-    /// Whether this machine alone answers to it, whatever a name server says.
+    /// Whether this machine alone has that name, independent of any name server.
     #[must_use]
     pub fn is_loopback(&self) -> bool {
         match self {

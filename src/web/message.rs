@@ -34,7 +34,7 @@ impl OneLine {
         }
     }
 
-    /// Appends the next piece, of at most so many bytes; whether that was the last.
+    /// Appends the next piece, of at most `most` bytes. True if it was the last.
     pub fn append(&mut self, most: usize, stream: &mut BytesMut) -> bool {
         let is_last = self.message.len() < most;
         let piece = self.message.split_to(self.message.len().min(most));

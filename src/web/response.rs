@@ -85,7 +85,7 @@ pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
     let mut message =
         format!("HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: {length}\r\n");
     for (name, value) in response.headers() {
-        // A `String` takes whatever is written to it.
+        // Writing to a `String` cannot fail.
         let value = value.to_str().unwrap_or_default();
         let _ = write!(message, "{name}: {value}\r\n");
     }

@@ -18,7 +18,7 @@ unsafe extern "C" {
     safe fn milliseconds() -> f64;
 }
 
-/// The kernel of an arm with so many links.
+/// The kernel of an arm with 2 or 3 links.
 enum AnyKernel {
     Two(Kernel<2>),
     Three(Kernel<3>),
@@ -52,7 +52,7 @@ fn give(bytes: Vec<u8>) -> usize {
     length
 }
 
-/// Begins anew with an arm of so many links.
+/// Begins anew with an arm of `links` links.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(links: usize, seed: f64) {
     let seed = seed.to_bits();
@@ -63,7 +63,7 @@ pub extern "C" fn start(links: usize, seed: f64) {
     }));
 }
 
-/// Makes room for a frame of so many bytes, and returns where it is.
+/// Makes room for a frame of `length` bytes, and returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(length: usize) -> *mut u8 {
     INPUT.with_borrow_mut(|input| {

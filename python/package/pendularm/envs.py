@@ -122,7 +122,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             self._task = self.task_of(num_envs, links, threads, method, timestep)
         except ValueError as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
-        # No arm takes so many steps in a lifetime: the largest number is no limit.
+        # The largest number is no limit in practice.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
         self._picture = Renderer(render_mode, self._task)
         self.num_envs = num_envs

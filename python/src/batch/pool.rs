@@ -41,7 +41,7 @@ pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
     pool
 }
 
-/// As many threads as the system has, up to so many. The number of threads changes no result.
+/// As many threads as the system has, up to `threads`. The number of threads changes no result.
 fn started(threads: usize) -> Option<Arc<ThreadPool>> {
     let fewer = iter::successors(Some(threads), |count| Some(count / 2));
     fewer.take_while(|&count| count > 1).find_map(|count| {

@@ -1,6 +1,6 @@
 //! The arrays that show a batch's arms.
 //!
-//! **Invariant:** they are made once, and whoever is given one cannot write it.
+//! **Invariant:** they are made once, and are read-only.
 
 use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
 use pyo3::IntoPyObject;

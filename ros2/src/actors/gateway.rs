@@ -1,6 +1,6 @@
 //! The arm's side: one rosbridge connection, with the topics that are wanted and the calls that wait.
 //!
-//! **Invariant:** whoever asks is answered, at the latest when the connection ends.
+//! **Invariant:** every call is answered, at the latest when the connection ends.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -173,7 +173,7 @@ impl Handler<Ended> for Gateway {
         report::say(&format!("the arm at {} has gone: {why}", self.address));
         self.outgoing = None;
         self.listeners.clear();
-        // Dropped, each says so to whoever waits.
+        // Dropped, each tells its waiting caller.
         self.calls.clear();
         self.goals.clear();
         self.graph.do_send(ArmPresence::Gone);

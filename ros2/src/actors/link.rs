@@ -16,7 +16,7 @@ use crate::report;
 
 /// Time to connect and to be let in.
 const OPENING: Duration = Duration::from_secs(5);
-/// An arm publishes its clock 60 times a second, paused or not. One that is silent for so long is gone.
+/// An arm publishes its clock 60 times a second, paused or not. A silence of this length means that it is gone.
 const SILENCE: Duration = Duration::from_secs(10);
 /// Longest line that is read; a run of `/study/rollout` with all its samples has some megabytes.
 const MAX_LINE: u64 = 64 * 1024 * 1024;

@@ -34,7 +34,7 @@ pub(super) struct Outlet {
 }
 
 impl Outlet {
-    /// A publisher there. A latched one gives its last message to whoever comes late.
+    /// A publisher there. A latched one gives its last message to late subscribers.
     pub(super) fn new(
         session: &Session,
         endpoint: Endpoint,

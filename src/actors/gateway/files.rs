@@ -22,7 +22,7 @@ pub struct Room {
     pub unauthenticated: usize,
 }
 
-/// Raises the limit of open files as far as so many clients need and the system allows. Returns how many connections
+/// Raises the limit of open files as far as `wanted_clients` need and the system allows. Returns how many connections
 /// there can be. They are fewer where the limit stays too low, which is logged.
 #[must_use]
 pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
@@ -61,7 +61,7 @@ fn raise_limit(_: usize) -> std::io::Result<usize> {
     Ok(usize::MAX)
 }
 
-/// Counts the places for so many open files: there is at least one client. Where files are few, those without the token
+/// Counts the places that `files` open files allow: at least one client. Where files are few, those without the token
 /// have half of them.
 #[must_use]
 pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room {

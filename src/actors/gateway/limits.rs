@@ -11,7 +11,7 @@ use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 const KIB: usize = 1024;
 
-/// Bytes that the program has resident at most with the default number of places, whatever clients do. The system's
+/// Bytes that the program has resident at most with the default number of places. The system's
 /// buffers for sockets are not in it.
 pub const MAX_MEMORY: usize = 640 * KIB * KIB;
 /// Bytes of one client at most, without long frames and answers. They are its input, as it comes and as a frame,
@@ -64,7 +64,7 @@ pub const HEAD_TIME: Duration = Duration::from_secs(5);
 /// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
 /// end of the stream itself may take.
 pub const LINGER: Duration = Duration::from_secs(5);
-/// A client that takes no byte for so long is disconnected, while responses wait or a topic message that takes shared
+/// A client that takes no byte in this time is disconnected, while responses wait or a topic message that takes shared
 /// room.
 pub const STALL_LIMIT: Duration = Duration::from_secs(20);
 /// How long a frame may take from its first byte to its last. A frame that is too long is skipped, and has as much time
@@ -82,5 +82,5 @@ pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
 /// at again.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
+/// Computations of one connection that wait at most behind the one that runs. The client is not read meanwhile.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

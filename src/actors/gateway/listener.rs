@@ -23,7 +23,7 @@ pub const SEND_BUFFER: u32 = 128 * 1024;
 pub const BACKLOG: u32 = 1024;
 /// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
 const BACKOFF: Duration = Duration::from_millis(50);
-/// After so long a silence a client's machine is asked whether it is still there. That is seldom enough to cost
+/// After this time of silence a client's machine is asked whether it is still there. That is seldom enough to cost
 /// nothing, and often enough for a router in between to keep the connection.
 pub const KEEPALIVE_IDLE: Duration = Duration::from_secs(60);
 /// Time between two such questions, and how many may go unanswered: a client survives half a minute without a network.

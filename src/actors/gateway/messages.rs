@@ -49,7 +49,7 @@ pub struct Outlets {
     pub configure: Recipient<Configure>,
     /// The end.
     pub finish: Recipient<Finish>,
-    /// Set while the client is told why a call failed in `values` too.
+    /// Set while a failed call has its reason in `values` too.
     pub wants_text: Arc<AtomicBool>,
     /// Set when the client is gone: heavy computations for it stop.
     pub gone: Arc<AtomicBool>,
@@ -58,7 +58,7 @@ pub struct Outlets {
 }
 
 impl Outlets {
-    /// How the client is told why a call failed.
+    /// The form in which the client gets the reason of a failed call.
     #[must_use]
     pub fn error_form(&self) -> ErrorForm {
         form_of(&self.wants_text)
@@ -170,7 +170,7 @@ impl Handled {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<Census>")]
 pub struct TakeCensus {
-    /// The answer may have at most so many of them.
+    /// Most topics and services of the answer.
     pub at_most: usize,
 }
 

@@ -92,7 +92,7 @@ pub(super) fn begin(
     begun
 }
 
-/// The name of the file, as it is told.
+/// The name of the file, as answers give it.
 pub(super) fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
@@ -113,7 +113,7 @@ fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
     File::create_new(&target.path).map_err(refused)
 }
 
-/// The operator is told of the file as he gave it; where the folder of clients lies is not theirs to know.
+/// The operator gets the path that he gave. Clients get a name without the path of the folder.
 fn failure(target: &TapeTarget, why: &impl ToString) -> NotRecorded {
     let path = &target.path;
     NotRecorded::File {

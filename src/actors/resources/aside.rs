@@ -37,7 +37,7 @@ pub enum WorkKind {
 }
 
 impl WorkKind {
-    /// Reads so many bytes of a client's input.
+    /// Reads that many bytes of a client's input.
     #[must_use]
     pub const fn reading(bytes: usize) -> Self {
         if bytes > MEDIUM {
@@ -47,7 +47,7 @@ impl WorkKind {
         }
     }
 
-    /// Writes a message of so many bytes in another form.
+    /// Writes a message of that many bytes in another form.
     #[must_use]
     pub const fn writing(bytes: usize) -> Self {
         if bytes > MEDIUM {

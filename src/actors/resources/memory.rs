@@ -42,7 +42,7 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// Pools of so many long frames, and of so many bytes of long answers.
+    /// Pools of `frames` long frames and of `answers` bytes of long answers.
     #[must_use]
     pub fn of(frames: usize, answers: usize) -> Self {
         let size = (frames.max(1), answers.div_ceil(ANSWER_PART).max(1));
@@ -59,7 +59,7 @@ impl Memory {
         Permit::new(permit.ok())
     }
 
-    /// The permit for an answer of at most so many bytes, if there is room for it now. The longest answer finds room
+    /// The permit for an answer of at most `bytes` bytes, if there is room for it now. The longest answer finds room
     /// once all others are gone.
     ///
     /// # Errors

@@ -4,12 +4,12 @@
 //! **Invariant:** a thread steps back once, when it starts, and stays there.
 
 /// How far a thread steps back, on the system's scale of niceness. Beside one that does not it still has a quarter of a
-/// core: other programs, which it gives way to as well, can't starve it.
+/// core: other programs, which have priority too, can't starve it.
 #[cfg(target_os = "linux")]
 const STEP_BACK: i32 = 5;
 
-/// From now on the present thread gives way to the program's others. Only on Linux: elsewhere the whole process would
-/// step back.
+/// Lowers the priority of the present thread below the program's others. Only on Linux: elsewhere it would change
+/// that of the whole process.
 pub fn give_way() {
     // Where that is forbidden all threads are equals.
     #[cfg(target_os = "linux")]

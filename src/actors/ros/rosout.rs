@@ -1,4 +1,4 @@
-//! `/rosout`: the runtime's own warnings and errors, for whoever subscribes.
+//! `/rosout`: the runtime's own warnings and errors.
 //!
 //! **Invariant:** without subscribers no warning is even noted.
 

@@ -15,7 +15,7 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
 
-/// A client's goal for an action or its end, as the registry has it.
+/// A client's goal for an action or its end, as the registry passes it on.
 pub enum ActionRequest {
     /// A goal.
     Goal {

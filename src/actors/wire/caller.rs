@@ -1,4 +1,4 @@
-//! A call as the registry has it, the client that made it, and the way back.
+//! A call as the registry passes it on, the client that made it, and the way back.
 //!
 //! **Invariant:** every call is answered once: a caller that is dropped unanswered says so itself.
 
@@ -21,7 +21,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
 use crate::services::Address;
 
-/// A call of one of the runtime's own services, as the registry has it.
+/// A call of one of the runtime's own services, as the registry passes it on.
 pub struct ServiceCall {
     /// The service that was called.
     pub service: Service,
@@ -31,7 +31,7 @@ pub struct ServiceCall {
     pub caller: Caller,
 }
 
-/// A client's message on a topic that the runtime subscribes to, as the registry has it.
+/// A client's message on a topic that the runtime subscribes to, as the registry passes it on.
 pub struct TopicMessage {
     /// The message, as far as the runtime needs it.
     pub heard: NodeMessage,
@@ -107,7 +107,7 @@ impl Caller {
         self
     }
 
-    /// The caller is told in this form why the call failed.
+    /// The form in which the caller gets the reason of a failed call.
     #[must_use]
     pub fn with_errors(mut self, form: ErrorForm) -> Self {
         self.address = self.address.take().map(|address| address.with_errors(form));
@@ -132,7 +132,7 @@ impl Caller {
         self.gone.load(Ordering::Relaxed)
     }
 
-    /// Takes room for an answer of at most so many bytes, beside the echo of the caller's `id`, before it is computed.
+    /// Takes room for an answer of at most `bytes` bytes, beside the echo of the caller's `id`, before it is computed.
     /// Short ones need none to be taken.
     ///
     /// # Errors

@@ -76,7 +76,7 @@ impl Nodes {
     }
 }
 
-/// Has arguments of so many bytes read: long ones on another thread, and what their client sends behind them waits.
+/// Reads arguments of `length` bytes: long ones on another thread, while the client's next frames wait.
 pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
     if length > LONG_ARGUMENTS {
         // Boxed, for every kind of task is compiled anew: there is one then, not one for each service.

@@ -7,7 +7,7 @@
 //!
 //! In the frame of link `i` (x along it, y across it) and in units of its mass, let its tip carry `A = (a b; b c)` and
 //! `B`. With `u = (τ_i - τ_{i+1}) / (m_i l_i)`, `w = l_i φ̇_i²`, `W = 1 + 3c`, `X = 1 + a + 3c + 3 det A` and `E = det
-//! A · A⁻¹ B`, Newton and Euler give for a uniform rod, whatever its length:
+//! A · A⁻¹ B`, Newton and Euler give for a uniform rod of any length:
 //!
 //! | | |
 //! | --- | --- |

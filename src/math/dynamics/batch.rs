@@ -2,7 +2,7 @@
 //!
 //! Numbers come and go in columns, a slice per joint, which registers are filled from without a shuffle.
 //!
-//! **Invariant:** every state has the bits that [`super::forward_dynamics`] gives it, whichever stand beside it.
+//! **Invariant:** every state has the bits that [`super::forward_dynamics`] gives, in every batch.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,4 +1,4 @@
-//! One arm in the lower lanes of registers of two, sines and cosines in both: how plain `x86-64` has it fastest.
+//! One arm in the lower lanes of registers of two, sines and cosines in both: the fastest layout on baseline `x86-64`.
 //!
 //! Left to itself, the compiler packs numbers of the recursion in pairs as it finds them. That saves instructions, but
 //! each pair is shuffled together and apart where the next result is waited for: with 3 links a third of the time.

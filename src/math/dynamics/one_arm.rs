@@ -1,6 +1,6 @@
 //! The accelerations of one arm.
 //!
-//! **Invariant:** their bits do not hang on the registers that they are found in.
+//! **Invariant:** results are bit-identical for every SIMD width.
 
 use super::articulated_body::recursion;
 use crate::math::arm::Arm;

@@ -75,7 +75,7 @@ pub(super) enum Precedence {
     Sum,
     Product,
     Power,
-    /// A negation, and whatever stands for itself: no operation asks for anything tighter.
+    /// A negation, a number, a name or parentheses: nothing binds tighter.
     Operand,
 }
 

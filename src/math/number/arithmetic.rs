@@ -1,7 +1,7 @@
 //! Arithmetic as a method's steps need it: less than dynamics and control do, so that numbers of more digits can be
 //! stepped too.
 //!
-//! **Invariant:** every number of the arm's formulas has it.
+//! **Invariant:** every number of the arm's formulas implements it.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -4,7 +4,7 @@
 //! done in all lanes alike. Two have to look at a lane by itself, the bound of an integral and the quadrant of an
 //! angle: they select and do not branch.
 //!
-//! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next but
+//! **Invariant:** every operation rounds once, to the nearest, as in IEEE 754, and none is fused with the next but
 //! where that changes nothing. So a lane has the bits of the arm that is stepped alone, on every machine and in
 //! registers of every width.
 

@@ -12,12 +12,12 @@ impl<const N: usize> Simulation<N> {
         self.time_after(0)
     }
 
-    /// Simulation time when so many more steps will have been taken \[s\].
+    /// Simulation time after `steps` more steps \[s\].
     pub(super) fn time_after(&self, steps: u64) -> f64 {
         self.base + in_f64(self.steps_since_base.saturating_add(steps)) * self.timestep
     }
 
-    /// How many of so many steps lead to a finite time: all of them, unless time ends before.
+    /// How many of `steps` lead to a finite time.
     // Within the loop that steps it would take registers: two instructions a step.
     #[inline(never)]
     pub(super) fn steps_with_time(&self, steps: u64) -> u64 {

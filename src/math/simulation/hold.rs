@@ -1,5 +1,5 @@
 //! Where a step's effort comes from: the control law, run once per control period and held meanwhile; commands while
-//! the controller is off; or whoever drives the arm by hand.
+//! the controller is off; or the effort that an outside controller sets.
 //!
 //! A control period is `k` steps, `k` the whole number nearest to the period that was asked for over the timestep, and
 //! at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay, its
@@ -12,7 +12,7 @@ use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::pid::{Control, Pid};
 
-/// Most steps of a control period: whole numbers up to it are exact as `f64`, and nobody waits for so many.
+/// Most steps of a control period: whole numbers up to it are exact as `f64`. They take years.
 const MOST_STEPS: u64 = 1 << 53;
 
 /// The time between two runs of the law, and whether their answers come late.

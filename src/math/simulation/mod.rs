@@ -62,7 +62,7 @@ pub struct Disturbance<const N: usize> {
 
 impl<const N: usize> Disturbance<N> {
     /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
-    /// timestep` steps, rounded up, so that at least one has it.
+    /// timestep` steps, rounded up, so that at least one takes it.
     ///
     /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, and
     /// by far less than a timestep. So 1.1 s in steps of 0.1 s are eleven steps, not twelve.
@@ -170,7 +170,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// Takes so many steps; breaks with the number of those that were taken where it ends before.
+    /// Takes `steps` steps. Breaks with the number of steps taken where the run ends early.
     fn take_steps<const HAS_GRAVITY: bool>(
         &mut self,
         steps: u64,
@@ -396,7 +396,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Applies `effort` \[N m\] instead of the controller's and of commands from the next step on, or no longer. The
-    /// controller stands still meanwhile; a control period begins afterwards.
+    /// controller is paused meanwhile; a control period begins afterwards.
     pub fn drive(&mut self, effort: Option<[f64; N]>) {
         let change = |held: &mut Held<N>| held.driven = effort;
         self.hold.begin_period(self.timestep, change);

@@ -1,6 +1,6 @@
 //! A timed trial: one random target after another, counted as the arm reaches them.
 //!
-//! A [`Trial`] is told what happens and says what to do about it, as a list of [`TrialCommand`]s; the actor around it
+//! A [`Trial`] gets events and returns a list of [`TrialCommand`]s; the actor around it
 //! only carries messages. It knows no arm. Targets come from a closure (usually around [`sample`]), and goals are
 //! known by their ids. The time is the simulation time that [`Trial::tick`] gets, before anything else that happened
 //! at that time.
@@ -346,7 +346,7 @@ impl Trial {
         matches!(&self.pursuit, Pursuit::InFlight { goal_id: ours } if ours == goal_id)
     }
 
-    /// Drops whatever is pursued and goes for `target`.
+    /// Drops the present goal and pursues `target`.
     fn replace(&mut self, target: Target) -> Vec<TrialCommand> {
         // The new goal would preempt the old one, but not if it is refused.
         let mut commands = self.abandon();

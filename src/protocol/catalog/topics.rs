@@ -134,7 +134,7 @@ const LOG_LEVELS: [Constant; 5] = [
     byte("FATAL", "50"),
 ];
 
-/// A goal's name, as ROS 1 has it.
+/// A goal's name in ROS 1.
 const GOAL_ID: [Field; 2] = [
     required("stamp", "builtin_interfaces/msg/Time", "s, ns"),
     required("id", "string", ""),

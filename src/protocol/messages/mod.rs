@@ -56,7 +56,7 @@ pub enum ErrorForm {
     /// An object, like that of any other response. It holds over raw TCP until the client says otherwise.
     #[default]
     Object,
-    /// The text of `status`, as `rosbridge_suite` has it. It holds over WebSocket until the client says otherwise.
+    /// The text of `status`, as in `rosbridge_suite`. It holds over WebSocket until the client says otherwise.
     Text,
 }
 

@@ -149,7 +149,7 @@ mod tests {
         assert!((end_effector.rotation.w - 1.0).abs() < 1e-15);
         let back = seen("hand", "world", [0.0, 0.0]);
         assert_eq!((back.translation.x, back.translation.y), (-1.5, 0.0));
-        // From one link to the next: the length of the first, whatever the pose.
+        // From one link to the next: the length of the first, in every pose.
         let next = seen("link1", "link2", [0.3, 0.7]);
         assert!((next.translation.x - 1.0).abs() < 1e-15 && next.translation.y.abs() < 1e-15);
         assert!((next.rotation.z - 0.35_f64.sin()).abs() < 1e-15);

@@ -196,7 +196,7 @@ impl<'a> Fields<'a> {
         self.take(name)
     }
 
-    /// An array of at most `most` values, whatever they are.
+    /// An array of at most `most` values of any type.
     pub fn entries(&mut self, name: &'static str, most: usize) -> Option<Vec<&'a RawValue>> {
         let raw = self.take(name)?;
         let Some(entries) = json::entries(raw, most) else {

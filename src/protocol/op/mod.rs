@@ -319,7 +319,7 @@ impl Arguments {
         )
     }
 
-    /// The arguments, whatever they are.
+    /// The arguments, of any type.
     #[must_use]
     pub fn payload(&self) -> &Payload {
         match self {

@@ -113,7 +113,7 @@ impl<'a> OpReader<'a> {
             .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
     }
 
-    /// A call. As soon as its service is known it can be answered as a call, whatever else is wrong.
+    /// A call. As soon as its service is known any other fault is answered as a call.
     fn call(&self) -> Result<Op, OpError> {
         let service = self.name("service").map_err(OpError::Status)?;
         let fields = Service::from_name(&service)
@@ -390,7 +390,7 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
 // ---- actions: goals and cancellations from those who send them, the rest from action servers ------------------------
 
 impl OpReader<'_> {
-    /// A goal. As soon as its action is known it can be answered as a goal, whatever else is wrong.
+    /// A goal. As soon as its action is known any other fault is answered as a goal.
     fn goal(&self) -> Result<Op, OpError> {
         let action = self.name("action").map_err(OpError::Status)?;
         match self.goal_for(&action) {

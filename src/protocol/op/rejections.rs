@@ -1,6 +1,6 @@
 //! Why fields of a request were not taken, by name.
 //!
-//! **Invariant:** they are reported in one line of bounded length, whatever was sent.
+//! **Invariant:** they are reported in one line of bounded length.
 
 use std::borrow::Cow;
 use std::fmt;

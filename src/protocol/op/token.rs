@@ -54,7 +54,7 @@ impl Token {
         self.0.as_bytes().ct_eq(presented.as_bytes()).into()
     }
 
-    /// The secret itself, to be handed to whoever has just shown it.
+    /// The secret itself, for a client that has just shown it.
     #[must_use]
     pub fn reveal(&self) -> &str {
         &self.0

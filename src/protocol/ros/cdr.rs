@@ -70,7 +70,7 @@ impl Writer {
                         self.single(kind, inner, entry);
                     }
                 }
-                // No count stands in front, since the type has it.
+                // No count is in front, since the type gives it.
                 Count::Exactly(count) => {
                     let mut entries = value.entries().into_iter().flatten();
                     for _ in 0..count {

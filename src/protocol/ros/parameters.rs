@@ -55,7 +55,7 @@ pub enum ParameterType {
 }
 
 impl ParameterType {
-    /// The type's name, as ROS 2 has it.
+    /// The type's name in ROS 2.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -17,7 +17,7 @@ pub fn describe_semantics(joint_names: &[&str]) -> String {
          <chain base_link=\"{WORLD}\" tip_link=\"{END_EFFECTOR}\"/>\n  </group>\n  \
          <group_state name=\"home\" group=\"{GROUP}\">\n"
     );
-    // A `String` takes whatever is written to it.
+    // Writing to a `String` cannot fail.
     for joint in joint_names {
         let _ = writeln!(xml, "    <joint name=\"{joint}\" value=\"0\"/>");
     }

@@ -28,7 +28,7 @@ pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String
         let across =
             (mass * length * length / 12.0).clamp(f64::MIN_POSITIVE / AXIAL_PART, f64::MAX);
         let along = across * AXIAL_PART;
-        // A `String` takes whatever is written to it.
+        // Writing to a `String` cannot fail.
         let _ = write!(
             xml,
             "  <joint name=\"{joint}\" type=\"continuous\">\n    <parent link=\"{parent}\"/>\n    \
@@ -72,7 +72,7 @@ mod tests {
         assert_eq!(xml.matches("type=\"continuous\"").count(), 2);
     }
 
-    /// Each inertia is greater than 0 and at most the sum of the other two, whatever the rod.
+    /// Each inertia is greater than 0 and at most the sum of the other two, for every rod.
     #[test]
     fn inertias_are_those_of_a_body() {
         let numbers = [5e-324, 1e-200, 1e-9, 0.002, 0.05, 1.0, 1e9, 1e200, f64::MAX];

@@ -1,7 +1,7 @@
 //! Long messages in pieces: `fragment` in both directions.
 //!
 //! They [go out](split()) only to subscribers that asked for them with `fragment_size`, and are taken in from any
-//! client, within bounds. The module is told the time.
+//! client, within bounds. The caller gives the time.
 //!
 //! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
 //! messages, none of them for longer than [`MAX_AGE`].

@@ -108,7 +108,7 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
-        // A `Vec` would double beyond [`MEDIUM`] before so many bytes have come.
+        // A `Vec` would grow to twice [`MEDIUM`] before those bytes have come.
         let needed = self.buffer.len() + bytes.len();
         if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
             self.buffer.reserve_exact(MEDIUM - self.buffer.len());

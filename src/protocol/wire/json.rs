@@ -2,9 +2,9 @@
 //!
 //! Python's `json` writes `NaN`, `Infinity` and `-Infinity`, and anybody may write `1e999`. Coming in, the names become
 //! literals that overflow, so that the parser takes the frame and [`number`] gives a non-finite value for the field's
-//! reader to reject by name. Going out, in payloads that only pass through, whatever overflows becomes `null`.
+//! reader to reject by name. Going out, in payloads that only pass through, a number that overflows becomes `null`.
 //!
-//! **Invariant:** one pass, linear in the length of the text, whatever the text is.
+//! **Invariant:** one pass, linear in the length of any text.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;

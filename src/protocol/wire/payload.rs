@@ -21,7 +21,7 @@ struct Inner {
 }
 
 impl Payload {
-    /// The value as it came: numbers that overflow are still there, for whoever has to refuse them by name.
+    /// The value as it came: numbers that overflow are still there, so that a reader can refuse them by name.
     #[must_use]
     pub fn raw(&self) -> &RawValue {
         &self.0.raw

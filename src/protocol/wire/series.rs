@@ -93,7 +93,7 @@ fn lines(bytes: &[u8]) -> usize {
     parts.map(|part| usize::from(ends(part))).sum()
 }
 
-/// The last messages of a series, at most so many.
+/// The last messages of a series, at most `count`.
 #[must_use]
 pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
     let mut start = frames.len();

@@ -42,7 +42,7 @@ pub(crate) fn acts(character: char) -> bool {
 /// Appends a character, escaped where it [acts].
 pub(crate) fn push_plain(text: &mut String, character: char) {
     if acts(character) {
-        // A `String` takes whatever is written to it.
+        // Writing to a `String` cannot fail.
         let _ = write!(text, "{}", character.escape_default());
     } else {
         text.push(character);

@@ -26,7 +26,7 @@ pub const STEPS_IN_A_ROW: u64 = 1000;
 pub struct Step<const N: usize> {
     /// How many, 1 to [`MAX_STEPS`].
     pub steps: Option<u64>,
-    /// The effort that is applied in them \[N m\], while the controller stands still; none for the controller's.
+    /// The effort that is applied in them \[N m\], while the controller is paused; none for the controller's.
     pub effort: Option<[f64; N]>,
     /// Fields that were not valid.
     pub rejected: Rejections,

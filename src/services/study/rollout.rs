@@ -1,7 +1,7 @@
 //! `/study/rollout`: an offline run of the arm, sample by sample, with its cost and its error.
 //!
 //! The run is made once by itself, against a worker's clock. If a reference is asked for, it is made again beside the
-//! reference, which costs far more than the run. So `took` is the time of the run alone, whatever else was asked.
+//! reference, which costs far more than the run. So `took` is the time of the run alone.
 //!
 //! **Invariant:** the samples are the live arm's own steps, and a run in slices gives the same bits as one at once.
 

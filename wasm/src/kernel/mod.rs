@@ -133,7 +133,7 @@ impl<const N: usize> Kernel<N> {
         self.settle();
     }
 
-    /// Computes for so long, if a computation waits. True if one still does.
+    /// Computes for at most that time, if a computation waits. True if one still does.
     pub fn compute(&mut self, budget: Duration) -> bool {
         let clock = self.arm.world().clock();
         let began = clock();

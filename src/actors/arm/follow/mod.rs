@@ -1,4 +1,4 @@
-//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name has it.
+//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name serves it.
 //!
 //! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and sees how the arm
 //! follows; the rules are `math::trajectory`'s. A goal ends where its setpoint is not the arm's any more: another
@@ -235,7 +235,7 @@ impl<const N: usize> PathFollower<N> {
         ctx.wait(self.go_on());
     }
 
-    /// The same, for whoever waits for it.
+    /// The same, for an asker that waits for it.
     fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         motion.map(|motion, node, ctx| match motion {

@@ -55,7 +55,7 @@ pub struct GoalTracker<const N: usize> {
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
-    /// Hears whom to send a [`Barrier`] before it says that it stands still.
+    /// Hears whom to send a [`Barrier`] before it says that it is at rest.
     pub add_barrier: Recipient<AddBarrier>,
 }
 

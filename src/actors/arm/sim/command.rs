@@ -24,7 +24,7 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 pub struct CommandEffort<const N: usize> {
     /// Effort per joint \[N m\].
     pub effort: [f64; N],
-    /// The message that it came in: its client is told if the controller is on.
+    /// The message that it came in. Its client gets an error if the controller is on.
     pub message: TopicMessage,
 }
 

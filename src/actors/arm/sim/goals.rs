@@ -1,8 +1,8 @@
-//! Goals on the arm: their begin, their end, and the barriers before the arm says that it stands still.
+//! Goals on the arm: their begin, their end, and the barriers before the arm says that it is at rest.
 //!
 //! `ik_action` owns the goal and hears what becomes of it; `live/goals.rs` judges the steps.
 //!
-//! **Invariant:** an answer that the arm stands still comes behind all news of goals.
+//! **Invariant:** an answer that the arm is at rest comes behind all news of goals.
 
 use actix::prelude::*;
 
@@ -65,7 +65,7 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Answers once all news of the arm about goals are published. News of a goal go by way of its owner, and none
-    /// may come after the answer that the arm stands still.
+    /// may come after the answer that the arm is at rest.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = self.owners.iter();
         let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();

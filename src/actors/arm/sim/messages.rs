@@ -72,13 +72,13 @@ pub struct TrackGoal<const N: usize> {
 }
 
 /// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From
-/// the arm, before it says that it stands still, and from `ik_trial`, which so hears all that the arm had said about
+/// the arm, before it says that it is at rest, and from `ik_trial`, which so hears all that the arm had said about
 /// goals before it gave the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;
 
-/// The sender tells clients of goals: the arm is to send it a [`Barrier`] before it says that it stands still. From
+/// The sender tells clients of goals: the arm is to send it a [`Barrier`] before it says that it is at rest. From
 /// `ik_action` and `joint_trajectory_controller`, when they start.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]

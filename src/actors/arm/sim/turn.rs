@@ -1,10 +1,10 @@
 //! How much the arm does in a row before its timers and the answers that it waits for have their turn.
 //!
-//! An actor's mailbox is emptied before anything else of it is looked at. So whoever keeps it full would keep the arm
-//! from its tick; the end of a turn lets the thread look up.
+//! actix empties an actor's mailbox before it polls the actor's timers. A sender that keeps the mailbox full would
+//! delay the arm's tick, so the arm yields at the end of a turn.
 //!
-//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, however much waits for
-//! it: [`TURN`], one message, and one row of steps. Steps that are due have their own budget.
+//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, at any length of the mailbox:
+//! [`TURN`], one message, and one row of steps. Steps that are due have their own budget.
 
 use std::time::{Duration, Instant};
 

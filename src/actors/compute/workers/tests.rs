@@ -86,7 +86,7 @@ impl Computation for Hesitating {
     fn refuse(&mut self, _why: &'static str) {}
 }
 
-/// Goes on until it is told that others are done.
+/// Goes on until others are done.
 struct Endless(mpsc::Receiver<()>);
 
 impl Computation for Endless {

@@ -23,7 +23,7 @@ impl Computations {
         self.waiting.push_back((request, length));
     }
 
-    /// Whether so many wait, or such long ones, that the client is not read.
+    /// Whether the client is not read because of the number or the bytes that wait.
     pub(super) fn are_too_many(&self) -> bool {
         self.waiting.len() >= MAX_COMPUTATIONS_WAITING || self.bytes >= SHORT
     }

@@ -68,13 +68,13 @@ pub struct Connection<S> {
     computations: Computations,
     /// When something was last written or computed, while the reader waited for that.
     room_since: Instant,
-    /// Set while the client is told why a call failed in `values` too.
+    /// Set while a failed call has its reason in `values` too.
     wants_text: Arc<AtomicBool>,
     /// Nothing more is read; queued messages are still sent.
     is_finishing: bool,
     /// Tells the session so.
     finish: Arc<Notify>,
-    /// The client speaks something else, or has broken a rule: it is told so, and its input is swallowed.
+    /// The client speaks another protocol, or has broken a rule. It gets the reason, and its input is discarded.
     is_refused: bool,
     /// The reader has ended.
     is_read_to_its_end: bool,

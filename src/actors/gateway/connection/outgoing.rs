@@ -222,7 +222,7 @@ impl Outgoing {
 // has not read, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
 // kept waiting, and nobody is asked more often than every `ASK` about it.
 
-/// Nothing more is written once a byte has been unread for so long. Python reads 8 KiB at a time: half a second of
+/// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time: half a second of
 /// messages to a client that takes half of them.
 const HOLD: Duration = Duration::from_millis(100);
 /// A slow client is written as much as it reads in that time.
@@ -277,7 +277,7 @@ impl FlowControl {
         }
     }
 
-    /// Notes that so many bytes have been written.
+    /// Notes that `bytes` have been written.
     fn note_written(&mut self, bytes: usize, now: Instant) {
         let bytes = bytes as u64;
         self.written += bytes;

@@ -49,7 +49,7 @@ pub(super) struct Performer {
     registry: Addr<Registry>,
     /// Where long frames find their room.
     memory: Memory,
-    /// Set while the client is told why a call failed in `values` too.
+    /// Set while a failed call has its reason in `values` too.
     wants_text: Arc<AtomicBool>,
     /// Whether frames may be binary: over raw TCP they are lines of text.
     takes_binary: bool,
@@ -308,7 +308,7 @@ async fn read_frame<T: Send + 'static>(
     aside(WorkKind::reading(length), read).await
 }
 
-/// An error that is told under the id of the pieces, unless it ends a call.
+/// An error goes out under the id of the pieces, unless it ends a call.
 fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     match incoming.op {
         Err(_) => Incoming { id, ..incoming },

@@ -67,7 +67,7 @@ enum ReadStep {
     Retiring(Option<BoxFuture<()>>, Instant),
     /// The registry forgets the client.
     Leaving(BoxFuture<()>),
-    /// The client was refused: so many bytes of its input are swallowed, until then.
+    /// The client was refused: at most that many bytes of its input are discarded, until that time.
     Discarding(usize, Instant),
 }
 

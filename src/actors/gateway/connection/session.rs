@@ -54,7 +54,7 @@ pub(super) struct Opened<S> {
     pub(super) first: BytesMut,
 }
 
-/// The place of a client that the registry knows; whoever drops it gives it back.
+/// The place of a client that the registry knows. Dropping it gives it back.
 pub(super) struct HeldPlace {
     id: ConnectionId,
     registry: Addr<Registry>,
@@ -241,7 +241,7 @@ impl ClientSession {
                 self.refuse(stream, &refused.to_string()).await;
             }
             HowServed::Gone => {}
-            // It is told over HTTP.
+            // The answer is over HTTP.
             #[cfg(feature = "web")]
             HowServed::Http(_) => {}
         }
@@ -295,7 +295,7 @@ impl ClientSession {
         }
     }
 
-    /// Waits after a wrong token: the more of them came from its address, the longer. Returns whether it is told.
+    /// Waits after a wrong token: longer with each one from its address. Returns whether it is answered.
     pub(super) async fn delay_wrong_token(&self) -> bool {
         let attempts = &self.admission.newcomers.failed_attempts;
         let from = self.ends.peer.ip();

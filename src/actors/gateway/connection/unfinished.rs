@@ -1,7 +1,7 @@
 //! How long a frame may take from its first byte to its last.
 //!
-//! **Invariant:** it is told the time, and knows no clock. Time counts only while the client is waited for: a client
-//! that is not read for a while loses none.
+//! **Invariant:** its caller gives the time. Time counts only while the client is waited for: a client that is
+//! not read for a while loses none.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ impl Unfinished {
         self.received = 0;
     }
 
-    /// Notes that the client was waited for so long, and sent so many bytes.
+    /// Notes how long the client was waited for, and how many bytes it sent.
     pub(super) fn wait(&mut self, time: Duration, received: usize) {
         self.waited += time;
         self.received += received;

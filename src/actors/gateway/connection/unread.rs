@@ -72,7 +72,7 @@ mod sockets {
         })
     }
 
-    /// `nlmsghdr` and `inet_diag_req_v2`, for one socket whatever its state.
+    /// `nlmsghdr` and `inet_diag_req_v2`, for one socket in any state.
     fn request(of: SocketAddr, to: SocketAddr) -> Vec<u8> {
         let (of_ip, to_ip) = (of.ip().to_canonical(), to.ip().to_canonical());
         // `AF_INET` and `AF_INET6`; 6 is TCP.

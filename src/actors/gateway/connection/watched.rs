@@ -83,7 +83,7 @@ impl<S> MonitoredStream<S> {
         self.turn == 0
     }
 
-    /// Reading goes on after so long a time. Where `is_next`, the last message has been read.
+    /// Reading goes on after this time. Where `is_next`, the last message has been read.
     pub(super) fn read_on(&mut self, unread: Duration, is_next: bool) {
         self.began = self.began.map(|began| began + unread);
         if is_next && self.place.message <= MEDIUM {

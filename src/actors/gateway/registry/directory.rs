@@ -1,7 +1,7 @@
 //! The names that clients have registered: topics that they use, services and actions that they serve. They are kept in
 //! order, so that telling them costs no search.
 //!
-//! **Invariant:** a name stands here as long as a client has it registered, and no longer.
+//! **Invariant:** a name is here exactly as long as a client has it registered.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ impl Served {
     }
 }
 
-/// The names, each with all that is known of it. Listed entries are shared with whoever asks for them.
+/// The names, each with all that is known of it. Listed entries are shared with each census.
 #[derive(Default)]
 pub(crate) struct Directory {
     topics: BTreeMap<Arc<str>, Users>,

@@ -1,6 +1,6 @@
 //! The registry's entries of one client: registrations, and calls and goals that wait for other clients.
 //!
-//! **Invariant:** it is at most [`MAX_KEPT`] bytes, and given back by whoever drops it.
+//! **Invariant:** it is at most [`MAX_KEPT`] bytes, and given back when it is dropped.
 
 use std::cell::Cell;
 use std::rc::Rc;

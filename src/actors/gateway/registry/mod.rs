@@ -154,7 +154,7 @@ impl Registry {
         }
     }
 
-    /// A registry without nodes, for at most so many clients at once.
+    /// A registry without nodes, for at most `clients` clients at once.
     #[must_use]
     pub fn serving_at_most(self, clients: usize) -> Self {
         let places = Places::of(clients);
@@ -187,7 +187,7 @@ impl Client {
         self.outlets.respond.do_send(Response { frame, service });
     }
 
-    /// Sets the form in which the client is told why a call failed, if one is given.
+    /// Sets the form in which the client gets the reason of a failed call, if one is given.
     fn set_error_form(&self, form: Option<ErrorForm>) {
         if let Some(form) = form {
             let wants_text = form == ErrorForm::Text;

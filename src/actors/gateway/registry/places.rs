@@ -22,7 +22,7 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// Places for so many clients. At least one of them is not kept.
+    /// Places for `clients` clients. At least one of them is not kept.
     pub(crate) fn of(clients: usize) -> Self {
         let kept = clients.div_ceil(16).min(KEPT_PLACES);
         Self {

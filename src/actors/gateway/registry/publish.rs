@@ -263,7 +263,7 @@ impl Handler<Publish> for Registry {
     }
 }
 
-/// Whether frames of so many bytes are sent as they are to a subscriber that has asked for `encoding`.
+/// Whether frames of `length` bytes are sent as they are to a subscriber that has asked for `encoding`.
 fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
     let is_short = encoding.fragment_size.is_none_or(|size| length <= size);
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps

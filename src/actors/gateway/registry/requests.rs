@@ -418,7 +418,7 @@ impl Registry {
         requests.take(number)
     }
 
-    /// The caller is told why the answer is discarded, and so is the client that gave it.
+    /// Both the caller and the provider get the reason why the answer is discarded.
     fn discard(&mut self, request: &Forwarded, why: Refusal) -> Result<(), Refusal> {
         let name = request.name.to_string();
         self.fail(request, &Refusal::BadAnswer(name, Box::new(why.clone())));

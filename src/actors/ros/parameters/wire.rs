@@ -1,6 +1,6 @@
 //! The parameter services in JSON.
 //!
-//! **Invariant:** a value is read as the arm's own service reads it, and has the type that it is told to have.
+//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration.
 
 use actix::prelude::*;
 use bytes::Bytes;

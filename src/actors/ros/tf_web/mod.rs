@@ -58,7 +58,7 @@ impl Ask for RepublishTfs {
     type Answer = ();
 }
 
-/// Frames for whoever asks, until cancelled. From clients, by the action or by the topic.
+/// Sends frames until cancelled. From clients, by the action or by the topic.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct WishFrames {

@@ -81,7 +81,7 @@ struct HeldSteps<const N: usize> {
 }
 
 impl<'a, const N: usize> BatchJob<'a, N> {
-    /// An arm that is to take so many steps, one at least.
+    /// An arm, and how many steps it is to take: at least one.
     pub(super) fn new(
         arm: &'a mut Simulation<N>,
         steps: u64,

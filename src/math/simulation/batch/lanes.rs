@@ -1,6 +1,6 @@
 //! The arms in the lanes of a pair of registers: how they get in and out, and how they step.
 //!
-//! **Invariant:** no lane knows of another.
+//! **Invariant:** no lane depends on another.
 
 #![allow(
     clippy::indexing_slicing,

@@ -7,8 +7,8 @@
 //! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time. A few
 //! such pairs take each step in turn, so that the processor works at one while another waits for its own results.
 //!
-//! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
-//! whoever stands beside it.
+//! **Invariant:** every simulation ends in the state that [`Simulation::advance`] gives, bit for bit, in every
+//! batch.
 
 mod job;
 mod lanes;
@@ -99,7 +99,7 @@ impl Registers {
     }
 }
 
-/// Takes up to so many steps with every arm, all of them unless it has diverged or does so.
+/// Takes up to `steps` steps with every arm. An arm takes fewer only if it has diverged or diverges.
 ///
 /// ```
 /// use pendularm::math::{arm::Arm, pid::Gains, simulation::{Simulation, batch}};

@@ -4,7 +4,7 @@
 //! must not lock the holder out. The wait makes guessing slow, and the
 //! [length](crate::protocol::op::token::MIN_TOKEN) of a token makes it hopeless.
 //!
-//! **Invariant:** so many addresses are kept in mind and no more, whoever guesses from wherever.
+//! **Invariant:** at most [`MAX_ADDRESSES`] addresses are remembered.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};

@@ -17,7 +17,7 @@ use crate::web::Site;
 /// Bytes that a client may send before it has shown its token.
 pub const MAX_AUTH_BYTES: usize = 16 * 1024;
 /// Connections that have not shown the token yet. They are counted apart from the clients, and the oldest is closed
-/// for the next. A client that shows the token at once is never the oldest of so many.
+/// for the next. A client that shows the token at once is never the oldest of them.
 pub const MAX_UNAUTHENTICATED: usize = 128;
 
 /// Clients that wait for a kept place, where no other place is free. The oldest is refused when there are more.
@@ -46,7 +46,7 @@ pub struct Newcomers {
 }
 
 impl Newcomers {
-    /// Makes room for so many clients that have not shown the token yet.
+    /// Makes room for `unauthenticated` clients that have not shown the token yet.
     #[must_use]
     pub fn of(unauthenticated: usize) -> Self {
         Self {

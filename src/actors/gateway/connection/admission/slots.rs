@@ -18,7 +18,7 @@ pub(crate) struct Slots {
 }
 
 impl Slots {
-    /// Makes so many slots, all of them free.
+    /// Makes `most` slots, all of them free.
     pub(crate) fn new(most: usize) -> Self {
         Self {
             most,
