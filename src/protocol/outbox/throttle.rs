@@ -208,6 +208,9 @@ impl Outbox {
     /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
     /// now.
     pub(super) fn release(&mut self, now: Instant) {
+        if !self.holds_back() {
+            return;
+        }
         while let Some((_, topic)) = self.next_due().filter(|(due, _)| *due <= now) {
             let topic = Arc::clone(topic);
             let Some(limits) = self.limits.get_mut(&topic) else {
