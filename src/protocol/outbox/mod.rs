@@ -15,12 +15,13 @@
 
 mod throttle;
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Buf, Bytes};
 
+use self::throttle::TopicLimits;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -36,9 +37,6 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
 pub const MESSAGE_BYTES: usize = 160;
-
-/// Microseconds since the outbox was first used: half the bytes of an [`Instant`].
-type Timestamp = u64;
 
 /// Bytes of a message, or of a series, that count.
 fn counted(frame: &Bytes) -> usize {
@@ -57,25 +55,20 @@ fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
 /// The outgoing queue of one connection.
 #[derive(Debug)]
 pub struct Outbox {
-    /// Topic messages in order, by their numbers.
-    topics: BTreeMap<u64, QueuedMessage>,
-    /// Every topic that has messages here, a bound or a throttle.
-    queues: HashMap<Arc<str>, TopicQueue>,
-    /// Messages with lower numbers have been looked at for their age. The messages that are left are the newest
-    /// of their topics.
-    looked_at: u64,
+    /// Topic messages in order.
+    topics: VecDeque<QueuedMessage>,
+    /// So many of the first are too old. Each of them is the newest of its topic.
+    kept_old: usize,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,
     /// Bytes of topic messages that may be taken, unless a response is behind them.
     room: usize,
     /// How old a topic message may be that is taken only because a response is behind it.
     fresh: Duration,
-    /// The time that ages are counted from.
-    epoch: Option<Instant>,
     /// Responses and statuses in order, each with its number.
     responses: VecDeque<(u64, Bytes)>,
-    /// How many topics are throttled.
-    throttled: usize,
+    /// What the client has asked for, by topic.
+    limits: HashMap<Arc<str>, TopicLimits>,
     /// Messages that are held back, and the bytes of them that count.
     held_count: usize,
     held_bytes: usize,
@@ -94,67 +87,40 @@ pub struct Outbox {
 /// A topic message that waits, or a series of them.
 #[derive(Debug)]
 struct QueuedMessage {
-    frame: Bytes,
-    /// Its topic; feedback of a goal has none.
-    topic: Option<Arc<str>>,
-    /// When it was produced.
-    since: Timestamp,
-}
-
-/// The messages of one topic, which leave the oldest first.
-#[derive(Debug, Default)]
-struct TopicQueue {
-    /// The number of the newest that is queued.
-    newest: u64,
-    /// How many messages, or series of them, are queued.
-    count: usize,
-    /// How many may be.
-    bound: Option<usize>,
-    /// The numbers of those that came while there was a bound.
-    bounded: VecDeque<u64>,
-    throttle: Option<TopicThrottle>,
-    /// Messages that the throttle holds back.
-    held: VecDeque<HeldMessage>,
-}
-
-/// `throttle_rate` and `queue_length` of one topic.
-#[derive(Debug)]
-struct TopicThrottle {
-    /// Least time between deliveries.
-    interval: Duration,
-    /// How many messages may be held back, 1 or more.
-    queue_length: usize,
-    /// When the last message was let go.
-    last: Option<Instant>,
-}
-
-/// A message that is held back.
-#[derive(Debug)]
-struct HeldMessage {
     number: u64,
     /// When it was produced.
-    since: Timestamp,
+    since: Instant,
+    /// Its topic; feedback of a goal has none.
+    topic: Option<Arc<str>>,
     frame: Bytes,
 }
 
-impl TopicQueue {
-    fn is_idle(&self) -> bool {
-        self.count == 0 && self.bound.is_none() && self.throttle.is_none()
+impl QueuedMessage {
+    fn is_on(&self, topic: &Arc<str>) -> bool {
+        let own = self.topic.as_ref();
+        own.is_some_and(|own| Arc::ptr_eq(own, topic) || own == topic)
+    }
+
+    fn is_older(&self, age: Duration, now: Instant) -> bool {
+        now.saturating_duration_since(self.since) > age
+    }
+
+    /// How many messages it has.
+    fn count(&self) -> u64 {
+        messages(self.frame.clone()).count() as u64
     }
 }
 
 impl Default for Outbox {
     fn default() -> Self {
         Self {
-            topics: BTreeMap::new(),
-            queues: HashMap::new(),
-            looked_at: 0,
+            topics: VecDeque::new(),
+            kept_old: 0,
             is_behind: false,
             room: usize::MAX,
             fresh: MAX_AGE,
-            epoch: None,
             responses: VecDeque::new(),
-            throttled: 0,
+            limits: HashMap::new(),
             held_count: 0,
             held_bytes: 0,
             produced: 0,
@@ -187,52 +153,38 @@ impl Outbox {
     /// Adds a message on a topic, or a series: queued, or held back if the topic is throttled. If it does not fit,
     /// the oldest go.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
-        let since = self.timestamp(now);
         self.release(now);
-        self.drop_old(now);
         if !self.may_fit(&frame) {
             return;
         }
-        match self.queues.get(topic) {
-            Some(queue) if queue.throttle.is_some() => self.offer(topic, since, frame, now),
-            Some(queue) if queue.bound.is_some() => {
+        match self.limits.get(topic) {
+            Some(limits) if limits.is_throttled() => self.offer(topic, frame, now),
+            Some(_) => {
                 let is_series = first_message(&frame) < frame.len();
                 for frame in messages(frame) {
-                    let number = self.number();
-                    self.enqueue(number, topic, since, by_itself(frame, is_series));
+                    self.enqueue(Some(topic), now, by_itself(frame, is_series));
                 }
             }
-            _ => {
-                let number = self.number();
-                self.enqueue(number, topic, since, frame);
-            }
+            None => self.enqueue(Some(topic), now, frame),
         }
+        self.keep_to_queue_length(topic);
+        self.drop_old(now);
         self.keep_bounded();
     }
 
     /// Adds feedback of a goal. It may be lost as a message may, but no throttle holds it back, not even that of a
     /// topic with the action's name.
     pub fn push_feedback(&mut self, frame: Bytes, now: Instant) {
-        let since = self.timestamp(now);
-        if !self.may_fit(&frame) {
-            return;
+        if self.may_fit(&frame) {
+            self.enqueue(None, now, frame);
+            self.keep_bounded();
         }
-        let number = self.number();
-        self.topic_bytes += counted(&frame);
-        let topic = None;
-        let message = QueuedMessage {
-            frame,
-            topic,
-            since,
-        };
-        self.topics.insert(number, message);
-        self.keep_bounded();
     }
 
-    /// Whether a topic is throttled.
+    /// Whether messages are held back.
     #[must_use]
-    pub const fn is_throttled(&self) -> bool {
-        self.throttled > 0
+    pub const fn holds_back(&self) -> bool {
+        self.held_count > 0
     }
 
     /// Adds a response or a status. Messages of the topics in `supersedes` that throttling holds back are older, and
@@ -249,45 +201,11 @@ impl Outbox {
         self.responses.push_back((number, frame));
     }
 
-    /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
-    /// kept; `None` for any number.
-    pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
-        if queue_length.is_none() {
-            return self.forget_bound(topic);
-        }
-        let queue = self.queues.entry(Arc::clone(topic)).or_default();
-        queue.bound = queue_length;
-    }
-
     /// Sets how many bytes of topic messages may be taken from now on. Messages ahead of a response are taken all
     /// the same, unless they are older than `fresh`. Then they are dropped, except the newest of its topic.
     pub const fn allow(&mut self, room: usize, fresh: Duration) {
         self.room = room;
         self.fresh = fresh;
-    }
-
-    /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
-    pub fn forget(&mut self, topic: &str) {
-        self.lift_throttle(topic);
-        self.forget_bound(topic);
-    }
-
-    fn forget_bound(&mut self, topic: &str) {
-        if let Some(queue) = self.queues.get_mut(topic) {
-            queue.bound = None;
-            queue.bounded = VecDeque::new();
-            self.tidy(topic);
-        }
-    }
-
-    /// Forgets a topic that has neither messages nor a bound or a throttle.
-    fn tidy(&mut self, topic: &str) {
-        if self.queues.get(topic).is_some_and(TopicQueue::is_idle) {
-            self.queues.remove(topic);
-            if self.queues.capacity() > 4 * self.queues.len() + 32 {
-                self.queues.shrink_to(2 * self.queues.len());
-            }
-        }
     }
 
     /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
@@ -305,29 +223,29 @@ impl Outbox {
         let mut bytes = 0;
         let mut taken = 0;
         while taken < max_frames.max(1) {
-            let is_response = match (self.topics.first_key_value(), self.responses.front()) {
-                (Some((topic, _)), Some((response, _))) => response < topic,
+            let is_response = match (self.topics.front(), self.responses.front()) {
+                (Some(topic), Some((response, _))) => *response < topic.number,
                 (Some(_), None) => false,
                 (None, Some(_)) => true,
                 (None, None) => break,
             };
-            if !is_response && !self.may_take_topic() {
-                break;
-            }
-            if !is_response && self.room == 0 && self.drop_stale(now) {
-                continue;
+            if !is_response && self.room == 0 {
+                if !self.has_responses() {
+                    break;
+                }
+                if self.drop_stale(now) {
+                    continue;
+                }
             }
             let next = if is_response {
                 self.responses.front_mut().map(|(_, frame)| frame)
             } else {
-                let first = self.topics.first_entry();
-                first.map(|entry| &mut entry.into_mut().frame)
+                self.topics.front_mut().map(|message| &mut message.frame)
             };
             let Some(next) = next else {
                 break;
             };
-            let single = max_frames <= 1 && !is_response;
-            let length = if single {
+            let length = if max_frames <= 1 && !is_response {
                 first_message(next)
             } else {
                 next.len()
@@ -341,17 +259,11 @@ impl Outbox {
                 self.topic_bytes -= counted(next);
                 let first = next.split_to(length);
                 self.topic_bytes += counted(next);
-                first
+                Some(first)
             } else if is_response {
-                let Some((_, whole)) = self.responses.pop_front() else {
-                    break;
-                };
-                whole
+                self.responses.pop_front().map(|(_, frame)| frame)
             } else {
-                let Some(whole) = self.take_out_first() else {
-                    break;
-                };
-                whole
+                self.take_out(0).map(|message| message.frame)
             };
             if !is_response {
                 self.room = self.room.saturating_sub(length);
@@ -361,20 +273,9 @@ impl Outbox {
                 is_response,
                 length,
             });
-            frames.push(frame);
+            frames.extend(frame);
         }
         self.is_behind &= !self.topics.is_empty();
-    }
-
-    /// Whether anything may be taken now.
-    #[must_use]
-    pub fn may_take(&self) -> bool {
-        self.has_responses() || (!self.topics.is_empty() && self.room > 0)
-    }
-
-    /// Whether the next topic message may be taken.
-    fn may_take_topic(&self) -> bool {
-        self.room > 0 || self.has_responses()
     }
 
     /// Notes that the next `bytes` of what was taken have been written.
@@ -399,16 +300,10 @@ impl Outbox {
     /// Whether a long topic message waits or is being written, what is held back aside.
     #[must_use]
     pub fn has_long(&self) -> bool {
-        let mut waiting = self.topics.values();
+        let mut waiting = self.topics.iter();
         let mut writing = self.in_flight.iter();
         waiting.any(|message| message.frame.len() > MEDIUM)
             || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
-    }
-
-    /// When the next held back message is due, if any is held back: the time to take frames again.
-    #[must_use]
-    pub fn next_release(&self) -> Option<Instant> {
-        self.next_due().map(|(due, _)| due)
     }
 
     /// Whether there is nothing to be taken now (held back messages that are not due do not count).
@@ -460,47 +355,27 @@ impl Outbox {
         !self.topics.is_empty()
     }
 
-    fn number(&mut self) -> u64 {
+    const fn number(&mut self) -> u64 {
         self.produced += 1;
         self.produced
     }
 
-    fn timestamp(&mut self, time: Instant) -> Timestamp {
-        let epoch = *self.epoch.get_or_insert(time);
-        let since = time.saturating_duration_since(epoch).as_micros();
-        Timestamp::try_from(since).unwrap_or(Timestamp::MAX)
-    }
-
-    fn enqueue(&mut self, number: u64, topic: &Arc<str>, since: Timestamp, frame: Bytes) {
-        let queue = self.queues.entry(Arc::clone(topic)).or_default();
-        let before = (queue.count > 0).then_some(queue.newest);
-        queue.newest = number;
-        queue.count += 1;
-        if queue.bound.is_some() {
-            queue.bounded.push_back(number);
-        }
-        if before.is_some_and(|before| before < self.looked_at) {
-            // It was too old, and is the newest no more.
-            self.drop_message(before);
-        }
+    fn enqueue(&mut self, topic: Option<&Arc<str>>, since: Instant, frame: Bytes) {
         self.topic_bytes += counted(&frame);
-        let message = QueuedMessage {
-            frame,
-            topic: Some(Arc::clone(topic)),
+        let number = self.number();
+        let replaced = topic.and_then(|topic| {
+            let mut old = self.topics.range(..self.kept_old);
+            old.position(|message| message.is_on(topic))
+        });
+        self.topics.push_back(QueuedMessage {
+            number,
             since,
-        };
-        self.topics.insert(number, message);
-        if !self.in_flight.is_empty() || self.room == 0 {
-            while let Some(surplus) = self.surplus(topic) {
-                self.drop_message(Some(surplus));
-            }
+            topic: topic.cloned(),
+            frame,
+        });
+        if let Some(replaced) = replaced {
+            self.drop_message(replaced);
         }
-    }
-
-    /// The oldest message of a topic, if more wait than may.
-    fn surplus(&self, topic: &str) -> Option<u64> {
-        let TopicQueue { bound, bounded, .. } = self.queues.get(topic)?;
-        (bounded.len() > (*bound)?).then(|| bounded.front().copied())?
     }
 }
 
@@ -514,22 +389,48 @@ impl Outbox {
         fits
     }
 
+    /// Drops the oldest messages of a topic of which more wait than the client wants, while it does not take all that
+    /// it is offered.
+    fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
+        let limits = self.limits.get(topic);
+        let Some(most) = limits.and_then(|limits| limits.queue_length) else {
+            return;
+        };
+        if self.in_flight.is_empty() && self.room > 0 {
+            return;
+        }
+        let waiting = self.topics.iter().filter(|message| message.is_on(topic));
+        let mut surplus = waiting.count().saturating_sub(most);
+        let (mut index, mut before) = (0, 0);
+        self.topics.retain(|message| {
+            let stays = surplus == 0 || !message.is_on(topic);
+            if !stays {
+                surplus -= 1;
+                self.topic_bytes -= counted(&message.frame);
+                self.dropped += message.count();
+                before += usize::from(index < self.kept_old);
+            }
+            index += 1;
+            stays
+        });
+        self.kept_old -= before;
+    }
+
     /// Drops the messages that have waited for too long, except the newest of each topic.
     fn drop_old(&mut self, now: Instant) {
-        loop {
+        while let Some(next) = self.topics.get(self.kept_old) {
             let age = if self.is_behind {
                 MAX_AGE_BEHIND
             } else {
                 MAX_AGE
             };
-            let oldest = self.oldest_at(now, age);
-            let next = self.topics.range(self.looked_at..).next();
-            let Some((&number, _)) = next.filter(|(_, message)| message.since < oldest) else {
+            if !next.is_older(age, now) {
                 return;
-            };
-            self.looked_at = number + 1;
+            }
             let dropped = self.dropped;
-            self.drop_but_newest(number);
+            if !self.drop_but_newest(self.kept_old) {
+                self.kept_old += 1;
+            }
             self.is_behind |= self.dropped > dropped;
         }
     }
@@ -537,73 +438,48 @@ impl Outbox {
     /// Drops the first topic message if it is too old to be taken only because a response is behind it; false if it is
     /// not.
     fn drop_stale(&mut self, now: Instant) -> bool {
-        let oldest = self.oldest_at(now, self.fresh);
-        let first = self.topics.first_key_value();
-        let Some((&number, _)) = first.filter(|(_, message)| message.since < oldest) else {
-            return false;
-        };
-        self.drop_but_newest(number)
+        let is_stale = |first: &QueuedMessage| first.is_older(self.fresh, now);
+        self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)
     }
 
     /// Drops a message, or all of a series, except the newest of the topic; true if nothing is left.
-    fn drop_but_newest(&mut self, number: u64) -> bool {
-        let Some(message) = self.topics.get_mut(&number) else {
+    fn drop_but_newest(&mut self, index: usize) -> bool {
+        let mut rest = self.topics.range_mut(index..);
+        let Some(message) = rest.next() else {
             return true;
         };
-        let queue = message
-            .topic
-            .as_ref()
-            .and_then(|topic| self.queues.get(topic));
-        if queue.is_none_or(|queue| queue.newest != number) {
-            self.drop_message(Some(number));
+        let is_newest = |topic: &Arc<str>| !rest.any(|newer| newer.is_on(topic));
+        if !message.topic.as_ref().is_some_and(is_newest) {
+            self.drop_message(index);
             return true;
         }
-        if first_message(&message.frame) == message.frame.len() {
+        let newest = last_messages(message.frame.clone(), 1);
+        let older = message.frame.len() - newest.len();
+        if older == 0 || first_message(&message.frame) == message.frame.len() {
             // The pieces of a message stay together.
             return false;
         }
-        let newest = by_itself(last_messages(message.frame.clone(), 1), true);
-        let older = message.frame.len() - newest.len();
         self.dropped += messages(message.frame.slice(..older)).count() as u64;
         self.topic_bytes -= counted(&message.frame);
         self.topic_bytes += counted(&newest);
-        message.frame = newest;
+        message.frame = by_itself(newest, true);
         false
     }
 
-    /// Drops a message, or all of a series, if there is one with that number.
-    fn drop_message(&mut self, number: Option<u64>) {
-        let message = number.and_then(|number| self.take_out(number));
-        if let Some(frame) = message {
-            self.dropped += messages(frame.clone()).count() as u64;
+    /// Drops the message, or all of the series, at that place.
+    fn drop_message(&mut self, index: usize) {
+        if let Some(message) = self.take_out(index) {
+            self.dropped += message.count();
         }
     }
 
-    /// Takes the first topic message out of the queue.
-    fn take_out_first(&mut self) -> Option<Bytes> {
-        let number = *self.topics.first_key_value()?.0;
-        self.take_out(number)
-    }
-
-    fn take_out(&mut self, number: u64) -> Option<Bytes> {
-        let QueuedMessage { frame, topic, .. } = self.topics.remove(&number)?;
-        self.topic_bytes -= counted(&frame);
-        if let Some(topic) = topic
-            && let Some(queue) = self.queues.get_mut(&topic)
-        {
-            queue.count -= 1;
-            if queue.bounded.front() == Some(&number) {
-                queue.bounded.pop_front();
-            }
-            self.tidy(&topic);
+    fn take_out(&mut self, index: usize) -> Option<QueuedMessage> {
+        let message = self.topics.remove(index)?;
+        self.topic_bytes -= counted(&message.frame);
+        if index < self.kept_old {
+            self.kept_old -= 1;
         }
-        Some(frame)
-    }
-
-    /// The least time of a message that is not older than `age`.
-    fn oldest_at(&mut self, now: Instant, age: Duration) -> Timestamp {
-        let age = Timestamp::try_from(age.as_micros()).unwrap_or(Timestamp::MAX);
-        self.timestamp(now).saturating_sub(age)
+        Some(message)
     }
 
     /// Drops topic messages, the oldest first, until what is left takes at most [`MAX_TOPIC_BYTES`]. The oldest is the
@@ -615,22 +491,23 @@ impl Outbox {
             if excess == 0 {
                 return;
             }
-            let first = self.topics.first_key_value();
-            let queued = first.map_or(u64::MAX, |(number, _)| *number);
-            let held = self.oldest_held().filter(|(held, _)| *held < queued);
-            if let Some((_, topic)) = held {
-                self.pop_held(&topic);
+            let first = self.topics.front_mut();
+            let queued = first.as_ref().map_or(u64::MAX, |first| first.number);
+            let held = self.limits.values_mut();
+            let held = held.filter(|one| one.first_held().is_some_and(|held| held < queued));
+            if let Some(limits) = held.min_by_key(|limits| limits.first_held()) {
+                let oldest = limits.pop_held();
+                self.forget_held(oldest.as_slice());
                 self.dropped += 1;
-            } else if let Some(mut first) = self.topics.first_entry() {
-                let frames = &mut first.get_mut().frame;
-                let (bytes, count) = first_messages(frames, excess);
+            } else if let Some(QueuedMessage { frame, .. }) = first {
+                let (bytes, count) = first_messages(frame, excess);
                 self.dropped += count as u64;
-                if bytes < frames.len() {
-                    self.topic_bytes -= counted(frames);
-                    frames.advance(bytes);
-                    self.topic_bytes += counted(frames);
+                if bytes < frame.len() {
+                    self.topic_bytes -= counted(frame);
+                    frame.advance(bytes);
+                    self.topic_bytes += counted(frame);
                 } else {
-                    self.take_out_first();
+                    self.take_out(0);
                 }
             } else {
                 debug_assert!(false, "bytes are counted that no message has");

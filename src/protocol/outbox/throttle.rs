@@ -1,4 +1,4 @@
-//! `throttle_rate` and `queue_length`: the messages that one connection asked to have held back, topic by topic.
+//! What a client asks for by `throttle_rate` and `queue_length`, and the messages that are held back for that.
 //!
 //! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held back
 //! the newest remain.
@@ -9,18 +9,68 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::{HeldMessage, Outbox, Timestamp, TopicQueue, TopicThrottle, by_itself, counted};
+use super::{Outbox, by_itself, counted};
 use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::series::{first_message, last_messages, messages};
 
 /// How long a message of more than [`MEDIUM`] may be held back: it takes room that others wait for.
 const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 
-impl TopicQueue {
+/// What a client has asked for of one topic.
+#[derive(Debug, Default)]
+pub(super) struct TopicLimits {
+    /// How many messages may wait while the client does not take all that it is offered.
+    pub(super) queue_length: Option<usize>,
+    throttle: Option<TopicThrottle>,
+    /// Messages that the throttle holds back.
+    held: VecDeque<HeldMessage>,
+}
+
+/// The least time between two messages of a topic.
+#[derive(Debug)]
+struct TopicThrottle {
+    interval: Duration,
+    /// How many messages may be held back, 1 or more.
+    most_held: usize,
+    /// When the last message was let go.
+    last: Option<Instant>,
+}
+
+/// A message that is held back.
+#[derive(Debug)]
+pub(super) struct HeldMessage {
+    number: u64,
+    /// When it was produced.
+    since: Instant,
+    frame: Bytes,
+}
+
+impl TopicLimits {
+    pub(super) const fn is_throttled(&self) -> bool {
+        self.throttle.is_some()
+    }
+
+    /// The number of the message that was held back first.
+    pub(super) fn first_held(&self) -> Option<u64> {
+        self.held.front().map(|held| held.number)
+    }
+
+    /// Takes the message that was held back first.
+    pub(super) fn pop_held(&mut self) -> Option<HeldMessage> {
+        self.held.pop_front()
+    }
+
     /// When the next message that is held back is due, if there is one.
     fn due(&self) -> Option<Instant> {
         let throttle = self.throttle.as_ref().filter(|_| !self.held.is_empty());
         throttle?.next()
+    }
+
+    /// Takes what is held back beyond what may be, the oldest.
+    fn trim(&mut self) -> Vec<HeldMessage> {
+        let most = self.throttle.as_ref().map_or(0, |one| one.most_held);
+        let surplus = self.held.len().saturating_sub(most);
+        self.held.drain(..surplus).collect()
     }
 }
 
@@ -39,42 +89,58 @@ impl Outbox {
     /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
     /// (`None`, or no time at all). Messages held back then count as produced now.
     pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
-        let Some((interval, queue_length)) = throttle.filter(|(interval, _)| !interval.is_zero())
-        else {
-            for held in self.lift_throttle(topic) {
-                let number = self.number();
-                self.enqueue(number, topic, held.since, held.frame);
-            }
+        let limits = self.limits.entry(Arc::clone(topic)).or_default();
+        let before = limits.throttle.take();
+        if let Some((interval, most_held)) = throttle.filter(|(interval, _)| !interval.is_zero()) {
+            limits.throttle = Some(TopicThrottle {
+                interval,
+                most_held: most_held.max(1),
+                last: before.and_then(|before| before.last),
+            });
+            let surplus = limits.trim();
+            self.forget_held(&surplus);
             return;
-        };
-        let queue = self.queues.entry(Arc::clone(topic)).or_default();
-        let before = queue.throttle.take();
-        self.throttled += usize::from(before.is_none());
-        queue.throttle = Some(TopicThrottle {
-            interval,
-            queue_length: queue_length.max(1),
-            last: before.and_then(|before| before.last),
-        });
-        self.trim_held(topic);
+        }
+        for held in self.take_held(topic) {
+            self.enqueue(Some(topic), held.since, held.frame);
+        }
+        self.keep_to_queue_length(topic);
+        self.tidy(topic);
+    }
+
+    /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
+    /// kept; `None` for any number.
+    pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
+        let limits = self.limits.entry(Arc::clone(topic)).or_default();
+        limits.queue_length = queue_length;
+        self.tidy(topic);
+    }
+
+    /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
+    pub fn forget(&mut self, topic: &str) {
+        self.take_held(topic);
+        self.limits.remove(topic);
+    }
+
+    /// Forgets the limits of a topic that has none.
+    fn tidy(&mut self, topic: &str) {
+        let limits = self.limits.get(topic);
+        if limits.is_some_and(|one| one.throttle.is_none() && one.queue_length.is_none()) {
+            self.limits.remove(topic);
+        }
     }
 
     /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
     /// newest would be left.
-    pub(super) fn offer(
-        &mut self,
-        topic: &Arc<str>,
-        since: Timestamp,
-        mut frames: Bytes,
-        now: Instant,
-    ) {
+    pub(super) fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
         let is_series = first_message(&frames) < frames.len();
         while !frames.is_empty() {
             let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
-            if !self.offer_one(topic, since, frame, now) {
-                let throttle = self.queues.get(topic).and_then(|one| one.throttle.as_ref());
-                let left = throttle.map_or(0, |throttle| throttle.queue_length);
+            if !self.offer_one(topic, frame, now) {
+                let throttle = self.limits.get(topic).and_then(|one| one.throttle.as_ref());
+                let left = throttle.map_or(0, |throttle| throttle.most_held);
                 for frame in messages(last_messages(frames, left)) {
-                    self.offer_one(topic, since, by_itself(frame, true), now);
+                    self.offer_one(topic, by_itself(frame, true), now);
                 }
                 return;
             }
@@ -82,23 +148,17 @@ impl Outbox {
     }
 
     /// Gives the throttle a message; false if it is held back.
-    fn offer_one(
-        &mut self,
-        topic: &Arc<str>,
-        since: Timestamp,
-        frame: Bytes,
-        now: Instant,
-    ) -> bool {
+    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
         let number = self.number();
-        let Some(queue) = self.queues.get_mut(topic) else {
+        let Some(limits) = self.limits.get_mut(topic) else {
             return true;
         };
-        let Some(throttle) = &mut queue.throttle else {
+        let Some(throttle) = &mut limits.throttle else {
             return true;
         };
-        if queue.held.is_empty() && throttle.is_due(now) {
+        if limits.held.is_empty() && throttle.is_due(now) {
             throttle.last = Some(now);
-            self.enqueue(number, topic, since, frame);
+            self.enqueue(Some(topic), now, frame);
             return true;
         }
         let is_long = frame.len() > MEDIUM;
@@ -108,91 +168,63 @@ impl Outbox {
         }
         self.held_count += 1;
         self.held_bytes += counted(&frame);
-        queue.held.push_back(HeldMessage {
+        limits.held.push_back(HeldMessage {
             number,
-            since,
+            since: now,
             frame,
         });
-        self.trim_held(topic);
+        let surplus = limits.trim();
+        self.forget_held(&surplus);
         false
     }
 
-    /// Discards what is held back of a topic beyond its `queue_length`, the oldest first.
-    fn trim_held(&mut self, topic: &str) {
-        while self.queues.get(topic).is_some_and(|queue| {
-            let throttle = queue.throttle.as_ref();
-            throttle.is_some_and(|throttle| queue.held.len() > throttle.queue_length)
-        }) {
-            self.pop_held(topic);
-        }
-    }
-
-    /// Takes the oldest message of a topic that is held back.
-    pub(super) fn pop_held(&mut self, topic: &str) -> Option<HeldMessage> {
-        let held = self.queues.get_mut(topic)?.held.pop_front()?;
-        self.held_count -= 1;
-        self.held_bytes -= counted(&held.frame);
-        Some(held)
+    /// These messages are no longer held back.
+    pub(super) fn forget_held(&mut self, held: &[HeldMessage]) {
+        self.held_count -= held.len();
+        self.held_bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
     }
 
     /// Takes all that is held back of a topic, oldest first; its throttle stays.
-    pub(super) fn take_held(&mut self, topic: &str) -> VecDeque<HeldMessage> {
-        let queue = self.queues.get_mut(topic);
-        let held = queue.map(|queue| std::mem::take(&mut queue.held));
-        let held = held.unwrap_or_default();
-        self.held_count -= held.len();
-        self.held_bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
+    pub(super) fn take_held(&mut self, topic: &str) -> Vec<HeldMessage> {
+        let limits = self.limits.get_mut(topic);
+        let held = limits.map_or_else(Vec::new, |limits| std::mem::take(&mut limits.held).into());
+        self.forget_held(&held);
         held
     }
 
-    /// Lifts the throttle of a topic and gives what was held back, oldest first.
-    pub(super) fn lift_throttle(&mut self, topic: &str) -> VecDeque<HeldMessage> {
-        let held = self.take_held(topic);
-        if let Some(queue) = self.queues.get_mut(topic)
-            && queue.throttle.take().is_some()
-        {
-            self.throttled -= 1;
-            self.tidy(topic);
-        }
-        held
+    /// When the next held back message is due, if any is held back: the time to take frames again.
+    #[must_use]
+    pub fn next_release(&self) -> Option<Instant> {
+        self.next_due().map(|(due, _)| due)
     }
 
     /// The topic of which a message is due first, and when. A client has at most some 200 topics.
-    pub(super) fn next_due(&self) -> Option<(Instant, Arc<str>)> {
-        if self.held_count == 0 {
-            return None;
-        }
-        let queues = self.queues.iter();
-        let due = queues.filter_map(|(topic, queue)| Some((queue.due()?, topic)));
-        due.min().map(|(due, topic)| (due, Arc::clone(topic)))
+    fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
+        let limits = self.limits.iter();
+        let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
+        due.min()
     }
 
     /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
     /// now.
     pub(super) fn release(&mut self, now: Instant) {
-        if !self.is_throttled() {
+        if !self.holds_back() {
             return;
         }
-        let since = self.timestamp(now);
         while let Some((_, topic)) = self.next_due().filter(|(due, _)| *due <= now) {
-            let Some(held) = self.pop_held(&topic) else {
+            let topic = Arc::clone(topic);
+            let Some(limits) = self.limits.get_mut(&topic) else {
                 return;
             };
-            let queue = self.queues.get_mut(&topic);
-            if let Some(throttle) = queue.and_then(|queue| queue.throttle.as_mut()) {
+            if let Some(throttle) = &mut limits.throttle {
                 throttle.last = Some(now);
             }
-            let number = self.number();
-            self.enqueue(number, &topic, since, held.frame);
+            let held = limits.pop_held();
+            self.forget_held(held.as_slice());
+            if let Some(held) = held {
+                self.enqueue(Some(&topic), now, held.frame);
+            }
+            self.keep_to_queue_length(&topic);
         }
-    }
-
-    /// The number and the topic of the message that was held back first.
-    pub(super) fn oldest_held(&self) -> Option<(u64, Arc<str>)> {
-        let queues = self.queues.iter();
-        let oldest = queues.filter_map(|(topic, queue)| Some((queue.held.front()?.number, topic)));
-        oldest
-            .min()
-            .map(|(number, topic)| (number, Arc::clone(topic)))
     }
 }

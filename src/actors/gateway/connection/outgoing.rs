@@ -126,14 +126,14 @@ impl Outgoing {
     }
 
     fn take(&mut self, is_finishing: bool) {
-        let (has_topics, is_throttled) = (self.outbox.has_topics(), self.outbox.is_throttled());
-        if self.outbox.is_empty() && !is_throttled {
+        let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
+        if self.outbox.is_empty() && !holds_back {
             return;
         }
         let now = Instant::now();
         let room = if is_finishing {
             usize::MAX
-        } else if has_topics || is_throttled {
+        } else if has_topics || holds_back {
             self.flow.room(now)
         } else {
             0
