@@ -220,7 +220,7 @@ impl Outgoing {
 // time: the buffers of Linux hold 15 s of `/joint_states`. So a client that is slower than its topics is only written
 // as much as it reads in `AHEAD`, and the rest is dropped before it is written. Where nobody knows how much a client
 // has not read, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
-// kept waiting, and nobody is asked more often than every `ASK` about it.
+// kept waiting.
 
 /// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time: half a second of
 /// messages to a client that takes half of them.
@@ -229,7 +229,9 @@ const HOLD: Duration = Duration::from_millis(100);
 const AHEAD: Duration = Duration::from_millis(200);
 /// How old a topic message may be that a client which is far behind gets only because a response is behind it.
 const FRESH: Duration = Duration::from_millis(200);
-/// Time between two looks at what the client has not read, and the same while it is slow.
+/// Time between two looks at the client's unread bytes: after a look that found none, after one that found some, and
+/// while the client is slow. A look takes two calls of the system.
+const ASK_CALM: Duration = Duration::from_millis(300);
 const ASK: Duration = Duration::from_millis(100);
 const ASK_SLOW: Duration = Duration::from_millis(50);
 /// A client that reads what it was sent within that time keeps up: it is sent twice as much.
@@ -345,6 +347,9 @@ impl FlowControl {
         } else {
             self.slow_until = None;
             self.room = u64::MAX;
+            if unread == 0 {
+                self.next = now + ASK_CALM;
+            }
             return;
         }
         self.next = now + ASK_SLOW;
