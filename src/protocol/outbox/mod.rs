@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 use bytes::{Buf, Bytes};
 
-use self::throttle::TopicLimits;
+use self::throttle::{HeldMessage, TopicLimits, TopicThrottle};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -35,6 +35,8 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 /// The same once a message has been too old, until nothing waits any more. The client is slower than its topics, and
 /// its reading is late by this and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
+/// How long a message of more than [`MEDIUM`] may be held back: it takes room that others wait for.
+const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
 pub const MESSAGE_BYTES: usize = 160;
 
@@ -158,7 +160,7 @@ impl Outbox {
             return;
         }
         match self.limits.get(topic) {
-            Some(limits) if limits.is_throttled() => self.offer(topic, frame, now),
+            Some(limits) if limits.throttle.is_some() => self.offer(topic, frame, now),
             Some(_) => {
                 let is_series = first_message(&frame) < frame.len();
                 for frame in messages(frame) {
@@ -379,6 +381,152 @@ impl Outbox {
     }
 }
 
+// ---- throttles ------------------------------------------------------------------------------------------------------
+
+impl Outbox {
+    /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
+    /// (`None`, or no time at all). Messages held back then count as produced now.
+    pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
+        let limits = self.limits.entry(Arc::clone(topic)).or_default();
+        let before = limits.throttle.take();
+        if let Some((interval, most_held)) = throttle.filter(|(interval, _)| !interval.is_zero()) {
+            limits.throttle = Some(TopicThrottle {
+                interval,
+                most_held: most_held.max(1),
+                last: before.and_then(|before| before.last),
+            });
+            let surplus = limits.trim();
+            self.forget_held(&surplus);
+            return;
+        }
+        for held in self.take_held(topic) {
+            self.enqueue(Some(topic), held.since, held.frame);
+        }
+        self.keep_to_queue_length(topic);
+        self.tidy(topic);
+    }
+
+    /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
+    /// kept; `None` for any number.
+    pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
+        let limits = self.limits.entry(Arc::clone(topic)).or_default();
+        limits.queue_length = queue_length;
+        self.tidy(topic);
+    }
+
+    /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
+    pub fn forget(&mut self, topic: &str) {
+        self.take_held(topic);
+        self.limits.remove(topic);
+    }
+
+    /// Forgets the limits of a topic that has none.
+    fn tidy(&mut self, topic: &str) {
+        let limits = self.limits.get(topic);
+        if limits.is_some_and(TopicLimits::is_none) {
+            self.limits.remove(topic);
+        }
+    }
+
+    /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
+    /// newest would be left.
+    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
+        let is_series = first_message(&frames) < frames.len();
+        while !frames.is_empty() {
+            let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
+            if !self.offer_one(topic, frame, now) {
+                let throttle = self.limits.get(topic).and_then(|one| one.throttle.as_ref());
+                let left = throttle.map_or(0, |throttle| throttle.most_held);
+                for frame in messages(last_messages(frames, left)) {
+                    self.offer_one(topic, by_itself(frame, true), now);
+                }
+                return;
+            }
+        }
+    }
+
+    /// Gives the throttle a message; false if it is held back.
+    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
+        let number = self.number();
+        let Some(limits) = self.limits.get_mut(topic) else {
+            return true;
+        };
+        let Some(throttle) = &mut limits.throttle else {
+            return true;
+        };
+        if limits.held.is_empty() && throttle.is_due(now) {
+            throttle.last = Some(now);
+            self.enqueue(Some(topic), now, frame);
+            return true;
+        }
+        let is_long = frame.len() > MEDIUM;
+        if is_long && throttle.next().is_some_and(|due| due > now + MAX_HELD_BACK) {
+            self.dropped += 1;
+            return false;
+        }
+        self.held_count += 1;
+        self.held_bytes += counted(&frame);
+        limits.held.push_back(HeldMessage {
+            number,
+            since: now,
+            frame,
+        });
+        let surplus = limits.trim();
+        self.forget_held(&surplus);
+        false
+    }
+
+    /// These messages are no longer held back.
+    fn forget_held(&mut self, held: &[HeldMessage]) {
+        self.held_count -= held.len();
+        self.held_bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
+    }
+
+    /// Takes all that is held back of a topic, oldest first; its throttle stays.
+    fn take_held(&mut self, topic: &str) -> Vec<HeldMessage> {
+        let limits = self.limits.get_mut(topic);
+        let held = limits.map_or_else(Vec::new, |limits| std::mem::take(&mut limits.held).into());
+        self.forget_held(&held);
+        held
+    }
+
+    /// When the next held back message is due, if any is held back: the time to take frames again.
+    #[must_use]
+    pub fn next_release(&self) -> Option<Instant> {
+        self.next_due().map(|(due, _)| due)
+    }
+
+    /// The topic of which a message is due first, and when. A client has at most some 200 topics.
+    fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
+        let limits = self.limits.iter();
+        let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
+        due.min()
+    }
+
+    /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
+    /// now.
+    fn release(&mut self, now: Instant) {
+        if !self.holds_back() {
+            return;
+        }
+        while let Some((_, topic)) = self.next_due().filter(|(due, _)| *due <= now) {
+            let topic = Arc::clone(topic);
+            let Some(limits) = self.limits.get_mut(&topic) else {
+                return;
+            };
+            if let Some(throttle) = &mut limits.throttle {
+                throttle.last = Some(now);
+            }
+            let held = limits.held.pop_front();
+            self.forget_held(held.as_slice());
+            if let Some(held) = held {
+                self.enqueue(Some(&topic), now, held.frame);
+            }
+            self.keep_to_queue_length(&topic);
+        }
+    }
+}
+
 // ---- dropping: the oldest messages go first, whole ------------------------------------------------------------------
 
 impl Outbox {
@@ -496,7 +644,7 @@ impl Outbox {
             let held = self.limits.values_mut();
             let held = held.filter(|one| one.first_held().is_some_and(|held| held < queued));
             if let Some(limits) = held.min_by_key(|limits| limits.first_held()) {
-                let oldest = limits.pop_held();
+                let oldest = limits.held.pop_front();
                 self.forget_held(oldest.as_slice());
                 self.dropped += 1;
             } else if let Some(QueuedMessage { frame, .. }) = first {
