@@ -35,8 +35,6 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 /// The same once a message has been too old, until nothing waits any more. The client is slower than its topics, and
 /// its reading is late by this and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
-/// How long a message of more than [`MEDIUM`] may be held back: it takes room that others wait for.
-const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
 pub const MESSAGE_BYTES: usize = 160;
 
@@ -55,7 +53,7 @@ fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
 }
 
 /// The outgoing queue of one connection.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Outbox {
     /// Topic messages in order.
     topics: VecDeque<QueuedMessage>,
@@ -63,8 +61,8 @@ pub struct Outbox {
     kept_old: usize,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,
-    /// Bytes of topic messages that may be taken, unless a response is behind them.
-    room: usize,
+    /// Bytes of topic messages that may be taken, unless a response is behind them; none for any number.
+    room: Option<usize>,
     /// How old a topic message may be that is taken only because a response is behind it.
     fresh: Duration,
     /// Responses and statuses in order, each with its number.
@@ -110,28 +108,6 @@ impl QueuedMessage {
     /// How many messages it has.
     fn count(&self) -> u64 {
         messages(self.frame.clone()).count() as u64
-    }
-}
-
-impl Default for Outbox {
-    fn default() -> Self {
-        Self {
-            topics: VecDeque::new(),
-            kept_old: 0,
-            is_behind: false,
-            room: usize::MAX,
-            fresh: MAX_AGE,
-            responses: VecDeque::new(),
-            limits: HashMap::new(),
-            held_count: 0,
-            held_bytes: 0,
-            produced: 0,
-            topic_bytes: 0,
-            response_bytes: 0,
-            short_bytes: 0,
-            in_flight: VecDeque::new(),
-            dropped: 0,
-        }
     }
 }
 
@@ -206,7 +182,7 @@ impl Outbox {
     /// Sets how many bytes of topic messages may be taken from now on. Messages ahead of a response are taken all
     /// the same, unless they are older than `fresh`. Then they are dropped, except the newest of its topic.
     pub const fn allow(&mut self, room: usize, fresh: Duration) {
-        self.room = room;
+        self.room = Some(room);
         self.fresh = fresh;
     }
 
@@ -231,7 +207,7 @@ impl Outbox {
                 (None, Some(_)) => true,
                 (None, None) => break,
             };
-            if !is_response && self.room == 0 {
+            if !is_response && self.room == Some(0) {
                 if !self.has_responses() {
                     break;
                 }
@@ -267,8 +243,8 @@ impl Outbox {
             } else {
                 self.take_out(0).map(|message| message.frame)
             };
-            if !is_response {
-                self.room = self.room.saturating_sub(length);
+            if let Some(room) = self.room.as_mut().filter(|_| !is_response) {
+                *room = room.saturating_sub(length);
             }
             self.in_flight.push_back(InFlight {
                 left: length,
@@ -459,8 +435,7 @@ impl Outbox {
             self.enqueue(Some(topic), now, frame);
             return true;
         }
-        let is_long = frame.len() > MEDIUM;
-        if is_long && throttle.next().is_some_and(|due| due > now + MAX_HELD_BACK) {
+        if frame.len() > MEDIUM && !throttle.may_hold_long(now) {
             self.dropped += 1;
             return false;
         }
@@ -544,7 +519,7 @@ impl Outbox {
         let Some(most) = limits.and_then(|limits| limits.queue_length) else {
             return;
         };
-        if self.in_flight.is_empty() && self.room > 0 {
+        if self.in_flight.is_empty() && self.room != Some(0) {
             return;
         }
         let waiting = self.topics.iter().filter(|message| message.is_on(topic));

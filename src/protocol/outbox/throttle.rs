@@ -8,6 +8,10 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+/// How long a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) may be held back: it takes room that
+/// others wait for.
+const MAX_HELD_BACK: Duration = Duration::from_secs(20);
+
 /// What a client has asked for of one topic.
 #[derive(Debug, Default)]
 pub(super) struct TopicLimits {
@@ -64,8 +68,13 @@ impl TopicLimits {
 
 impl TopicThrottle {
     /// When the next message may go; `None`: at once.
-    pub(super) fn next(&self) -> Option<Instant> {
+    fn next(&self) -> Option<Instant> {
         self.last.and_then(|last| last.checked_add(self.interval))
+    }
+
+    /// Whether a long message may wait for the next time.
+    pub(super) fn may_hold_long(&self, now: Instant) -> bool {
+        self.next().is_none_or(|next| next <= now + MAX_HELD_BACK)
     }
 
     pub(super) fn is_due(&self, now: Instant) -> bool {
