@@ -576,16 +576,14 @@ impl Outbox {
             self.drop_message(index);
             return true;
         }
-        let newest = last_messages(message.frame.clone(), 1);
-        let older = message.frame.len() - newest.len();
-        if older == 0 || first_message(&message.frame) == message.frame.len() {
-            // The pieces of a message stay together.
-            return false;
+        // The pieces of a message stay together.
+        if first_message(&message.frame) < message.frame.len() {
+            let newest = by_itself(last_messages(message.frame.clone(), 1), true);
+            self.dropped += message.count() - 1;
+            self.topic_bytes -= counted(&message.frame);
+            self.topic_bytes += counted(&newest);
+            message.frame = newest;
         }
-        self.dropped += messages(message.frame.slice(..older)).count() as u64;
-        self.topic_bytes -= counted(&message.frame);
-        self.topic_bytes += counted(&newest);
-        message.frame = by_itself(newest, true);
         false
     }
 
