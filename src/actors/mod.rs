@@ -1,4 +1,4 @@
-//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*.
+//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and route messages.
 //! Operations of clients are read, and answers written, beside them.
 //!
 //! ```text
@@ -15,7 +15,7 @@
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
 //! or from another node; the [`node::Reply`] knows the way back.
 //!
-//! Each message says in its documentation what it means and who sends it. The drawing in `ARCHITECTURE.md` has all of
+//! The documentation of each message gives its meaning and its sender. The drawing in `ARCHITECTURE.md` has all of
 //! them.
 //!
 //! **Invariant:** every message of a node to a client passes through the registry's one mailbox. So a client sees a

@@ -1,10 +1,10 @@
 //! The language of the nodes: questions with their one answer, messages on topics, interest.
 //!
 //! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
-//! a client or another node, is behind the [`Reply`]: the node does not know it.
+//! a client or another node, is behind the [`Reply`].
 //!
 //! **Invariant:** every [`Call`] is answered exactly once, even if the node that has it fails: a [`Reply`] that
-//! is dropped unanswered says so itself.
+//! is dropped unanswered answers with an error.
 
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ pub struct Call<A: Ask> {
 #[rtype(result = "()")]
 pub struct ShutDown(pub &'static str);
 
-/// Why a question has no answer; nothing of what it asked for has been done, or is done any more.
+/// Why a question has no answer. Its effect has not happened, and will not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unserved {
     /// The node dropped it.

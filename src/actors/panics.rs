@@ -1,8 +1,8 @@
-//! The end of a panic: it takes along what it happened in, or everything.
+//! The end of a panic: it ends one client or computation, or the process.
 //!
 //! No input is known to cause one. Should one happen all the same: in what serves one client it ends that client, in a
 //! computation that computation. Anywhere else, in a node or the registry, others would wait for ever. There the
-//! process ends at once, with one line that says where, so that its supervisor can start it again.
+//! process ends at once, with one line that names the place, so that its supervisor can start it again.
 //!
 //! **Invariant:** a panic is contained by the caller of [`contain`], or it is the last thing that the process does.
 

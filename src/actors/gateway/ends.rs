@@ -13,7 +13,7 @@ pub struct Ends {
     pub peer: SocketAddr,
 }
 
-/// Both ends where nobody knows them: a client of the same machine.
+/// Unknown ends: those of a client of the same machine.
 impl Default for Ends {
     fn default() -> Self {
         SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into()

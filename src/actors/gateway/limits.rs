@@ -47,7 +47,7 @@ pub const MAX_RESPONSES_WAITING: usize = SHORT;
 /// Different `fragment_size`s among the subscriptions to a topic, beside powers of two: a message is cut up once for
 /// each of them. A further one counts as the power of two below, of which there are few.
 pub const MAX_FRAGMENT_SIZES: usize = 16;
-/// How long a provider may take when its caller does not say.
+/// How long a provider may take where its caller sets no timeout.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
 /// answers to its own calls) is refused. The connection is not read at that point, but others would go on sending to
@@ -77,7 +77,7 @@ pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
-/// Frames of a chunk after which others have a turn.
+/// Frames of a chunk after which the reader yields.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
 /// at again.

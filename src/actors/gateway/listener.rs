@@ -106,7 +106,7 @@ async fn accept(
     gauges: Arc<Gauges>,
     admission: Arc<Admission>,
 ) {
-    // The log says it once, not twenty times a second.
+    // Logged once, not twenty times a second.
     let mut failing = false;
     loop {
         match socket.accept().await {

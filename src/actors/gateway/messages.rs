@@ -217,7 +217,7 @@ pub struct SetTap(pub Option<Tap>);
 #[rtype(result = "()")]
 pub struct RefuseCalls(pub &'static str);
 
-/// Every connection sends what it has and ends. From the runtime, when it ends.
+/// Every connection sends its queue and ends. From the runtime, when it ends.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct FinishAll;
@@ -231,13 +231,13 @@ pub struct FinishAll;
 pub struct Deliver {
     /// The topic, for throttling; none for feedback of a goal.
     pub topic: Option<Arc<str>>,
-    /// The message, shared by all subscribers who want it in this form.
+    /// The message, shared by all subscribers of this form.
     pub frame: Bytes,
     /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
     pub underway: Option<DeliveryGuard>,
 }
 
-/// Shared by the deliveries of a message whose publisher waits: it goes on when the last of them is dropped.
+/// Shared by the deliveries of a message whose publisher waits. The last drop lets the publisher go on.
 pub type DeliveryGuard = Arc<oneshot::Sender<()>>;
 
 /// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
@@ -267,7 +267,7 @@ pub struct Throttle {
     pub interval: Duration,
     /// How many messages throttling may hold back, newest kept; at least 1.
     pub held_back: usize,
-    /// How many messages may wait for a slow client, newest kept, if a subscription says so.
+    /// How many messages may wait for a slow client, newest kept, if a subscription limits that.
     pub queue_length: Option<usize>,
 }
 
@@ -280,7 +280,7 @@ impl Throttle {
     };
 }
 
-/// Send what is queued, then end. From the registry when the runtime ends, and from the reader at the end of the
+/// Send the queue, then end. From the registry when the runtime ends, and from the reader at the end of the
 /// stream.
 #[derive(Message, Clone, Copy)]
 #[rtype(result = "()")]

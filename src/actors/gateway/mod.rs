@@ -1,6 +1,6 @@
 //! The gateway stands between the sockets and the nodes: a listener, an actor for each connection, and the registry.
 //!
-//! **Invariant:** what is the arm's own is read from the catalog, and whatever a client sends, the others are served.
+//! **Invariant:** the runtime's own names come from the catalog, and no input of one client stops the service of others.
 
 pub mod connection;
 mod ends;

@@ -35,7 +35,7 @@ pub enum ActionRequest {
     },
 }
 
-/// A goal of the action, as its client knows it.
+/// A goal of the action: its client and the client's id.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SentGoal {
     /// The connection.
@@ -44,7 +44,7 @@ pub struct SentGoal {
     pub id: Option<Payload>,
 }
 
-/// The client that wants a goal to end.
+/// The client that cancels a goal.
 pub struct Canceller {
     /// The way back.
     pub respond: Recipient<Respond>,

@@ -5,7 +5,7 @@
 //! routes ([`Nodes`]) says which node is asked. All that goes wrong on the way is in here, once: bad arguments, a
 //! question that was dropped, and how an error is written.
 //!
-//! **Invariant:** a node sees no JSON. Arguments are read before a node hears of the call. Its answer is written
+//! **Invariant:** a node sees no JSON. Arguments are read before a node gets the call. Its answer is written
 //! afterwards, by the registry or by the thread that has a long answer.
 
 pub mod action_client;

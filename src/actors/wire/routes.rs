@@ -18,7 +18,7 @@ use crate::services::{Answered, Callable, Streamed};
 /// so these take a fifth of a millisecond. Only computations, paths and lists of parameters take longer ones.
 const LONG_ARGUMENTS: usize = 1024;
 
-/// Hands what has come to the node that is meant.
+/// Passes a message to its node.
 pub type Route<T> = Box<dyn Fn(T) + Send>;
 
 /// The runtime's own nodes, by the services, topics and actions that they serve.
@@ -49,7 +49,7 @@ impl Nodes {
         self.route(service, node.into(), PatientAsker::<A>::new);
     }
 
-    /// Reads what is asked, or says what is wrong with it.
+    /// Reads the question, or returns its rejected fields.
     fn route<A: Callable, C: Asker<A::Answer> + 'static>(
         &mut self,
         service: Service,

@@ -1,6 +1,6 @@
 //! Clients that have asked: each waits for an answer, which is written for it.
 //!
-//! **Invariant:** what goes wrong is said by the thread that would have written the answer.
+//! **Invariant:** errors are reported by the thread that would have written the answer.
 
 use std::marker::PhantomData;
 

@@ -1,4 +1,4 @@
-//! The end of a goal, as a number that clients know.
+//! The end of a goal, as the number of `action_msgs`.
 //!
 //! **Invariant:** the numbers are those of `action_msgs/msg/GoalStatus`.
 

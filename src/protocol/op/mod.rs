@@ -120,7 +120,7 @@ pub enum Op {
     },
     /// A piece of a longer frame.
     Fragment(Piece),
-    /// Sets which statuses the sender wants, and how it wants to be told why a call failed.
+    /// Sets the level of the sender's statuses, and the form of the reason of a failed call.
     SetLevel {
         /// The statuses.
         verbosity: Verbosity,
@@ -281,7 +281,7 @@ pub enum ActionServerOp {
     },
     /// Withdraws that.
     Unadvertise,
-    /// Passes on how a goal goes.
+    /// Passes on the progress of a goal.
     Feedback {
         /// Any value.
         values: Payload,
@@ -328,7 +328,7 @@ impl Arguments {
     }
 }
 
-/// Why a frame is no operation, and how its sender hears of it.
+/// Why a frame is no operation, and the form of the answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpError {
     /// A fault that is answered by an error `status`.
@@ -378,7 +378,7 @@ pub enum Problem {
         /// The field.
         field: &'static str,
     },
-    /// A field is not what it has to be.
+    /// A field is rejected.
     #[error("{op}: {field} must be {expected}, got {found}")]
     Mistyped {
         /// The operation.

@@ -53,7 +53,7 @@ const KEYS: [&str; 25] = [
     "feedback",
 ];
 
-/// The operations that we know, by their names on the wire.
+/// The known operations, by their names on the wire.
 pub const OPS: [&str; 18] = [
     "advertise",
     "unadvertise",
@@ -75,7 +75,7 @@ pub const OPS: [&str; 18] = [
     "action_result",
 ];
 
-/// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
+/// Reads a frame. Unknown members are ignored; of a repeated one the last counts.
 #[must_use]
 pub fn read(frame: &str) -> Incoming {
     let mut members = [None; KEYS.len()];
@@ -262,7 +262,7 @@ impl<'a> OpReader<'a> {
     }
 
     /// Reads the token that a client shows. A complaint about it does not repeat it.
-    /// A command of this program says that it is one, and has a token only if one was given to it.
+    /// A command of this program marks itself, and shows a token only if it got one.
     fn auth(&self) -> Result<Op, Problem> {
         let is_command = self.get("command").is_some() && self.boolean("command")?;
         let has_none = is_command && self.get("token").is_none();

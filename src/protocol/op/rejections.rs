@@ -146,7 +146,7 @@ impl Rejections {
         self.0.push(rejection);
     }
 
-    /// Gives a field the name by which the sender knows it.
+    /// Gives a field the sender's name for it.
     pub fn rename(&mut self, field: &str, name: &str) {
         for rejection in self.0.iter_mut().filter(|one| one.field == field) {
             name.clone_into(&mut rejection.field);

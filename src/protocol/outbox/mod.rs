@@ -8,7 +8,7 @@
 //!
 //! A message that has waited for longer than [`MAX_AGE`] is dropped, except the newest of its topic.
 //!
-//! It is told the time, and knows no socket and no clock.
+//! Its caller gives the time; it has no socket and no clock.
 //!
 //! **Invariant:** dropping removes whole messages, never reorders; of topic messages, held back ones included, at most
 //! [`MAX_TOPIC_BYTES`] wait.
@@ -35,7 +35,7 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 /// The same once a message has been too old, until nothing waits any more. The client is slower than its topics, and
 /// its reading is late by this and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
-/// Bytes that a waiting message counts beside its own: its reference count, its place, and what the allocator adds.
+/// Bytes that a waiting message counts beside its own: its reference count, its place, and the allocator's share.
 pub const MESSAGE_BYTES: usize = 160;
 
 /// Bytes of a message, or of a series, that count.
@@ -275,7 +275,7 @@ impl Outbox {
         }
     }
 
-    /// Whether a long topic message waits or is being written, what is held back aside.
+    /// Whether a long topic message waits or is being written. Messages that are held back do not count.
     #[must_use]
     pub fn has_long(&self) -> bool {
         let mut waiting = self.topics.iter();
@@ -390,7 +390,7 @@ impl Outbox {
         self.tidy(topic);
     }
 
-    /// Forgets a topic after an unsubscription: its throttle, and what is held back. Queued messages still leave.
+    /// Forgets a topic after an unsubscription: its throttle, and the messages held back. Queued messages still leave.
     pub fn forget(&mut self, topic: &str) {
         self.take_held(topic);
         self.limits.remove(topic);

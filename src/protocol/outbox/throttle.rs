@@ -1,7 +1,7 @@
-//! What a client asks for by `throttle_rate` and `queue_length`, and the messages that are held back for that.
+//! A client's `throttle_rate` and `queue_length` of a topic, and the messages that are held back for that.
 //!
-//! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held back
-//! the newest remain.
+//! **Invariant:** at least the interval lies between two released messages of a topic, and the newest messages are
+//! held back.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use bytes::Bytes;
 /// others wait for.
 const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 
-/// What a client has asked for of one topic.
+/// A client's limits of one topic.
 #[derive(Debug, Default)]
 pub(super) struct TopicLimits {
     /// How many messages may wait while the client does not take all that it is offered.
@@ -28,7 +28,7 @@ pub(super) struct TopicThrottle {
     pub(super) interval: Duration,
     /// How many messages may be held back, 1 or more.
     pub(super) most_held: usize,
-    /// When the last message was let go.
+    /// When the last message was released.
     pub(super) last: Option<Instant>,
 }
 
@@ -58,7 +58,7 @@ impl TopicLimits {
         throttle?.next()
     }
 
-    /// Takes what is held back beyond what may be, the oldest.
+    /// Takes the oldest messages beyond the number that may be held back.
     pub(super) fn trim(&mut self) -> Vec<HeldMessage> {
         let most = self.throttle.as_ref().map_or(0, |one| one.most_held);
         let surplus = self.held.len().saturating_sub(most);

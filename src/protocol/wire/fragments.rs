@@ -159,7 +159,7 @@ impl Fragments {
         std::mem::take(&mut self.refused)
     }
 
-    /// Bytes of what is kept.
+    /// Bytes of the pieces that are kept.
     #[must_use]
     pub const fn bytes(&self) -> usize {
         self.bytes
@@ -209,7 +209,7 @@ impl Fragments {
         Some(gone)
     }
 
-    /// Forgets what has taken longer than [`MAX_AGE`].
+    /// Forgets messages that take longer than [`MAX_AGE`].
     pub fn forget_old(&mut self, now: Instant) {
         let bytes = &mut self.bytes;
         self.messages.retain(|_, one| {

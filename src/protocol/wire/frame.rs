@@ -41,7 +41,7 @@ enum Within {
 /// Takes bytes as they come and gives frames, one at a time.
 ///
 /// [`push`](Self::push) a chunk, then [`cut`](Self::cut) until it gives `None`; at the end of the stream,
-/// [`finish`](Self::finish). As an iterator it reads each frame too, and knows no series.
+/// [`finish`](Self::finish). As an iterator it reads each frame too, without series.
 #[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,

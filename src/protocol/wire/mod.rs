@@ -1,6 +1,6 @@
 //! From bytes to frames and back: lines, nesting, pieces, text and JSON.
 //!
-//! **Invariant:** what is read here is cut and checked, and its meaning is left to `op`.
+//! **Invariant:** bytes are cut and checked here; `op` has their meaning.
 
 pub mod fragments;
 pub mod frame;

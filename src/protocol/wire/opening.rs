@@ -63,7 +63,7 @@ const BSON_LENGTH: usize = 4;
 
 /// Judges a connection by all the bytes that it has sent so far.
 ///
-/// At the end of the stream what is undecided is to be read as JSON.
+/// At the end of the stream an undecided opening counts as JSON.
 #[must_use]
 pub fn opening(first: &[u8]) -> Opening {
     if first.starts_with(TLS_HELLO) {

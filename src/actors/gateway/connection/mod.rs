@@ -132,7 +132,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
     type Context = Context<Self>;
 
-    /// Judges the client, and speaks with it or says why not.
+    /// Judges the client, and serves or refuses it.
     fn started(&mut self, ctx: &mut Context<Self>) {
         let Some((stream, admission, ends)) = self.newcomer.take() else {
             return;

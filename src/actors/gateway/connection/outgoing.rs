@@ -1,4 +1,4 @@
-//! The outgoing side of one client: all that waits to be written to it, what is being written, and how long the client
+//! The outgoing side of one client: its queue, the frames that are being written, and how long the client
 //! may take for that.
 //!
 //! **Invariant:** patience ends only for a client that is finishing, or for which responses or a long message have
@@ -193,7 +193,7 @@ impl Outgoing {
         self.flow.age() > STALL_LIMIT && self.outbox.has_long()
     }
 
-    /// When a client that takes nothing of what is being written is given up; none while neither a response nor a long
+    /// The deadline of a client that takes no byte of a write; none while neither a response nor a long
     /// message waits and it is not finishing. `taken`: when it took some of a write that goes on.
     pub(super) fn patience(&self, taken: Option<Instant>, is_finishing: bool) -> Option<Instant> {
         let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
@@ -218,8 +218,8 @@ impl Outgoing {
 //
 // Bytes in a client's socket get old, and can't be dropped any more. The size of a socket's buffers says nothing about
 // time: the buffers of Linux hold 15 s of `/joint_states`. So a client that is slower than its topics is only written
-// as much as it reads in `AHEAD`, and the rest is dropped before it is written. Where nobody knows how much a client
-// has not read, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
+// as much as it reads in `AHEAD`, and the rest is dropped before it is written. Where a client's unread bytes
+// are unknown, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
 // kept waiting.
 
 /// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time: half a second of
@@ -234,7 +234,7 @@ const FRESH: Duration = Duration::from_millis(200);
 const ASK_CALM: Duration = Duration::from_millis(300);
 const ASK: Duration = Duration::from_millis(100);
 const ASK_SLOW: Duration = Duration::from_millis(50);
-/// A client that reads what it was sent within that time keeps up: it is sent twice as much.
+/// A client that reads all within that time keeps up: it is sent twice as much.
 const KEEPS_UP: Duration = Duration::from_millis(25);
 /// How long the pace of reading is kept in mind, and how long a client counts as slow.
 const MEMORY: Duration = Duration::from_secs(1);

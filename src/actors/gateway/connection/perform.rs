@@ -39,11 +39,11 @@ pub(super) enum OpOutcome {
     Done,
     /// The computation runs when its turn comes. It came in a frame of that length.
     Computation(Request, usize),
-    /// The client is refused, and gets this status: it has not done what it has to, or speaks another protocol.
+    /// The client is refused, and gets this status: it broke a rule, or speaks another protocol.
     Refused(Bytes),
 }
 
-/// Performs the ops of one client, one at a time. It goes into the future of an op and comes back with its end.
+/// Performs the ops of one client, one at a time. The future of an op owns it, and returns it at its end.
 pub(super) struct Performer {
     id: ConnectionId,
     registry: Addr<Registry>,
@@ -123,14 +123,14 @@ impl Performer {
         }
     }
 
-    /// Performs what has been cut off the stream, to its end.
+    /// Performs one part of the stream.
     pub(super) async fn take(mut self, cut: FramePart) -> (Self, OpOutcome) {
         let outcome = self.perform_part(cut).await;
         self.coming = None;
         (self, outcome)
     }
 
-    /// Tells the client what is wrong with the end of its stream.
+    /// Sends the client the error at the end of its stream.
     pub(super) async fn take_end(self, error: FrameError) -> (Self, OpOutcome) {
         let outcome = self.complain(&error.to_string(), None).await;
         (self, outcome)

@@ -26,7 +26,7 @@ pub(super) const DISCARD_BYTES: usize = 16 * 1024 * 1024;
 pub(super) enum ClientLost {
     /// It is gone.
     Gone,
-    /// It has broken a rule, and hears so at the end.
+    /// It has broken a rule, and gets an error at the end.
     #[cfg(feature = "web")]
     Refused,
 }
@@ -37,7 +37,7 @@ pub(super) fn yield_turn(cx: &mut Context<'_>) {
     let _ = pin!(tokio::task::yield_now()).poll(cx);
 }
 
-/// Appends what is there to `chunk`; 0 at the end of the stream.
+/// Appends the available bytes to `chunk`; 0 at the end of the stream.
 pub(super) fn poll_read<S: AsyncRead + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,

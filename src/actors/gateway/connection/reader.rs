@@ -336,7 +336,7 @@ impl ClientReader {
         true
     }
 
-    /// The end of the stream: what has begun there is no frame.
+    /// The end of the stream. A frame that has begun there is incomplete.
     fn poll_last(&mut self, cx: &mut task::Context<'_>) -> Poll<Result<(), ClientLost>> {
         let performer = self.performer.take();
         let Some((performer, error)) = performer.zip(self.frames.finish()) else {

@@ -112,7 +112,7 @@ pub(super) struct Newcomer<'a> {
     pub(super) refused: Option<Refused>,
 }
 
-/// Says when the opening of a client is examined, and so what it has to show.
+/// Decides when the opening of a client is examined.
 #[derive(Clone, Copy)]
 enum Examination<'a> {
     /// It has a place.
@@ -320,7 +320,7 @@ impl ClientSession {
         Ok(HeldPlace { id, registry })
     }
 
-    /// Reads until it is clear what is to be done about the client.
+    /// Reads until the opening of the client is decided.
     async fn examine<S>(
         &self,
         stream: &mut S,
@@ -364,7 +364,7 @@ impl ClientSession {
         }
     }
 
-    /// Does what is to be done about a client that the registry knows.
+    /// Serves or refuses a client that the registry knows.
     async fn serve<S>(
         &self,
         mut stream: S,
@@ -392,7 +392,7 @@ impl ClientSession {
         }
     }
 
-    /// Reads until the first bytes tell what the client speaks. A client that ends before that counts as one that
+    /// Reads until the first bytes tell the client's protocol. A client that ends before that counts as one that
     /// speaks JSON. A silent client may stay silent, unless it has something to show until `due`; a client that has
     /// begun what may become a request has to go on.
     async fn detect_protocol<S: AsyncRead + Unpin>(
@@ -451,7 +451,7 @@ impl ClientSession {
         }
     }
 
-    /// Tells a client why it is not served, and swallows what it sends so that it can read that.
+    /// Tells a client why it is not served, and discards its input so that it can read the reason.
     async fn refuse<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: &mut S, why: &str) {
         let status = messages::status(Level::Error, why, None);
         let tell = async {

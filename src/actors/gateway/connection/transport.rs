@@ -42,7 +42,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Appends what is there; 0 at the end of the stream, after which the client may still be reading.
+    /// Appends the available bytes; 0 at the end of the stream, after which the client may still be reading.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
@@ -93,7 +93,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Sends what the transport itself has to say, if anything. It is called when there is nothing else to send.
+    /// Sends a due ping, where the transport has pings. Called when there is nothing else to send.
     pub(super) fn send_due_ping(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self {
             Self::Plain(_) => {

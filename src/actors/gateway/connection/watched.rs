@@ -15,9 +15,9 @@ use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::memory::{Memory, Permit};
 use crate::protocol::limits::MEDIUM;
 
-/// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
+/// Input buffer of a WebSocket. It lives as long as the connection, so it is small.
 pub(super) const READ_BUFFER: usize = 8 * 1024;
-/// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
+/// Bytes that are read before the reader yields. They may be ten thousand empty frames without a message.
 const TURN: usize = 32 * 1024;
 /// Longest head of a frame: two bytes, eight of a length, four of the mask.
 const LONGEST_HEAD: usize = 14;
@@ -46,7 +46,7 @@ pub(super) struct MonitoredStream<S> {
     place: FramePlace,
     /// Arrival time of its first byte, plus all time spent not reading.
     began: Option<Instant>,
-    /// Bytes that may still be read before others have a turn, however many messages they are.
+    /// Bytes that may still be read before the reader yields, in any number of messages.
     turn: usize,
     memory: Memory,
     /// The room for the message that comes, if it is long.
@@ -78,7 +78,7 @@ impl<S> MonitoredStream<S> {
         self.turn = TURN;
     }
 
-    /// Whether others have a turn now, though there may be more to be read.
+    /// Whether the reader yields now, though there may be more to read.
     pub(super) const fn is_turn_over(&self) -> bool {
         self.turn == 0
     }

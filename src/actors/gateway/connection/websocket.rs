@@ -56,11 +56,11 @@ pub(super) struct WebSocket<S> {
     line: Option<OneLine>,
     /// A long message, kept until the library reads on: it would keep the memory of one that is gone for the next.
     spent: Option<Bytes>,
-    /// The kind of message that the next write goes on with, if it does not begin one.
+    /// The kind of the message that the next write continues, if it does not begin one.
     unfinished: Option<Data>,
     /// Bytes of frames that the library has taken and not written.
     underway: usize,
-    /// Why the connection ends, for the peer to know.
+    /// The reason for the end of the connection, for the peer.
     close_reason: (CloseCode, &'static str),
     /// The close frame has been put behind all else.
     is_closing: bool,
@@ -108,7 +108,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         self.stream().permit.take()
     }
 
-    /// Appends what has come of a message: a long one as it would come over TCP, a chunk at a time.
+    /// Appends the received part of a message: a long one a chunk at a time, as over TCP.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
@@ -316,7 +316,7 @@ fn close_reason(error: &Error) -> (CloseCode, &'static str) {
     }
 }
 
-/// How a frame goes out: JSON begins with a brace, CBOR never does.
+/// The kind of a frame: JSON begins with a brace, CBOR never does.
 fn kind_of(frame: &Bytes) -> Data {
     if frame.first() == Some(&b'{') {
         Data::Text

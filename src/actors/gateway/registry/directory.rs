@@ -203,7 +203,7 @@ impl Directory {
         is_served
     }
 
-    /// All names, up to the limit of what is listed; none if there are more than `at_most`.
+    /// All names, up to the limit of a list; none if there are more than `at_most`.
     pub(crate) fn census(&self, at_most: usize) -> Option<Census> {
         if self.topics.len() + self.services.len() + self.actions.len() > at_most {
             return None;

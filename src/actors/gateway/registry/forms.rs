@@ -18,8 +18,8 @@ use crate::protocol::ros::tree::MessageTree;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
-/// Longest message, or series of them, whose forms are made where it is heard, which takes some tenth of a millisecond
-/// each.
+/// Longest message, or series of them, whose forms are made on the registry's thread. Each takes about a tenth of a
+/// millisecond.
 const ENCODED_HERE: usize = 16 * 1024;
 
 /// The messages in one form.

@@ -1,7 +1,7 @@
 //! Calls and goals that were forwarded to the clients that serve them, and have not ended.
 //!
 //! **Invariant:** each ends once: by the answer of its own provider, by its deadline, or with that client. A goal
-//! outlives its sender, but then nobody hears of it any more.
+//! outlives its sender, but then its progress is not sent.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -32,7 +32,7 @@ pub(crate) struct Forwarded {
 pub(crate) enum RequestTerms {
     /// A call ends when its caller's patience does. The registry may look later, if the process has stood still.
     Call { deadline: Instant },
-    /// A goal goes on, and may be cancelled under the name that its server knows.
+    /// A goal continues, and may be cancelled under its name at the server.
     Goal {
         spelling: Box<str>,
         wants_feedback: bool,
@@ -70,7 +70,7 @@ fn remove(numbers: &mut NumbersByClient, client: ConnectionId, number: u64) {
     }
 }
 
-/// The id under which request `number` goes to its provider.
+/// The id of request `number` at its provider.
 fn own_id(number: u64) -> String {
     format!("{OWN_ID_PREFIX}{number}")
 }
@@ -85,7 +85,7 @@ fn number_of(id: &Payload) -> Option<u64> {
 }
 
 impl Requests {
-    /// Adds a request. Returns the id under which it goes to its provider.
+    /// Adds a request. Returns its id at its provider.
     pub(crate) fn add(&mut self, request: Forwarded) -> String {
         self.made += 1;
         let number = self.made;
@@ -126,7 +126,7 @@ impl Requests {
         (request.provider == provider && is_meant && !is_late).then_some(number)
     }
 
-    /// The newest request that `caller` has made under `id`, and the id that its provider knows.
+    /// The newest request of `caller` under `id`, and its id at the provider.
     pub(crate) fn made_under(
         &self,
         id: Option<&Payload>,

@@ -86,7 +86,7 @@ pub struct Registry {
     permit: Option<Permit>,
 }
 
-/// One client, as the registry knows it.
+/// The registry's entry of one client.
 struct Client {
     outlets: Outlets,
     /// Its address.
@@ -97,7 +97,7 @@ struct Client {
     /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
     /// dropped until it advertises again.
     withdrawn: HashSet<Topic>,
-    /// Statuses that it wants.
+    /// The least level of its statuses.
     verbosity: Verbosity,
     /// Ends with the client.
     present: Arc<()>,
@@ -107,7 +107,7 @@ struct Client {
     answered: Option<oneshot::Sender<()>>,
 }
 
-/// All that one client has registered, in order of the names: owners of topics hear of its going in that order.
+/// All registrations of one client, in order of the names. They are withdrawn in that order.
 #[derive(Default)]
 struct Registrations {
     advertised: BTreeMap<Box<str>, KeptEntry>,
@@ -535,7 +535,7 @@ impl Registry {
         self.tap.is_some() || self.topics.has_subscribers(topic)
     }
 
-    /// Notes that nobody wants messages on that topic any more.
+    /// Notes that the topic has no subscriber any more.
     fn note_unwanted(&mut self, topic: &str) {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);

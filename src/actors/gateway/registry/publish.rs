@@ -34,7 +34,7 @@ pub(super) struct Backpressure {
 }
 
 impl Backpressure {
-    /// Makes the guard that goes with the message to a subscriber.
+    /// Makes the guard of the message for a subscriber.
     fn underway(&mut self) -> DeliveryGuard {
         let (underway, _) = self.underway.get_or_insert_with(|| {
             let (underway, end) = oneshot::channel();
@@ -221,7 +221,7 @@ impl Registry {
         }
     }
 
-    /// The type of a topic's messages, if anybody has said it and it is known.
+    /// The type of a topic's messages, if a client has given one that the runtime knows.
     pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),

@@ -1,6 +1,6 @@
 //! Calls and goals: to the node or the client that serves them, and the answers of clients back to those who asked.
 //!
-//! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender goes first.
+//! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
 use std::sync::Arc;
 
@@ -338,7 +338,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Progress goes to who sent the goal, if it was asked for; a slow client may miss some.
+    /// Sends progress to the sender of the goal, if it asked for that. A slow client may miss some.
     pub(super) fn pass_feedback(
         &self,
         origin: &FrameOrigin,
@@ -364,7 +364,7 @@ impl Registry {
         Ok(())
     }
 
-    /// The answer of the client that serves a call or a goal goes back under the caller's own id.
+    /// Returns the provider's answer to a call or a goal under the caller's own id.
     pub(super) fn complete(
         &mut self,
         origin: &FrameOrigin,

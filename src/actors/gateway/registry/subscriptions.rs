@@ -112,7 +112,7 @@ impl Registry {
             topic: name,
             throttle,
         });
-        // The status leaves before the first message: the topic's owner hears of the subscriber after it.
+        // The status leaves before the first message: the topic's owner gets the news of the subscriber after it.
         let msg = format!("subscribed to {topic}");
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
         if first {
