@@ -173,7 +173,12 @@ impl<G: Gate> Responder<'_, G> {
                 Err(why) => text(StatusCode::SERVICE_UNAVAILABLE, &why),
             },
             Err(why) => {
-                tracing::debug!(%why, "request refused");
+                // A browser shows nobody the answer to a WebSocket handshake.
+                if matches!(why, AccessError::Origin(_)) {
+                    tracing::warn!(%why, "request refused");
+                } else {
+                    tracing::debug!(%why, "request refused");
+                }
                 if why == AccessError::WrongToken && !self.gate.delay().await {
                     return Err(io::ErrorKind::PermissionDenied.into());
                 }

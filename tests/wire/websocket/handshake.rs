@@ -2,8 +2,9 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::process::Stdio;
 
-use crate::common::{PATIENCE, Runtime, SET_GRAVITY};
+use crate::common::{Logged, PATIENCE, Runtime, SET_GRAVITY, program};
 use crate::web_client::{Answer, exchange, handshake, rest, try_handshake};
 
 #[test]
@@ -85,6 +86,17 @@ fn a_foreign_origin_is_a_403_that_names_the_option() {
         assert_eq!(status, 403, "{name}");
         assert!(body.contains("--allow-host"), "{body}");
     }
+}
+
+/// A browser shows nobody the answer to a handshake.
+#[test]
+fn the_log_names_the_option_for_a_foreign_origin() {
+    let mut runtime = Logged::start(program(), Stdio::null());
+    let headers = handshake(runtime.address) + "Origin: https://class.example\r\n";
+    try_handshake(runtime.address, "/", &headers);
+    let line = runtime.await_line("--allow-origin");
+    assert!(line.contains("WARN"), "{line}");
+    assert!(line.contains("https://class.example"), "{line}");
 }
 
 #[test]
