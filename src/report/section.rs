@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, escape};
+use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, csv, escape};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
@@ -106,36 +106,9 @@ impl Section {
             grid(panels.len()).1,
             escape(caption),
         );
-        let mut csv = "curve,x,y,note\n".to_owned();
-        for (curve, x, y, note) in panels.iter().flat_map(|panel| &panel.rows) {
-            csv += &format!(
-                "{},{},{},{}\n",
-                quoted(curve),
-                spelled(*x),
-                spelled(*y),
-                quoted(note)
-            );
-        }
-        self.files.push((format!("{name}.csv"), csv));
+        self.files.push((format!("{name}.csv"), csv(panels)));
         self.files
             .push((format!("{name}.svg"), sheet(title, &legend, panels)));
-    }
-}
-
-/// A field of a CSV file.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        return format!("\"{}\"", text.replace('"', "\"\""));
-    }
-    text.to_owned()
-}
-
-/// A number that reads back to the same bits; nothing where there is none.
-fn spelled(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value:e}")
-    } else {
-        String::new()
     }
 }
 

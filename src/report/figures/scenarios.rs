@@ -65,9 +65,9 @@ pub(super) fn make(section: &mut Section) {
         "scenarios",
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps. The scale is that of the largest angle, which is \
-         written at the right. A cross ends a run that would have left the finite numbers. Below: the time watched, \
-         and whether the scene does as theory says; the table has the details. A name opens the arm on the page of a \
-         running program at 127.0.0.1:9095, which applies the settings on a click.",
+         written below. A cross ends a run that would have left the finite numbers. Below: the time watched, the \
+         largest angle, and whether the scene does as theory says; the table has the details. A name opens the arm on \
+         the page of a running program at 127.0.0.1:9095, which applies the settings on a click.",
         &panels,
     );
     section.table(&table);
@@ -107,12 +107,12 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
     let (drawn, rows) = match live.watch() {
         Ok(watched) => {
             let link = escape(&live.fragment());
-            let watched_for = seconds(live.seconds());
-            let note =
-                format!("<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{watched_for}</text>");
+            let largest = largest(&watched);
+            let scale = format!("{}, ±{} rad", seconds(live.seconds()), number(largest));
             let drawn = format!(
-                "<a href=\"{PAGE}{link}\">{heading}</a>{}{note}",
-                curves(&watched)
+                "<a href=\"{PAGE}{link}\">{heading}</a>{}<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{scale}\
+                 </text>",
+                curves(&watched, largest)
             );
             (drawn, rows(name, &watched))
         }
@@ -131,6 +131,7 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
         keys: JOINTS
             .map(|(class, label)| Key::line(class, label))
             .to_vec(),
+        axes: ["time [s]", "angle from the start [rad]"].map(str::to_owned),
         rows,
     }
 }
@@ -147,9 +148,13 @@ fn rows(name: &str, watched: &LiveRun) -> Vec<PlotNumber> {
     samples.flat_map(row).collect()
 }
 
-fn curves(watched: &LiveRun) -> String {
+/// The largest angle from the start \[rad\].
+fn largest(watched: &LiveRun) -> f64 {
     let all = watched.samples.iter().flat_map(|(_, angles)| angles);
-    let largest = all.fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
+    all.fold(0.0, |largest, angle| largest.max(angle.abs()))
+}
+
+fn curves(watched: &LiveRun, largest: f64) -> String {
     let end = watched.samples.last().map_or(1.0, |(time, _)| *time);
     let x = |time: f64| LEFT + (RIGHT - LEFT) * time / end;
     let part = |angle: f64| if largest > 0.0 { angle / largest } else { 0.0 };
@@ -170,8 +175,5 @@ fn curves(watched: &LiveRun) -> String {
         out += "<g class=\"series ink\">";
         out += &format!("<path class=\"lost\" d=\"M{x} {y}l8 8m0 -8l-8 8\"/></g>");
     }
-    let (y, largest) = (TOP + 4.0, number(largest));
-    out + &format!(
-        "<text class=\"note\" x=\"{RIGHT}\" y=\"{y}\" text-anchor=\"end\">{largest} rad</text>"
-    )
+    out
 }

@@ -11,7 +11,7 @@ mod plot;
 
 pub(crate) use axis::{Axis, Unit};
 pub(crate) use numbers::{number, one_digit, plain, power, scientific, seconds};
-pub(crate) use plot::{Heat, Mark, Plot, bars};
+pub(crate) use plot::{Heat, Mark, Plot, bars, csv};
 
 use crate::math::integrator::Method;
 
@@ -162,11 +162,13 @@ impl Curve {
     }
 }
 
-/// A drawn panel: an `<svg>` element without style, the keys of its curves, and its numbers.
+/// A drawn panel: an `<svg>` element without style, the keys of its curves, and its numbers with the names of its axes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Panel {
     pub(crate) svg: String,
     pub(crate) keys: Vec<Key>,
+    /// Names of x and y with their units; empty for an axis that is not there.
+    pub(crate) axes: [String; 2],
     pub(crate) rows: Vec<PlotNumber>,
 }
 
