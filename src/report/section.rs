@@ -252,7 +252,7 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
     let width = panel_width * length_in_f64(columns);
     let mut head = String::new();
     let mut y = 4.0;
-    for line in lines(title, width - 2.0 * MARGIN) {
+    for line in lines(title, width - 2.0 * MARGIN, LETTER) {
         y += 22.0;
         let line = escape(&line);
         head += &format!("<text class=\"heading\" x=\"{MARGIN}\" y=\"{y}\">{line}</text>");
@@ -291,13 +291,13 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
 /// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
 const LETTER: f64 = 10.4;
 
-/// A heading's words in lines of at most `room` pixels; a word that is longer stands alone.
-fn lines(heading: &str, room: f64) -> Vec<String> {
+/// A heading's words in lines of at most `room` pixels, at so many pixels a letter; a word that is longer stands alone.
+pub(super) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in heading.split_whitespace() {
         let line = lines.last().map_or("", String::as_str);
         let length = line.chars().count() + 1 + word.chars().count();
-        if line.is_empty() || LETTER * length_in_f64(length) <= room {
+        if line.is_empty() || letter * length_in_f64(length) <= room {
             let line = format!("{line} {word}").trim_start().to_owned();
             lines.pop();
             lines.push(line);
@@ -317,13 +317,13 @@ mod tests {
         let heading =
             "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
         for room in [100.0, 400.0, 812.0, 5000.0] {
-            let lines = lines(heading, room);
+            let lines = lines(heading, room, LETTER);
             assert_eq!(lines.join(" "), heading);
             for line in &lines {
                 let fits = LETTER * length_in_f64(line.chars().count()) <= room;
                 assert!(fits || !line.contains(' '), "{line}");
             }
         }
-        assert_eq!(lines(heading, 5000.0).len(), 1);
+        assert_eq!(lines(heading, 5000.0, LETTER).len(), 1);
     }
 }

@@ -24,14 +24,15 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Equilibrium, equilibrium, gravity_gradient};
 use crate::study::stability::Sampling;
 
-/// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold meanwhile.
+/// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold
+/// meanwhile.
 pub const STEPS: u64 = 4000;
 
 /// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
 const NUDGE: f64 = 1e-6;
 
-/// A deviation, or a velocity times the control period, that has made its point \[rad\]: two thousand nudges, and still less
-/// than the chatter past a limit.
+/// A deviation, or a velocity times the control period, that has made its point \[rad\]: two thousand nudges, and still
+/// less than the chatter past a limit.
 const ESCAPED: f64 = 2e-3;
 
 /// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.

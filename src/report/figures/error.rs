@@ -3,7 +3,7 @@
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
 //! nothing is interpolated between two runs.
 
-use super::fit::{slope, worst};
+use super::fit::{fewest, slope, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
@@ -81,8 +81,13 @@ impl Data {
                     .find(|(of, it)| {
                         *of == method && it.error <= target && it.steps <= MOST_SEARCHED
                     });
-                let steps = enough.map(|(_, outcome)| (least, outcome.steps));
-                let fewest = steps.and_then(|steps| fewest(&scene, method, target, steps));
+                let fewest = enough.and_then(|(_, outcome)| {
+                    fewest(
+                        StepSearch::new(least, outcome.steps).to_part(RESOLUTION),
+                        |steps| scene.run_within(method, steps, target),
+                        |outcome| outcome.error <= target,
+                    )
+                });
                 least = fewest.map_or(least, |outcome| outcome.steps);
                 reached.extend(fewest.map(|outcome| (target, run(method, outcome))));
             }
@@ -143,25 +148,6 @@ impl Data {
     fn is_held(&self) -> bool {
         self.scene.control == "held"
     }
-}
-
-/// The run that keeps within `target` with the fewest steps between the two, found to a part of [`RESOLUTION`].
-fn fewest(
-    scene: &Scene,
-    method: Method,
-    target: f64,
-    (least, most): (u64, u64),
-) -> Option<RunOutcome> {
-    let mut search = StepSearch::new(least, most).to_part(RESOLUTION);
-    let mut best = None;
-    while let Some(steps) = search.wanted() {
-        let outcome = scene.run_within(method, steps, target);
-        search.tell(outcome.error <= target);
-        best = Some(outcome)
-            .filter(|outcome| outcome.error <= target)
-            .or(best);
-    }
-    best
 }
 
 fn evaluations(run: &Run) -> f64 {
@@ -292,7 +278,7 @@ fn against_time(section: &mut Section, data: &[Data]) {
     let x = Axis::around("time for the whole run", Unit::Seconds, times);
     let mut plots = plots(data, &x, |run| run.timing.minimum);
     for (plot, data) in plots.iter_mut().zip(data) {
-        plot.above = data.evaluation_time();
+        plot.above = data.evaluation_time().map(|time| (time, "evaluations"));
         let points = plot.curves.iter_mut().flat_map(|curve| &mut curve.points);
         let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
         for (point, run) in points.zip(runs) {

@@ -7,7 +7,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::report::experiments::nonlinear::{PeriodicSwing, are_carried, arrive, move_of, spun};
 use crate::report::section::Section;
-use crate::report::svg::{Axis, Curve, Heat, Key, Panel, Plot, Unit, number};
+use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Panel, Plot, Unit, number};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
 use crate::study::stability::{limit_held, limits};
@@ -119,7 +119,7 @@ fn map(
             Axis::log("timestep", Unit::Seconds, kind.steps),
             Axis::log(kind.label, Unit::Number, kind.values),
         );
-        let class = |holds: &bool| if *holds { "h2" } else { "h7" };
+        let class = |holds: &bool| if *holds { "yes" } else { "no" };
         let rows = holds.chunks(columns);
         plot.heat = Some(Heat {
             edges: edges.clone(),
@@ -129,6 +129,10 @@ fn map(
         let line = line.filter(|(limit, _)| *limit <= kind.steps.1);
         plot.curves
             .push(Curve::line(Key::line("ink", "predicted limit"), line));
+        for (class, label) in [("yes", "arrives, or keeps its energy"), ("no", "does not")] {
+            let key = Key::line(class, label).marked(Marker::Square);
+            plot.curves.push(Curve::named(key));
+        }
         panels.push(plot.draw());
     }
     counts

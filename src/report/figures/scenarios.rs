@@ -4,7 +4,7 @@
 
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveRun, LiveScene, live_scenes};
-use crate::report::section::{Cell, Section, Table};
+use crate::report::section::{Cell, Section, Table, lines};
 use crate::report::svg::{HEIGHT, Key, Panel, PlotNumber, WIDTH, escape, number, plain, seconds};
 
 pub(super) fn make(section: &mut Section) {
@@ -84,26 +84,23 @@ const SMALL_WIDTH: f64 = 0.5 * WIDTH;
 const SMALL_HEIGHT: f64 = 0.5 * HEIGHT;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = SMALL_WIDTH - LEFT;
-const TOP: f64 = 30.0;
+const TOP: f64 = 40.0;
 const MIDDLE: f64 = 0.5 * (TOP + SMALL_HEIGHT - 24.0);
 
 fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
-    /// Characters of a heading that fit above a picture.
-    const LONGEST: usize = 25;
+    /// A letter of a heading is no wider on average, in pixels.
+    const LETTER: f64 = 8.2;
     let bottom = SMALL_HEIGHT - 8.0;
     let (class, verdict) = match holds {
         Some(true) => ("good", "holds"),
         Some(false) => ("bad", "falls short"),
         None => ("soft", "not run"),
     };
-    let heading = match name.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", name.get(..end - 2).unwrap_or_default()),
-        None => name.to_owned(),
-    };
-    let heading = format!(
-        "<text class=\"title\" x=\"{LEFT}\" y=\"17\">{}</text>",
-        escape(&heading)
-    );
+    let mut heading = String::new();
+    for (y, line) in [15, 31].into_iter().zip(lines(name, RIGHT - LEFT, LETTER)) {
+        let line = escape(&line);
+        heading += &format!("<text class=\"title\" x=\"{LEFT}\" y=\"{y}\">{line}</text>");
+    }
     let (drawn, rows) = match live.watch() {
         Ok(watched) => {
             let link = escape(&live.fragment());

@@ -154,6 +154,11 @@ impl Curve {
         }
     }
 
+    /// An entry of the legend alone.
+    pub(crate) fn named(key: Key) -> Self {
+        Self::line(key, Vec::<Point>::new())
+    }
+
     pub(crate) fn dots(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
         Self {
             has_line: false,

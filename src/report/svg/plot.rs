@@ -36,8 +36,8 @@ pub(crate) struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
-    /// A second scale above: `x` in this unit.
-    pub(crate) above: Option<f64>,
+    /// A second scale above: its unit on x, and its name.
+    pub(crate) above: Option<(f64, &'static str)>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
     pub(crate) curves: Vec<Curve>,
@@ -146,8 +146,9 @@ impl Plot {
         let grid = if self.heat.is_some() { "tick" } else { "grid" };
         for (value, label) in self.x.ticks(6.0) {
             let x = self.across(value);
-            // A label at the very end would leave the paper.
-            let (anchor, shown) = if x > RIGHT - 12.0 {
+            // A long label at the very end would leave the paper.
+            let half = 3.4 * length_in_f64(label.chars().count());
+            let (anchor, shown) = if x + half > WIDTH - 3.0 {
                 ("end", WIDTH - 3.0)
             } else {
                 ("middle", x)
@@ -161,7 +162,8 @@ impl Plot {
             out += &format!("<path class=\"{grid}\" d=\"M{LEFT} {y:.1}H{RIGHT}\"/>");
             out += &text("label", (LEFT - 6.0, y + 4.0), "end", &label);
         }
-        if let Some(unit) = self.above {
+        if let Some((unit, name)) = self.above {
+            out += &text("note", (WIDTH - 3.0, 17.0), "end", name);
             let other = Axis::log("", Unit::Number, (self.x.min / unit, self.x.max / unit));
             for (value, label) in other.ticks(5.0) {
                 let x = self.across(value * unit);

@@ -2,7 +2,8 @@
 //!
 //! Expectations come from theory or from the arm's own prediction, never from an earlier run. Some are verdicts of the
 //! study alone: efforts that are capped or late, and arms that the contract allows but a careful user would not. A
-//! scene that falls short says so. `scenes.txt` has the expectations, `page/scenes.js` the names, and a live arm for each.
+//! scene that falls short says so. `scenes.txt` has the expectations. `page/scenes.js` has the names, and a live arm
+//! for each.
 //!
 //! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. A seed in the source
 //! gives what is random.
