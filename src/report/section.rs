@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, escape};
+use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, csv, escape};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
@@ -106,36 +106,9 @@ impl Section {
             grid(panels.len()).1,
             escape(caption),
         );
-        let mut csv = "curve,x,y,note\n".to_owned();
-        for (curve, x, y, note) in panels.iter().flat_map(|panel| &panel.rows) {
-            csv += &format!(
-                "{},{},{},{}\n",
-                quoted(curve),
-                spelled(*x),
-                spelled(*y),
-                quoted(note)
-            );
-        }
-        self.files.push((format!("{name}.csv"), csv));
+        self.files.push((format!("{name}.csv"), csv(panels)));
         self.files
             .push((format!("{name}.svg"), sheet(title, &legend, panels)));
-    }
-}
-
-/// A field of a CSV file.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        return format!("\"{}\"", text.replace('"', "\"\""));
-    }
-    text.to_owned()
-}
-
-/// A number that reads back to the same bits; nothing where there is none.
-fn spelled(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value:e}")
-    } else {
-        String::new()
     }
 }
 
@@ -279,7 +252,7 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
     let width = panel_width * length_in_f64(columns);
     let mut head = String::new();
     let mut y = 4.0;
-    for line in lines(title, width - 2.0 * MARGIN) {
+    for line in lines(title, width - 2.0 * MARGIN, LETTER) {
         y += 22.0;
         let line = escape(&line);
         head += &format!("<text class=\"heading\" x=\"{MARGIN}\" y=\"{y}\">{line}</text>");
@@ -318,13 +291,13 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
 /// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
 const LETTER: f64 = 10.4;
 
-/// A heading's words in lines of at most `room` pixels; a word that is longer stands alone.
-fn lines(heading: &str, room: f64) -> Vec<String> {
+/// A heading's words in lines of at most `room` pixels, at so many pixels a letter; a word that is longer stands alone.
+pub(super) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in heading.split_whitespace() {
         let line = lines.last().map_or("", String::as_str);
         let length = line.chars().count() + 1 + word.chars().count();
-        if line.is_empty() || LETTER * length_in_f64(length) <= room {
+        if line.is_empty() || letter * length_in_f64(length) <= room {
             let line = format!("{line} {word}").trim_start().to_owned();
             lines.pop();
             lines.push(line);
@@ -344,13 +317,13 @@ mod tests {
         let heading =
             "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
         for room in [100.0, 400.0, 812.0, 5000.0] {
-            let lines = lines(heading, room);
+            let lines = lines(heading, room, LETTER);
             assert_eq!(lines.join(" "), heading);
             for line in &lines {
                 let fits = LETTER * length_in_f64(line.chars().count()) <= room;
                 assert!(fits || !line.contains(' '), "{line}");
             }
         }
-        assert_eq!(lines(heading, 5000.0).len(), 1);
+        assert_eq!(lines(heading, 5000.0, LETTER).len(), 1);
     }
 }

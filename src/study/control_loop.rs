@@ -97,10 +97,15 @@ impl<const N: usize> ControlLoop<N> {
         Self { period, ..self }
     }
 
-    /// Whether the gains are all zero.
+    /// Whether the gains are all zero, so that the controller does nothing even when it is on.
     #[must_use]
+    #[allow(
+        clippy::float_cmp,
+        reason = "a gain that is exactly zero is a gain that is not there"
+    )]
     pub fn is_free(&self) -> bool {
-        is_free(&self.gains)
+        let Gains { kp, ki, kd } = &self.gains;
+        kp.iter().chain(ki).chain(kd).all(|&gain| gain == 0.0)
     }
 
     /// The joints that have an integral gain.
@@ -131,15 +136,4 @@ pub const fn no_control<const N: usize>() -> Gains<N> {
         ki: [0.0; N],
         kd: [0.0; N],
     }
-}
-
-/// Whether the gains are all zero, so that the controller does nothing even when it is on.
-#[must_use]
-#[allow(
-    clippy::float_cmp,
-    reason = "a gain that is exactly zero is a gain that is not there"
-)]
-pub fn is_free<const N: usize>(gains: &Gains<N>) -> bool {
-    let Gains { kp, ki, kd } = gains;
-    kp.iter().chain(ki).chain(kd).all(|&gain| gain == 0.0)
 }

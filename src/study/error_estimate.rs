@@ -15,6 +15,7 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
+use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::{Increment, Method};
 use crate::math::simulation::{Simulation, step_under};
@@ -71,15 +72,7 @@ pub fn estimate_step<const N: usize>(
     };
     // Increments are compared, not states: in those of a wound joint the difference would drown.
     let off = |whole: &[f64; N], first: &[f64; N], second: &[f64; N]| {
-        (0..N)
-            .map(|i| (whole[i] - (first[i] + second[i])).abs() * whole_of)
-            .fold(0.0, |max: f64, error| {
-                if error > max || error.is_nan() {
-                    error
-                } else {
-                    max
-                }
-            })
+        largest((0..N).map(|i| (whole[i] - (first[i] + second[i])).abs() * whole_of))
     };
     let local_error = off(&whole_q, &first_q, &second_q);
     let velocity_error = off(&whole_v, &first_v, &second_v);

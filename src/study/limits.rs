@@ -6,7 +6,7 @@ use super::control_loop::ControlLoop;
 use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
 use super::motion::Motion;
-use super::poses::{PoseCandidate, PoseSearch};
+use super::poses::{PoseCandidate, PoseSearch, Sought};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
@@ -130,7 +130,7 @@ pub struct LimitSearch<const N: usize> {
     control: ControlLoop<N>,
     limits: Limits<N>,
     /// How the loop rests, unless it runs away.
-    at_rest: Rest,
+    kind: Rest,
     /// A pose in which the loop runs away.
     runaway: Option<PoseCandidate<N>>,
     stage: LimitStage<N>,
@@ -141,9 +141,7 @@ enum LimitStage<const N: usize> {
     Setpoint,
     Held(Linear),
     Continuous(Linear),
-    Proving(Option<Box<Proof<N>>>),
-    /// The pose that the proof found to be the worst.
-    Proven(Option<Proven<N>>),
+    Proving(Box<Proof<N>>),
     Runaway(PoseSearch<N>),
     Poses(Sampling, PoseSearch<N>),
     Done,
@@ -172,7 +170,7 @@ impl<const N: usize> LimitSearch<N> {
                 critical: None,
                 advised: None,
             },
-            at_rest: Rest::Setpoint,
+            kind: Rest::Setpoint,
             runaway: None,
             stage: LimitStage::Setpoint,
         }
@@ -194,21 +192,22 @@ impl<const N: usize> LimitSearch<N> {
             }
             LimitStage::Continuous(linear) => {
                 limits.continuous = largest_timestep(&linear, method, Sampling::Continuous);
-                LimitStage::Proving(Proof::new(&self.control).map(Box::new))
+                match Proof::new(&self.control) {
+                    Some(proof) => LimitStage::Proving(Box::new(proof)),
+                    None => self.search_without_bound(),
+                }
             }
-            LimitStage::Proving(None) => LimitStage::Proven(None),
-            LimitStage::Proving(Some(mut proof)) => match proof.advance(BOXES) {
-                None => LimitStage::Proving(Some(proof)),
-                proven => LimitStage::Proven(proven),
+            LimitStage::Proving(mut proof) => match proof.advance(BOXES) {
+                None => LimitStage::Proving(proof),
+                Some(proven) => self.compare(&proven),
             },
-            LimitStage::Proven(proven) => self.compare(proven),
             LimitStage::Runaway(mut search) => {
                 if search.advance() {
                     LimitStage::Runaway(search)
                 } else {
                     let (found, pose) = search.smallest();
                     self.runaway = found.map(|_| pose);
-                    self.search_held()
+                    self.search_held(self.at_rest(self.limits.held))
                 }
             }
             LimitStage::Poses(sampling, mut search) => {
@@ -230,7 +229,7 @@ impl<const N: usize> LimitSearch<N> {
         let linear = Linear::at(control, &rest.position, &rest.integrating);
         let mut off = rest.position.iter().zip(&control.setpoint.position);
         self.limits.equilibrium = rest.position;
-        self.at_rest = if rest.balanced {
+        self.kind = if rest.balanced {
             Rest::Saddle
         } else if control.is_free() {
             Rest::Hanging
@@ -239,25 +238,30 @@ impl<const N: usize> LimitSearch<N> {
         } else {
             Rest::Sagging
         };
-        self.limits.rest = self.at_rest;
+        self.limits.rest = self.kind;
         linear
     }
 
-    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree, no search follows.
-    fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
+    /// A limit of the pose in which the loop rests.
+    fn at_rest(&self, limit: Option<f64>) -> (Option<f64>, PoseCandidate<N>) {
+        (limit, PoseCandidate::as_it_is(self.limits.equilibrium))
+    }
+
+    /// Looks for a pose that runs away, where there may be one, before all poses are searched.
+    fn search_without_bound(&self) -> LimitStage<N> {
         let control = &self.control;
-        let mut found = (
-            self.limits.held,
-            PoseCandidate::as_it_is(self.limits.equilibrium),
-        );
-        let Some(Proven { timestep, pose }) = proven else {
-            let integrates = control.integrating().contains(&true);
-            return if integrates && control.arm.gravity() > 0.0 {
-                LimitStage::Runaway(PoseSearch::for_runaway(control))
-            } else {
-                self.search_held()
-            };
-        };
+        if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
+            let search = PoseSearch::new(control, Sought::Runaway, self.at_rest(None));
+            LimitStage::Runaway(search)
+        } else {
+            self.search_held(self.at_rest(self.limits.held))
+        }
+    }
+
+    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree, no search follows.
+    fn compare(&mut self, &Proven { timestep, pose }: &Proven<N>) -> LimitStage<N> {
+        let control = &self.control;
+        let mut found = self.at_rest(self.limits.held);
         let linear = Linear::at_pose(control, &pose);
         let there = largest_timestep(&linear, control.method, Sampling::Held);
         if let Some(limit) = there
@@ -271,30 +275,22 @@ impl<const N: usize> LimitSearch<N> {
             // Rounding alone can make slow modes seem to grow beside rates a trillion times their own. A proof does not
             // round.
             self.limits.held = Some(timestep);
-            self.limits.rest = self.at_rest;
+            self.limits.rest = self.kind;
             found.0 = self.limits.held;
         }
         if found.0.is_some_and(|least| agree(timestep, least)) {
             return self.conclude(Sampling::Held, found);
         }
-        LimitStage::Poses(
-            Sampling::Held,
-            PoseSearch::new(control, Sampling::Held, found),
-        )
+        self.search_held(found)
     }
 
     /// Searches all poses, or those without gravity where some pose with it runs away.
-    fn search_held(&self) -> LimitStage<N> {
-        let found = (
-            self.limits.held,
-            PoseCandidate::as_it_is(self.limits.equilibrium),
-        );
-        let search = PoseSearch::new(&self.control, Sampling::Held, found);
-        let search = if self.runaway.is_some() {
-            search.weightless()
-        } else {
-            search
+    fn search_held(&self, found: (Option<f64>, PoseCandidate<N>)) -> LimitStage<N> {
+        let sought = match self.runaway {
+            Some(_) => Sought::WeightlessLimit,
+            None => Sought::Limit(Sampling::Held),
         };
+        let search = PoseSearch::new(&self.control, sought, found);
         LimitStage::Poses(Sampling::Held, search)
     }
 
@@ -331,11 +327,9 @@ impl<const N: usize> LimitSearch<N> {
             limits.worst_pose = Some(worst.pose);
             limits.critical = critical(&worst.linear(control), control.method, limit);
         }
-        let known = (
-            limits.continuous,
-            PoseCandidate::as_it_is(limits.equilibrium),
-        );
-        let search = PoseSearch::new(control, Sampling::Continuous, known);
+        let known = self.at_rest(self.limits.continuous);
+        let sought = Sought::Limit(Sampling::Continuous);
+        let search = PoseSearch::new(&self.control, sought, known);
         LimitStage::Poses(Sampling::Continuous, search)
     }
 }

@@ -22,7 +22,7 @@
 )]
 
 use super::control_loop::ControlLoop;
-pub use super::control_loop::{is_free, no_control};
+pub use super::control_loop::no_control;
 pub(crate) use super::equilibrium::gravity_gradient;
 pub use super::equilibrium::{Equilibrium, equilibrium};
 use super::matrix::Matrix;

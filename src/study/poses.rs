@@ -8,7 +8,7 @@
 //! since then the gains run away.
 //!
 //! An arm whose joints integrate can be held in every pose, and where it runs away it does so for good. Towards the
-//! border of such poses the limit falls to zero. So these are searched first ([`PoseSearch::for_runaway`]): uphill on
+//! border of such poses the limit falls to zero. So these are searched first ([`Sought::Runaway`]): uphill on
 //! the largest real part of any mode in continuous time.
 //!
 //! **Invariant:** the work is bounded: [`cells`] poses, and one climb from each at most.
@@ -86,11 +86,11 @@ struct Climb<const N: usize> {
 
 /// The object of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Sought {
+pub(super) enum Sought {
     /// The smallest limit, of poses with gravity and without.
     Limit(Sampling),
-    /// The smallest limit of poses without gravity.
-    WeightlessLimit(Sampling),
+    /// The smallest limit of poses without gravity, effort held.
+    WeightlessLimit,
     /// A pose that runs away in continuous time: its limit is zero.
     Runaway,
 }
@@ -117,37 +117,30 @@ pub(super) struct PoseSearch<const N: usize> {
 }
 
 impl<const N: usize> PoseSearch<N> {
-    /// A search that begins with `bound` \[s\], the limit at `worst`.
+    /// A search that begins with `bound` \[s\], the limit at `worst`. A pose that runs away has a limit of zero.
     pub(super) fn new(
         control: &ControlLoop<N>,
-        sampling: Sampling,
+        sought: Sought,
         (bound, worst): (Option<f64>, PoseCandidate<N>),
     ) -> Self {
         Self {
             control: *control,
-            sought: Sought::Limit(sampling),
+            sought,
             smallest: bound,
             worst,
-            stage: PoseStage::Grid(0),
+            stage: match sought {
+                Sought::Runaway => PoseStage::Rating(0, Vec::new()),
+                Sought::Limit(_) | Sought::WeightlessLimit => PoseStage::Grid(0),
+            },
         }
     }
 
-    /// The same search among poses without gravity.
-    pub(super) fn weightless(mut self) -> Self {
-        if let Sought::Limit(sampling) = self.sought {
-            self.sought = Sought::WeightlessLimit(sampling);
-        }
-        self
-    }
-
-    /// A search for a pose that runs away: its smallest limit is zero, or none is found.
-    pub(super) fn for_runaway(control: &ControlLoop<N>) -> Self {
-        Self {
-            control: *control,
-            sought: Sought::Runaway,
-            smallest: None,
-            worst: PoseCandidate::as_it_is(control.setpoint.position),
-            stage: PoseStage::Rating(0, Vec::new()),
+    /// When the law whose limit is sought runs; none if a pose is sought that runs away.
+    fn sampling(&self) -> Option<Sampling> {
+        match self.sought {
+            Sought::Limit(sampling) => Some(sampling),
+            Sought::WeightlessLimit => Some(Sampling::Held),
+            Sought::Runaway => None,
         }
     }
 
@@ -210,7 +203,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Judgements at one pose of the outer joints. Without gravity the direction of the first joint makes no
     /// difference.
     fn turns(&self) -> usize {
-        if self.control.arm.gravity() == 0.0 || matches!(self.sought, Sought::WeightlessLimit(_)) {
+        if self.control.arm.gravity() == 0.0 || self.sought == Sought::WeightlessLimit {
             1
         } else {
             DIRECTIONS + 1
@@ -218,7 +211,7 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     fn judge(&mut self, judged: &PoseCandidate<N>) {
-        let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
+        let Some(sampling) = self.sampling() else {
             return;
         };
         let linear = judged.linear(&self.control);
@@ -246,7 +239,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Growth at the smallest limit so far, or in continuous time if a pose is sought that runs away.
     fn growth(&mut self, judged: &PoseCandidate<N>) -> f64 {
         let linear = judged.linear(&self.control);
-        let (Sought::Limit(sampling) | Sought::WeightlessLimit(sampling)) = self.sought else {
+        let Some(sampling) = self.sampling() else {
             let modes = Modes::of(&linear);
             if modes.run_away() {
                 self.smallest = Some(0.0);

@@ -5,20 +5,28 @@
 //!
 //! `P(λ) = λ² I + S + M⁻¹ (Kp + λ Kd + Ki/λ)`
 //!
-//! whose columns alone are large where a joint's gains are, so that elimination keeps the other digits. Newton's rule
-//! on `log det P`, begun at an eigenvalue, brings a mode to its own last digits: `λ ↦ λ - 1 / tr(P⁻¹ P')`.
+//! whose columns alone are large where a joint's gains are, so that elimination keeps the other digits. Aberth's rule
+//! brings all zeros of `det P` to their own last digits at once. It is Newton's rule on `log det P` with the other
+//! zeros divided out, so that no two guesses come to the same zero:
 //!
-//! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 5.
+//! `λ ↦ λ - 1 / (tr(P⁻¹ P') - Σ 1 / (λ - λ_j))`
+//!
+//! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 5; Aberth, *Mathematics of Computation* 27
+//! (1973).
 //!
 //! **Invariant:** the work is bounded, and a mode that does not converge counts for nothing.
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "indices run over the joints of a matrix of their number"
+    reason = "indices run over the joints of a matrix of their number, and over the modes"
 )]
 
+use std::f64::consts::TAU;
+
 use super::linear::Linear;
-use super::matrix::{Complex, Matrix, largest};
+use super::matrix::Complex;
+use crate::math::count::length_in_f64;
+use crate::math::elementary::sin_cos;
 
 /// A mode is slow, and looked at here, if the fastest one is so many times faster.
 const SLOWER: f64 = 1e-4;
@@ -27,8 +35,8 @@ const SLOWER: f64 = 1e-4;
 /// apart from others.
 const GROWTH: f64 = 1e-9;
 
-/// Rounds of Newton's rule, which takes five if two digits are right at the start.
-const ROUNDS: u32 = 30;
+/// Rounds of Aberth's rule. A mode that is begun at a thousand times its modulus takes some forty.
+const ROUNDS: u32 = 100;
 
 /// A mode has converged if it moves by no more than this part of itself.
 const SETTLED: f64 = 1e-12;
@@ -37,86 +45,51 @@ const SETTLED: f64 = 1e-12;
 /// \[1/s\], so that rounding may have hidden it.
 pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64) -> bool {
     let is_slow = |mode: &&Complex| mode.modulus() < SLOWER * rate && mode.re.abs() < doubtful;
-    let slow = modes.iter().filter(is_slow).count();
-    if slow == 0 {
+    if !modes.iter().any(|mode| is_slow(&mode)) {
         return false;
     }
-    // Eigenvalues of the whole loop may be too far off to begin at. The eigenvalues of the loop whose fast joints are
-    // locked are not.
-    let locked = locked_modes(linear, rate);
-    modes
+    let modes = settled(linear, modes, rate);
+    let mut slow = modes.iter().filter(is_slow);
+    slow.any(|mode| mode.re > GROWTH * mode.modulus())
+}
+
+/// The modes, to their own last digits, of those that converge. They are looked for from the moduli that the `guesses`
+/// have, of which rounding at the fastest `rate` \[1/s\] may have left nothing more, each at an angle of its own.
+fn settled(linear: &Linear, guesses: &[Complex], rate: f64) -> Vec<Complex> {
+    let count = length_in_f64(guesses.len());
+    let mut angle = 0.7;
+    let mut modes: Vec<Complex> = guesses
         .iter()
-        .chain(&locked)
-        .filter(is_slow)
-        .filter_map(|mode| settled(linear, *mode))
-        .any(|mode| mode.re > GROWTH * mode.modulus())
-}
-
-/// The modes of the loop with every joint locked that is fast by itself, and of the rest with its own fast ones locked.
-fn locked_modes(linear: &Linear, rate: f64) -> Vec<Complex> {
-    let mut modes = Vec::new();
-    let (mut rest, mut rate) = (linear.clone(), rate);
-    // Every round locks a joint, and the last one moves.
-    while let Some(fast) = fast_joint(&rest, SLOWER * rate).filter(|_| rest.joints() > 1) {
-        rest = locked(&rest, fast);
-        if fast_joint(&rest, SLOWER * rate).is_none() {
-            let found = rest.flow().eigenvalues();
-            rate = largest(found.iter().map(|mode| mode.modulus()));
-            modes.extend(found);
-        }
-    }
-    modes
-}
-
-/// A joint whose own damping or spring is as fast as `least` \[1/s\].
-fn fast_joint(linear: &Linear, least: f64) -> Option<usize> {
-    (0..linear.joints()).find(|&j| {
-        let ease = linear.inverse_mass[(j, j)];
-        let own = (ease * linear.kd[j]).max((ease * linear.kp[j]).sqrt());
-        own > least
-    })
-}
-
-/// The loop without `joint`, which does not move: the holding effort acts on the others too.
-fn locked(linear: &Linear, joint: usize) -> Linear {
-    let (n, ease) = (linear.joints(), &linear.inverse_mass);
-    let other = |i: usize| if i < joint { i } else { i + 1 };
-    let without = |of: &Matrix| {
-        Matrix::from_fn(n - 1, |i, j| {
-            let (i, j) = (other(i), other(j));
-            of[(i, j)] - ease[(i, joint)] / ease[(joint, joint)] * of[(joint, j)]
+        .map(|guess| {
+            angle += TAU / count;
+            let (im, re) = sin_cos(angle);
+            Complex { re, im }.scaled(guess.modulus().max(f64::EPSILON * rate))
         })
-    };
-    let gains = |of: &[f64]| (0..n - 1).map(|i| of[other(i)]).collect();
-    Linear {
-        gravity: without(&linear.gravity),
-        inverse_mass: without(ease),
-        kp: gains(&linear.kp),
-        kd: gains(&linear.kd),
-        integrals: (0..n - 1)
-            .filter_map(|i| {
-                let mut of = linear.integrals.iter();
-                of.find(|(at, _)| *at == other(i)).map(|(_, ki)| (i, *ki))
-            })
-            .collect(),
-    }
-}
-
-/// The mode near `guess`, to its own last digits.
-fn settled(linear: &Linear, guess: Complex) -> Option<Complex> {
-    let mut mode = guess;
+        .collect();
+    let mut has_settled = vec![false; modes.len()];
     for _ in 0..ROUNDS {
-        let step = slope(linear, mode)?.reciprocal();
-        mode = mode - step;
-        // A value that is not finite never converges.
-        if step.modulus() <= SETTLED * mode.modulus() {
-            return Some(mode);
+        for at in 0..modes.len() {
+            let mode = modes[at];
+            let others = (0..modes.len()).filter(|other| *other != at);
+            let others = others.map(|other| (mode - modes[other]).reciprocal());
+            let Some(slope) = slope(linear, mode).filter(|_| !has_settled[at]) else {
+                continue;
+            };
+            let step = others.fold(slope, |sum, other| sum - other).reciprocal();
+            // A value that is not finite never converges, and is no guess for the next round.
+            if step.modulus().is_finite() {
+                modes[at] = mode - step;
+                has_settled[at] = step.modulus() <= SETTLED * modes[at].modulus();
+            }
         }
     }
-    None
+    let both = modes.into_iter().zip(has_settled);
+    both.filter_map(|(mode, settled)| settled.then_some(mode))
+        .collect()
 }
 
-/// `tr(P⁻¹ P')` at `at`, by elimination; `None` where `P` has no pivot.
+/// `tr(P⁻¹ P')` at `at`, of the polynomial that `det P` is with a power of `λ` for each integral; by elimination.
+/// `None` where `P` has no pivot.
 fn slope(linear: &Linear, at: Complex) -> Option<Complex> {
     let n = linear.joints();
     let (mut p, mut derivative) = (vec![Complex::ZERO; n * n], vec![Complex::ZERO; n * n]);
@@ -145,7 +118,9 @@ fn slope(linear: &Linear, at: Complex) -> Option<Complex> {
         }
     }
     eliminate(&mut p, &mut derivative, n)?;
-    Some((0..n).fold(Complex::ZERO, |sum, i| sum + derivative[i * n + i]))
+    let integrals = length_in_f64(linear.integrals.len());
+    let trace = (0..n).fold(Complex::ZERO, |sum, i| sum + derivative[i * n + i]);
+    Some(trace + inverse.scaled(integrals))
 }
 
 /// Leaves `p⁻¹ right` in `right`, by Gauss and Jordan with the largest pivot of each column.

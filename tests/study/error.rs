@@ -11,7 +11,7 @@ use pendularm::report::experiments::error::{OUTPUTS, scenes};
 fn every_method_has_its_order_in_every_scene_but_where_the_effort_is_held() {
     for scene in scenes() {
         // A held effort is half a step old on average: first order, whatever the method.
-        let held = scene.control() == "held";
+        let held = scene.control == "held";
         for method in Method::ALL {
             // Fine enough for the leading term to be all of the error, also of Euler in a whirl.
             let steps = match method.order() {
@@ -26,7 +26,7 @@ fn every_method_has_its_order_in_every_scene_but_where_the_effort_is_held() {
             assert!(
                 (order - expected).abs() < 0.2,
                 "{} {method}: order {order}, expected {expected}",
-                scene.name()
+                scene.name
             );
         }
     }
@@ -38,7 +38,7 @@ fn evaluations_are_counted_and_not_estimated() {
         for method in Method::ALL {
             let outcome = scene.run(method, 8192);
             let expected = 8192 * u64::from(method.evaluations());
-            assert_eq!(outcome.evaluations, expected, "{} {method}", scene.name());
+            assert_eq!(outcome.evaluations, expected, "{} {method}", scene.name);
         }
     }
 }
@@ -51,8 +51,8 @@ fn the_steps_that_are_timed_are_the_steps_that_are_judged() {
         for method in Method::ALL {
             let end = scene.run(method, 8192).end;
             let sum = scene.replay(method, 8192);
-            assert!(sum.is_finite(), "{} {method}", scene.name());
-            assert_eq!(end.to_bits(), sum.to_bits(), "{} {method}", scene.name());
+            assert!(sum.is_finite(), "{} {method}", scene.name);
+            assert_eq!(end.to_bits(), sum.to_bits(), "{} {method}", scene.name);
         }
     }
 }
@@ -61,7 +61,7 @@ fn the_steps_that_are_timed_are_the_steps_that_are_judged() {
 fn a_run_past_its_stability_limit_counts_as_diverged() {
     let reach = scenes()
         .into_iter()
-        .find(|s| s.name() == "reach-held")
+        .find(|s| s.name == "reach-held")
         .unwrap();
     // 31 ms, where the held effort allows 21.7 ms.
     assert!(reach.run(Method::Rk4, OUTPUTS).error > 0.1);
@@ -72,10 +72,10 @@ fn a_run_past_its_stability_limit_counts_as_diverged() {
 fn references_are_a_million_times_better_than_the_smallest_error_shown() {
     for scene in scenes() {
         assert!(
-            scene.uncertainty() < 1e-22,
+            scene.uncertainty < 1e-22,
             "{}: {:e}",
-            scene.name(),
-            scene.uncertainty()
+            scene.name,
+            scene.uncertainty
         );
     }
 }

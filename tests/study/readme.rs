@@ -29,7 +29,7 @@ fn agrees(before: &str, seen: f64, digits: i32) {
 }
 
 /// The fewest steps within `error`, between `least` and the first run of ever half the timestep that is within it.
-fn fewest(scene: &dyn Scene, method: Method, error: f64, least: u64) -> u64 {
+fn fewest(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
     let is_enough = |steps| scene.run_within(method, steps, error).error <= error;
     let mut most = OUTPUTS;
     while !is_enough(most) {
@@ -45,11 +45,11 @@ fn fewest(scene: &dyn Scene, method: Method, error: f64, least: u64) -> u64 {
 #[test]
 fn the_timestep_and_the_evaluations_of_the_first_finding_are_runs() {
     let all = scenes();
-    let swing = all.iter().find(|scene| scene.name() == "swing-2").unwrap();
-    let duration = swing.duration();
+    let swing = all.iter().find(|scene| scene.name == "swing-2").unwrap();
+    let duration = swing.duration;
     let evaluations = |method: Method| {
-        let coarse = fewest(&**swing, method, 1e-2, 1);
-        let steps = fewest(&**swing, method, 1e-4, coarse);
+        let coarse = fewest(swing, method, 1e-2, 1);
+        let steps = fewest(swing, method, 1e-4, coarse);
         (steps * u64::from(method.evaluations())) as f64
     };
     let rk4 = evaluations(Method::Rk4);

@@ -38,7 +38,7 @@ fn compare<const N: usize>(case: &Value) {
         .collect();
     let law = Law::Constant(array(&case["tau"]));
     let reference = ReferenceMotion::between(&arm, &start, &law, &intervals);
-    for index in 0..reference.len() {
+    for index in 0..reference.samples.len() {
         let state = reference.state(index).unwrap();
         let growth = case["growth_max"][index].as_f64().unwrap();
         // Stored values are rounded to the nearest double, and so are ours. The intervals are differences of rounded
@@ -59,7 +59,7 @@ fn compare<const N: usize>(case: &Value) {
             assert!(v <= v_bound, "{name} {N} {index} {i}: {v:e} > {v_bound:e}");
         }
         // The stored sensitivity bounds what rounding at 106 bits can have done on the way.
-        let own = reference.uncertainty()[index];
+        let own = reference.uncertainty[index];
         assert!(
             own <= 1e-27 * growth,
             "{name} {N} {index}: {own:e}, growth {growth:e}"
@@ -155,7 +155,7 @@ fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
 fn a_reference_knows_far_more_digits_than_a_double() {
     let arm = Arm::<3>::default();
     let reference = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 0.5, 4);
-    assert!(reference.uncertainty().iter().all(|own| *own < 1e-26));
+    assert!(reference.uncertainty.iter().all(|own| *own < 1e-26));
     assert!(reference.angle_error(0, &[f64::NAN; 3]).unwrap().is_nan());
     assert_eq!(DoubleDouble::from(1.5).to_f64(), 1.5);
 }

@@ -60,7 +60,7 @@ fn reference<const N: usize>() {
     let motion = ReferenceMotion::of(&Arm::<N>::default(), &start(), &Law::FREE, DURATION, 1);
     let end = motion.state(0).expect("one sample").position;
     let angles: Vec<String> = end.iter().map(|q| format!("{q:?}")).collect();
-    println!("{} {:e}", angles.join(" "), motion.uncertainty()[0]);
+    println!("{} {:e}", angles.join(" "), motion.uncertainty[0]);
 }
 
 /// A line for a setting: its error, and the shortest time of its runs. False if the sweep has come to its end.

@@ -67,7 +67,7 @@ impl Budget {
         let looks = usize::try_from(steps).map_or(MOST_LOOKS, |steps| steps.clamp(1, MOST_LOOKS));
         let every = steps / looks as u64;
         let stride = MOST_LOOKS / looks;
-        let truth = self.law.samples().iter().skip(stride - 1).step_by(stride);
+        let truth = self.law.samples.iter().skip(stride - 1).step_by(stride);
         let held = Law::Held {
             gains: self.control.gains,
             setpoint: self.control.setpoint,
@@ -77,7 +77,7 @@ impl Budget {
         let plant = (!self.control.is_free())
             .then(|| ReferenceMotion::of(arm, &start, &held, spacing, looks));
         let plant: Vec<_> = match &plant {
-            Some(plant) => plant.samples().iter().collect(),
+            Some(plant) => plant.samples.iter().collect(),
             None => truth.clone().collect(),
         };
         let parts = |&method| {

@@ -15,7 +15,7 @@ use crate::math::expression::Expression;
 use crate::math::integrator::{Method, increment, two_sum};
 use crate::math::particle::{MAX_STEPS, Particle};
 use crate::math::pid::{Gains, Pid, Setpoint};
-use crate::study::control_loop::{ControlLoop, no_control};
+use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, largest_timestep};
 
@@ -89,85 +89,116 @@ impl RunOutcome {
 }
 
 /// Something to be computed by every method.
-pub trait Scene {
+pub struct Scene {
     /// Short name, as files and tables use it.
-    fn name(&self) -> &'static str;
+    pub name: &'static str,
     /// The scene in words, for a heading.
-    fn title(&self) -> &'static str;
+    pub title: &'static str,
     /// Parameters in one line.
-    fn about(&self) -> String;
-    /// Number of links; 0 for the particle.
-    fn links(&self) -> usize;
+    pub about: String,
     /// How the effort is found: `none`, `continuous` or `held`.
-    fn control(&self) -> &'static str;
+    pub control: &'static str,
+    /// Unit of its errors.
+    pub unit: &'static str,
     /// Simulated time \[s\].
-    fn duration(&self) -> f64;
+    pub duration: f64,
     /// How far the reference itself may be off \[rad\].
-    fn uncertainty(&self) -> f64;
-    /// Runs `steps` steps and compares.
-    fn run(&self, method: Method, steps: u64) -> RunOutcome {
-        self.run_within(method, steps, LOST)
-    }
-    /// As [`Scene::run`], but a run whose error exceeds `most` ends there and counts as diverged.
-    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome;
+    pub uncertainty: f64,
+    /// Most steps of one run.
+    pub most_steps: u64,
+    run: Box<dyn SceneRun>,
+}
+
+/// The runs of a scene.
+trait SceneRun {
+    /// Takes the steps of `outcome` and compares; ends where an error exceeds `most`.
+    fn compare(&self, method: Method, outcome: RunOutcome, most: f64) -> RunOutcome;
     /// The same steps without counting or comparing: [`RunOutcome::end`].
     fn replay(&self, method: Method, steps: u64) -> f64;
-    /// The largest stable timestep \[s\] as predicted for the scene's control at its setpoint, if it has one.
+    /// The largest stable timestep \[s\] as predicted for the control at its setpoint, if there is one.
     fn predicted_limit(&self, method: Method) -> Option<f64>;
-    /// Most steps of one run.
-    fn most_steps(&self) -> u64 {
-        u64::MAX
+}
+
+impl Scene {
+    /// Runs `steps` steps and compares.
+    #[must_use]
+    pub fn run(&self, method: Method, steps: u64) -> RunOutcome {
+        self.run_within(method, steps, LOST)
+    }
+
+    /// As [`Scene::run`], but a run whose error exceeds `most` ends there and counts as diverged.
+    #[must_use]
+    pub fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
+        let outcome = RunOutcome::new(steps, self.duration);
+        self.run.compare(method, outcome, most)
+    }
+
+    /// The same steps without counting or comparing: [`RunOutcome::end`].
+    #[must_use]
+    pub fn replay(&self, method: Method, steps: u64) -> f64 {
+        self.run.replay(method, steps)
+    }
+
+    /// The largest stable timestep \[s\] as predicted for the scene's control at its setpoint, if it has one.
+    #[must_use]
+    pub fn predicted_limit(&self, method: Method) -> Option<f64> {
+        self.run.predicted_limit(method)
     }
 }
 
 /// All scenes, in the order in which they are shown.
 #[must_use]
-pub fn scenes() -> Vec<Box<dyn Scene>> {
+pub fn scenes() -> Vec<Scene> {
     let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap_or_default();
     let whirling = State {
         position: [0.0, 0.5],
         velocity: [10.0, 0.0],
     };
     let reach = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
-    let (two, three) = (Arm::<2>::default(), Arm::<3>::default());
-    let free = Actuation::Held;
+    let swing = |name, title, arm, start| {
+        arm_scene(
+            name,
+            title,
+            ControlLoop::<2>::free(arm),
+            start,
+            Actuation::Held,
+        )
+    };
     vec![
-        Box::new(ParticleScene),
-        Box::new(ArmScene::new(
+        particle_scene(),
+        swing(
             "swing-2",
             "Free swing, 2 links",
-            ControlLoop::free(two),
+            Arm::default(),
             State::rest(),
-            free,
-        )),
-        Box::new(ArmScene::new(
+        ),
+        arm_scene(
             "swing-3",
             "Free swing, 3 links",
-            ControlLoop::free(three),
+            ControlLoop::<3>::free(Arm::default()),
             State::rest(),
-            free,
-        )),
-        Box::new(ArmScene::new(
+            Actuation::Held,
+        ),
+        swing(
             "whirl-2",
             "Whirl at 10 rad/s, no gravity",
-            ControlLoop::free(weightless),
+            weightless,
             whirling,
-            free,
-        )),
-        Box::new(ArmScene::new(
+        ),
+        arm_scene(
             "reach-continuous",
             "PD reach, law in every stage",
             reach,
             State::rest(),
             Actuation::Continuous,
-        )),
-        Box::new(ArmScene::new(
+        ),
+        arm_scene(
             "reach-held",
             "PD reach, effort held for the step",
             reach,
             State::rest(),
             Actuation::Held,
-        )),
+        ),
     ]
 }
 
@@ -180,39 +211,71 @@ enum Actuation {
     Held,
 }
 
-/// An arm in motion. The steps are those of the live arm, bit for bit, wherever the live arm can take them.
-struct ArmScene<const N: usize> {
+/// Simulated time of an arm's scene \[s\].
+const ARM_DURATION: f64 = 2.0;
+
+fn arm_scene<const N: usize>(
     name: &'static str,
     title: &'static str,
+    control: ControlLoop<N>,
+    start: State<N>,
+    drive: Actuation,
+) -> Scene {
+    let ControlLoop {
+        arm,
+        gains,
+        setpoint,
+        ..
+    } = &control;
+    let kind = match drive {
+        _ if control.is_free() => "none",
+        Actuation::Continuous => "continuous",
+        Actuation::Held => "held",
+    };
+    let law = match kind {
+        "none" => "no control".to_owned(),
+        kind => format!(
+            "effort {kind}, kp {:?}, kd {:?}, to {:?} rad, error against the law at every instant",
+            gains.kp, gains.kd, setpoint.position
+        ),
+    };
+    let State { position, velocity } = start;
+    let about = format!(
+        "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
+         {ARM_DURATION} s",
+        arm.lengths(),
+        arm.masses(),
+        arm.gravity(),
+    );
+    let law = Law::Continuous(*gains, *setpoint);
+    let reference = ReferencePath::new(arm, &start, &law, ARM_DURATION);
+    Scene {
+        name,
+        title,
+        about,
+        control: kind,
+        unit: "rad",
+        duration: ARM_DURATION,
+        uncertainty: reference.uncertainty(),
+        most_steps: u64::MAX,
+        run: Box::new(ArmRun {
+            control,
+            start,
+            drive,
+            reference,
+        }),
+    }
+}
+
+/// An arm in motion. The steps are those of the live arm, bit for bit, wherever the live arm can take them.
+struct ArmRun<const N: usize> {
     control: ControlLoop<N>,
     start: State<N>,
     drive: Actuation,
     reference: ReferencePath<N>,
 }
 
-/// Simulated time of an arm's scene \[s\].
-const ARM_DURATION: f64 = 2.0;
-
-impl<const N: usize> ArmScene<N> {
-    fn new(
-        name: &'static str,
-        title: &'static str,
-        control: ControlLoop<N>,
-        start: State<N>,
-        drive: Actuation,
-    ) -> Self {
-        let law = Law::Continuous(control.gains, control.setpoint);
-        let reference = ReferencePath::new(&control.arm, &start, &law, ARM_DURATION);
-        Self {
-            name,
-            title,
-            control,
-            start,
-            drive,
-            reference,
-        }
-    }
-
+impl<const N: usize> ArmRun<N> {
     /// Takes steps and shows the state after each, until told to stop; `count` is called at every evaluation.
     fn march(
         &self,
@@ -257,62 +320,11 @@ fn add<const N: usize>(value: &mut [f64; N], carry: &mut [f64; N], increment: &[
     }
 }
 
-impl<const N: usize> Scene for ArmScene<N> {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn title(&self) -> &'static str {
-        self.title
-    }
-
-    fn about(&self) -> String {
-        let ControlLoop {
-            arm,
-            gains,
-            setpoint,
-            ..
-        } = &self.control;
-        let law = match self.control() {
-            "none" => "no control".to_owned(),
-            kind => format!(
-                "effort {kind}, kp {:?}, kd {:?}, to {:?} rad, error against the law at every instant",
-                gains.kp, gains.kd, setpoint.position
-            ),
-        };
-        let State { position, velocity } = self.start;
-        format!(
-            "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
-             {ARM_DURATION} s",
-            arm.lengths(),
-            arm.masses(),
-            arm.gravity(),
-        )
-    }
-
-    fn links(&self) -> usize {
-        N
-    }
-
-    fn control(&self) -> &'static str {
-        match self.drive {
-            _ if self.control.gains == no_control() => "none",
-            Actuation::Continuous => "continuous",
-            Actuation::Held => "held",
-        }
-    }
-
-    fn duration(&self) -> f64 {
-        ARM_DURATION
-    }
-
-    fn uncertainty(&self) -> f64 {
-        self.reference.uncertainty()
-    }
-
-    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
-        let mut outcome = RunOutcome::new(steps, ARM_DURATION);
-        let timestep = outcome.timestep;
+impl<const N: usize> SceneRun for ArmRun<N> {
+    fn compare(&self, method: Method, mut outcome: RunOutcome, most: f64) -> RunOutcome {
+        let RunOutcome {
+            steps, timestep, ..
+        } = outcome;
         let every = steps.div_ceil(MOST_LOOKS).max(1);
         let mut evaluations = 0;
         let count = || evaluations += 1;
@@ -359,14 +371,14 @@ impl<const N: usize> Scene for ArmScene<N> {
 
 /// The 1-DOF service, expression and all, against its closed form with 106 bits: `ẍ = cos 2t`, so `x = x₀ + v₀ t + sin²
 /// t / 2`.
-struct ParticleScene;
+struct ParticleRun;
 
 const FUNCTION: &str = "cos(2*t)";
 const X0: f64 = 0.5;
 const V0: f64 = -0.25;
 const DURATION: f64 = 8.0;
 
-impl ParticleScene {
+impl ParticleRun {
     fn particle(method: Method, steps: u64) -> Option<Particle> {
         let function = Expression::parse(FUNCTION).ok()?;
         Particle::new(function, X0, V0, DURATION / in_f64(steps), steps, method).ok()
@@ -379,38 +391,24 @@ fn exact(t: f64) -> DoubleDouble {
     real(X0) + real(V0) * real(t) + real(0.5) * sin * sin
 }
 
-impl Scene for ParticleScene {
-    fn name(&self) -> &'static str {
-        "particle"
-    }
-
-    fn title(&self) -> &'static str {
-        "1-DOF service, closed form"
-    }
-
-    fn about(&self) -> String {
-        format!("ẍ = {FUNCTION} from x = {X0} m, ẋ = {V0} m/s; {DURATION} s")
-    }
-
-    fn links(&self) -> usize {
-        0
-    }
-
-    fn control(&self) -> &'static str {
-        "none"
-    }
-
-    fn duration(&self) -> f64 {
-        DURATION
-    }
-
-    fn uncertainty(&self) -> f64 {
+fn particle_scene() -> Scene {
+    Scene {
+        name: "particle",
+        title: "1-DOF service, closed form",
+        about: format!("ẍ = {FUNCTION} from x = {X0} m, ẋ = {V0} m/s; {DURATION} s"),
+        control: "none",
+        unit: "m",
+        duration: DURATION,
         // Rounding of a closed form of a few operations at 106 bits.
-        1e-30
+        uncertainty: 1e-30,
+        most_steps: MAX_STEPS,
+        run: Box::new(ParticleRun),
     }
+}
 
-    fn run_within(&self, method: Method, steps: u64, most: f64) -> RunOutcome {
-        let mut outcome = RunOutcome::new(steps, DURATION);
+impl SceneRun for ParticleRun {
+    fn compare(&self, method: Method, mut outcome: RunOutcome, most: f64) -> RunOutcome {
+        let steps = outcome.steps;
         let every = usize::try_from(steps.div_ceil(MOST_LOOKS)).unwrap_or(1);
         let Some(mut particle) = Self::particle(method, steps) else {
             return outcome;
@@ -438,9 +436,5 @@ impl Scene for ParticleScene {
 
     fn predicted_limit(&self, _: Method) -> Option<f64> {
         None
-    }
-
-    fn most_steps(&self) -> u64 {
-        MAX_STEPS
     }
 }

@@ -6,9 +6,9 @@
 //!
 //! **Invariant:** no prediction enters but the equilibrium.
 
-use super::measure::nudged;
-use super::sampled::SampledLoop;
+use super::measure::{in_substeps, live_at, nudged};
 use crate::math::arm::State;
+use crate::math::simulation::{Checkpoint, Simulation};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::equilibrium;
 use crate::study::matrix;
@@ -28,15 +28,15 @@ const COUNTED: u32 = 4000;
 #[must_use]
 pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32) -> Option<f64> {
     let period = control.timestep;
-    let rest = equilibrium(control);
-    let start = nudged(&rest.position, period);
-    let mut sampled = SampledLoop::new(control, substeps, &rest, start);
+    let control = in_substeps(control, substeps, false);
+    let rest = equilibrium(&control);
+    let mut live = live_at(&control, &rest, nudged(&control, &rest.position));
     let mut logarithm = 0.0;
     for count in 0..BEFORE + COUNTED {
-        sampled.advance();
-        let State { position, velocity } = sampled.state;
+        live.advance(substeps.into());
+        let State { position, velocity } = *live.state();
         let moved = difference(&position, &rest.position);
-        let mut gathered = difference(sampled.integral(), &rest.integral);
+        let mut gathered = difference(live.pid().integral(), &rest.integral);
         for (gathered, integrates) in gathered.iter_mut().zip(control.integrating()) {
             // An integral that acts on nothing only drifts.
             if !integrates {
@@ -49,7 +49,7 @@ pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32
             largest(&gathered),
         ];
         let size = largest(&sizes);
-        if !size.is_finite() {
+        if live.divergence().is_some() {
             return None;
         }
         if size == 0.0 {
@@ -60,7 +60,12 @@ pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32
             position: sum(&rest.position, &moved, back),
             velocity: velocity.map(|velocity| velocity * back),
         };
-        sampled.set(scaled, sum(&rest.integral, &gathered, back));
+        live = Simulation::continued(&Checkpoint {
+            state: scaled,
+            carry: State::rest(),
+            integral: sum(&rest.integral, &gathered, back),
+            ..live.checkpoint()
+        });
         if count >= BEFORE {
             logarithm -= back.ln();
         }

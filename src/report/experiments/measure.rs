@@ -15,24 +15,24 @@
 
 use std::ops::ControlFlow;
 
-use super::sampled::SampledLoop;
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::mass_matrix;
+use crate::math::dynamics::{gravity_load, mass_matrix};
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{Simulation, batch};
+use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation, batch};
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
-use crate::study::linear::{equilibrium, gravity_gradient, no_control};
+use crate::study::linear::{Equilibrium, equilibrium, gravity_gradient};
 use crate::study::stability::Sampling;
 
-/// Steps for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold meanwhile.
+/// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold
+/// meanwhile.
 pub const STEPS: u64 = 4000;
 
 /// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
 const NUDGE: f64 = 1e-6;
 
-/// A deviation, or a velocity times the timestep, that has made its point \[rad\]: two thousand nudges, and still less
-/// than the chatter past a limit.
+/// A deviation, or a velocity times the control period, that has made its point \[rad\]: two thousand nudges, and still
+/// less than the chatter past a limit.
 const ESCAPED: f64 = 2e-3;
 
 /// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.
@@ -57,18 +57,18 @@ pub fn measured_limit<const N: usize>(
     })
 }
 
-/// As [`measured_limit`] for the control period, with `substeps` steps of the method in each; `delayed`: every effort
+/// As [`measured_limit`] for the control period, with `substeps` steps of the method in each; `delay`: every effort
 /// acts one period late.
 #[must_use]
 pub fn measured_period<const N: usize>(
     control: &ControlLoop<N>,
     guess: f64,
     substeps: u32,
-    delayed: bool,
+    delay: bool,
 ) -> Option<f64> {
     boundary(guess, |period| {
-        let control = control.with_timestep(period);
-        decays(sampled_growth(&control, substeps, delayed))
+        let control = in_substeps(&control.with_timestep(period), substeps, delay);
+        decays(growth(&control, Sampling::Held))
     })
 }
 
@@ -90,7 +90,7 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
     ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
-/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth. In the first,
+/// Largest energy of the deviation in the last eighth of the periods, per largest in the second eighth. In the first,
 /// modes die out that say nothing about the last to do so. `None` once the deviation has escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
@@ -105,56 +105,43 @@ pub fn growths<const N: usize>(
 ) -> Vec<Option<f64>> {
     let watched = controls.iter().map(|control| {
         let rest = equilibrium(control);
-        let start = nudged(&rest.position, control.timestep);
+        let start = nudged(control, &rest.position);
         let energy = energy_about(control, &rest.position);
-        (control, rest.integral, start, energy)
+        (control, rest, start, energy)
     });
     if sampling == Sampling::Continuous {
         // No live arm, which is all that lanes know to step.
-        let growths = watched.map(|(control, integral, state, energy)| {
-            let control = *control;
+        let growths = watched.map(|(control, rest, state, energy)| {
             let mut whole = ContinuousLoop {
-                control,
+                control: *control,
                 state,
-                integral,
+                integral: rest.integral,
             };
-            watch(|| whole.step().then(|| energy(&whole.state)).flatten())
+            let mut watch = Watch::new(1);
+            while watch.seen < STEPS {
+                let taken = whole.step();
+                if watch
+                    .see(|| energy(&whole.state).filter(|_| taken))
+                    .is_break()
+                {
+                    break;
+                }
+            }
+            watch.growth()
         });
         return growths.collect();
     }
-    let watched = watched.map(|(control, integral, start, energy)| {
-        let mut live = primed(control, &integral);
-        if let Some(live) = &mut live {
-            live.set_state(start);
-        }
-        (live, energy, Watch::default())
+    let watched = watched.map(|(control, rest, start, energy)| {
+        let steps = control.period.steps(control.timestep);
+        (live_at(control, &rest, start), energy, Watch::new(steps))
     });
     let mut watched: Vec<_> = watched.collect();
-    batch::advance_with(watched.iter_mut().filter_map(|(live, energy, watch)| {
-        let observe = |state: &State<N>| watch.see(energy(state));
-        Some((live.as_mut()?, STEPS, observe))
+    batch::advance_with(watched.iter_mut().map(|(live, energy, watch)| {
+        let steps = STEPS * watch.every;
+        let observe = |state: &State<N>| watch.see(|| energy(state));
+        (live, steps, observe)
     }));
     watched.iter().map(|(_, _, watch)| watch.growth()).collect()
-}
-
-/// The [`growth`] per control period of `substeps` steps, each effort one period late if `delayed`.
-#[must_use]
-pub fn sampled_growth<const N: usize>(
-    control: &ControlLoop<N>,
-    substeps: u32,
-    delayed: bool,
-) -> Option<f64> {
-    let rest = equilibrium(control);
-    let energy = energy_about(control, &rest.position);
-    let start = nudged(&rest.position, control.timestep);
-    let mut sampled = SampledLoop::new(control, substeps, &rest, start);
-    if delayed {
-        sampled = sampled.delayed(&rest);
-    }
-    watch(|| {
-        sampled.advance();
-        energy(&sampled.state)
-    })
 }
 
 /// The energy of a deviation from `rest` \[J\], zero below [`DEAD`]; `None` beyond [`ESCAPED`].
@@ -164,7 +151,8 @@ fn energy_about<const N: usize>(
 ) -> impl Fn(&State<N>) -> Option<f64> + use<N> {
     let mass = mass_matrix(&control.arm, rest);
     let gravity = gravity_gradient(&control.arm, rest);
-    let (rest, kp, h) = (*rest, control.gains.kp, control.timestep);
+    let h = control.period.effective(control.timestep);
+    let (rest, kp) = (*rest, control.gains.kp);
     move |state| {
         let x: [f64; N] = std::array::from_fn(|i| state.position[i] - rest[i]);
         let v = &state.velocity;
@@ -186,31 +174,46 @@ fn energy_about<const N: usize>(
     }
 }
 
-/// The live loop with its integral where the equilibrium needs it. An integral cannot be set; but one step without
-/// gains, at a setpoint that is off by the right amount, leaves just that.
-fn primed<const N: usize>(control: &ControlLoop<N>, integral: &[f64; N]) -> Option<Simulation<N>> {
-    let away = Setpoint::at(integral.map(|integral| integral / control.timestep));
-    let idle = ControlLoop {
-        gains: no_control(),
-        setpoint: away,
-        ..*control
+/// The live loop in `state`, with the integral and the late effort that it has where it rests.
+pub(super) fn live_at<const N: usize>(
+    control: &ControlLoop<N>,
+    rest: &Equilibrium<N>,
+    state: State<N>,
+) -> Simulation<N> {
+    let live = control.simulation(state).checkpoint();
+    let held = Held {
+        computed: gravity_load(&control.arm, &rest.position),
+        ..live.held
     };
-    let mut live = idle.simulation(State::rest());
-    live.enable(true);
-    let primed = live.step();
-    live.set_gains(control.gains);
-    live.set_setpoint(control.setpoint);
-    primed.then_some(live)
+    Simulation::continued(&Checkpoint {
+        integral: rest.integral,
+        held,
+        ..live
+    })
+}
+
+/// The same loop with its timestep \[s\] as its control period, in `substeps` steps; `delay`: every effort acts one
+/// period late.
+#[must_use]
+pub fn in_substeps<const N: usize>(
+    control: &ControlLoop<N>,
+    substeps: u32,
+    delay: bool,
+) -> ControlLoop<N> {
+    let period = control.timestep;
+    control
+        .with_timestep(period / f64::from(substeps))
+        .with_period(ControlPeriod { period, delay })
 }
 
 /// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the
 /// velocity.
-pub(super) fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
+pub(super) fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> State<N> {
     let mut state = State::at_rest(*position);
     let mut nudge = NUDGE;
     for i in 0..N {
         state.position[i] += nudge;
-        state.velocity[i] -= 0.5 * nudge / timestep;
+        state.velocity[i] -= 0.5 * nudge / control.period.effective(control.timestep);
         nudge *= -0.618;
     }
     state
@@ -239,20 +242,13 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     None
 }
 
-/// The growth of a deviation with these energies.
-fn watch(mut energy: impl FnMut() -> Option<f64>) -> Option<f64> {
-    let mut watch = Watch::default();
-    for _ in 0..STEPS {
-        if watch.see(energy()).is_break() {
-            break;
-        }
-    }
-    watch.growth()
-}
-
-/// The energies of a deviation, as they come.
-#[derive(Debug, Default)]
+/// The energies of a deviation at the end of every control period, as they come.
+#[derive(Debug)]
 struct Watch {
+    /// Steps of a period, and those taken in it so far.
+    every: u64,
+    in_period: u64,
+    /// Periods seen.
     seen: u64,
     /// Largest of the second eighth of [`STEPS`], and of the last.
     early: f64,
@@ -261,10 +257,26 @@ struct Watch {
 }
 
 impl Watch {
-    /// Takes in the next energy, until one is zero or missing.
-    fn see(&mut self, energy: Option<f64>) -> ControlFlow<()> {
+    fn new(every: u64) -> Self {
+        Self {
+            every,
+            in_period: 0,
+            seen: 0,
+            early: 0.0,
+            late: 0.0,
+            has_died: false,
+        }
+    }
+
+    /// Takes in the energy after another step, until one is zero or missing.
+    fn see(&mut self, energy: impl FnOnce() -> Option<f64>) -> ControlFlow<()> {
         const WINDOW: u64 = STEPS / 8;
-        let Some(energy) = energy else {
+        self.in_period += 1;
+        if self.in_period < self.every {
+            return ControlFlow::Continue(());
+        }
+        self.in_period = 0;
+        let Some(energy) = energy() else {
             return ControlFlow::Break(());
         };
         if energy == 0.0 {

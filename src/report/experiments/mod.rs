@@ -27,7 +27,6 @@ pub mod growth;
 pub mod measure;
 pub mod nonlinear;
 pub mod reference;
-mod sampled;
 pub mod scenarios;
 pub mod step_scene;
 pub mod stiff;

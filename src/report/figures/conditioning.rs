@@ -21,11 +21,11 @@ type Way = (&'static str, Marker, &'static str, fn(&Lost) -> f64);
 
 const WAYS: [Way; 3] = [
     ("c2", Marker::Square, "elimination of M(q)", |lost| {
-        lost.dense.1
+        lost.dense
     }),
-    ("soft", Marker::None, "inherent", |lost| lost.inherent.1),
+    ("soft", Marker::None, "inherent", |lost| lost.inherent),
     ("c1", Marker::Diamond, "this arm's recursion", |lost| {
-        lost.recursion.1
+        lost.recursion
     }),
 ];
 
@@ -45,10 +45,10 @@ pub(super) fn make(section: &mut Section) {
         )
     };
     let [bent, stretched, folded] = &poses;
-    let straight = worst_of(&[bent.clone(), stretched.clone()], |lost| lost.recursion.1);
-    let folded = worst_of(std::slice::from_ref(folded), |lost| lost.recursion.1);
-    let own = worst_of(&poses, |lost| lost.recursion.1 - lost.inherent.1);
-    let dense = match worst_of(&poses, |lost| lost.dense.1) {
+    let straight = worst_of(&[bent.clone(), stretched.clone()], |lost| lost.recursion);
+    let folded = worst_of(std::slice::from_ref(folded), |lost| lost.recursion);
+    let own = worst_of(&poses, |lost| lost.recursion - lost.inherent);
+    let dense = match worst_of(&poses, |lost| lost.dense) {
         all if all.is_infinite() => "all".to_owned(),
         digits => number(digits),
     };

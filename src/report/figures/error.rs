@@ -3,7 +3,7 @@
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
 //! nothing is interpolated between two runs.
 
-use super::fit::{slope, worst};
+use super::fit::{fewest, slope, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
@@ -27,7 +27,7 @@ const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
 /// A scene with its runs.
 struct Data {
-    scene: Box<dyn Scene>,
+    scene: Scene,
     /// Runs of ever half the timestep.
     runs: Vec<Run>,
     /// The run of each method that reaches each of [`TARGETS`] with the fewest steps.
@@ -58,14 +58,14 @@ pub(super) fn make(section: &mut Section) {
 }
 
 impl Data {
-    fn new(scene: Box<dyn Scene>, halvings: u32, effort: Effort) -> Self {
+    fn new(scene: Scene, halvings: u32, effort: Effort) -> Self {
         let run = |method, outcome: RunOutcome| Run {
             method,
             outcome,
             timing: time(effort, || scene.replay(method, outcome.steps)),
         };
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
-        let steps = steps.filter(|steps| *steps <= scene.most_steps());
+        let steps = steps.filter(|steps| *steps <= scene.most_steps);
         let both = steps.flat_map(|steps| Method::ALL.map(|method| (method, steps)));
         let runs: Vec<Run> = both
             .map(|(method, steps)| run(method, scene.run(method, steps)))
@@ -81,8 +81,13 @@ impl Data {
                     .find(|(of, it)| {
                         *of == method && it.error <= target && it.steps <= MOST_SEARCHED
                     });
-                let steps = enough.map(|(_, outcome)| (least, outcome.steps));
-                let fewest = steps.and_then(|steps| fewest(&*scene, method, target, steps));
+                let fewest = enough.and_then(|(_, outcome)| {
+                    fewest(
+                        StepSearch::new(least, outcome.steps).to_part(RESOLUTION),
+                        |steps| scene.run_within(method, steps, target),
+                        |outcome| outcome.error <= target,
+                    )
+                });
                 least = fewest.map_or(least, |outcome| outcome.steps);
                 reached.extend(fewest.map(|outcome| (target, run(method, outcome))));
             }
@@ -140,32 +145,9 @@ impl Data {
         times.get(times.len() / 2).copied()
     }
 
-    fn unit(&self) -> &'static str {
-        if self.scene.links() == 0 { "m" } else { "rad" }
-    }
-
     fn is_held(&self) -> bool {
-        self.scene.control() == "held"
+        self.scene.control == "held"
     }
-}
-
-/// The run that keeps within `target` with the fewest steps between the two, found to a part of [`RESOLUTION`].
-fn fewest(
-    scene: &dyn Scene,
-    method: Method,
-    target: f64,
-    (least, most): (u64, u64),
-) -> Option<RunOutcome> {
-    let mut search = StepSearch::new(least, most).to_part(RESOLUTION);
-    let mut best = None;
-    while let Some(steps) = search.wanted() {
-        let outcome = scene.run_within(method, steps, target);
-        search.tell(outcome.error <= target);
-        best = Some(outcome)
-            .filter(|outcome| outcome.error <= target)
-            .or(best);
-    }
-    best
 }
 
 fn evaluations(run: &Run) -> f64 {
@@ -173,7 +155,7 @@ fn evaluations(run: &Run) -> f64 {
 }
 
 fn of<'a>(data: &'a [Data], name: &str) -> Option<&'a Data> {
-    data.iter().find(|data| data.scene.name() == name)
+    data.iter().find(|data| data.scene.name == name)
 }
 
 fn cheapest(data: &[Data]) -> Table {
@@ -199,16 +181,16 @@ fn cheapest(data: &[Data]) -> Table {
                 let more = number(evaluations(next) / evaluations(run));
                 format!("; {} ×{more}", next.method)
             });
-            let per_second = (evaluations(run) / data.scene.duration()).round();
+            let per_second = (evaluations(run) / data.scene.duration).round();
             Cell::method(run.method).detail(format!(
                 "dt {}; {} evaluations, {} per s{}",
                 seconds(run.outcome.timestep),
                 number(per_second),
-                seconds(run.timing.minimum / data.scene.duration()),
+                seconds(run.timing.minimum / data.scene.duration),
                 next.unwrap_or_default()
             ))
         });
-        let title = Cell::new(data.scene.title());
+        let title = Cell::new(data.scene.title);
         table.rows.push([title].into_iter().chain(cells).collect());
     }
     table
@@ -230,7 +212,7 @@ fn orders(data: &[Data]) -> Table {
             let order = Cell::new(order.unwrap_or_else(|| "too few points".to_owned()));
             order.detail(format!("down to {least}"))
         });
-        let title = Cell::new(data.scene.title());
+        let title = Cell::new(data.scene.title);
         table.rows.push([title].into_iter().chain(cells).collect());
     }
     table
@@ -244,10 +226,10 @@ fn scene_list(data: &[Data]) -> Table {
         ["Scene", "Parameters", "Uncertainty"],
     );
     let row = |Data { scene, .. }: &Data| {
-        let uncertainty = scientific(scene.uncertainty());
+        let uncertainty = scientific(scene.uncertainty);
         vec![
-            Cell::new(scene.title()),
-            Cell::new(scene.about()),
+            Cell::new(scene.title),
+            Cell::new(&scene.about),
             Cell::new(uncertainty),
         ]
     };
@@ -258,12 +240,12 @@ fn scene_list(data: &[Data]) -> Table {
 /// A panel for each scene. All share the error axis, so that scenes can be compared.
 fn plots(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
     let plot = |data: &Data| {
-        let label = match data.unit() {
+        let label = match data.scene.unit {
             "m" => "largest error [m]",
             _ => "largest error [rad]",
         };
         let y = Axis::log(label, Unit::Number, (1e-17, 10.0));
-        let mut plot = Plot::new(data.scene.title(), x.clone(), y);
+        let mut plot = Plot::new(data.scene.title, x.clone(), y);
         plot.curves.extend(Method::ALL.map(|method| {
             let points = data.of(method).map(|run| {
                 let RunOutcome {
@@ -273,7 +255,7 @@ fn plots(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
                     ..
                 } = run.outcome;
                 let outcome = match error.is_finite() {
-                    true => format!("error {} {}", scientific(error), data.unit()),
+                    true => format!("error {} {}", scientific(error), data.scene.unit),
                     false => "diverged".to_owned(),
                 };
                 let times = [seconds(timestep), seconds(run.timing.minimum)].join(" in ");
@@ -296,7 +278,7 @@ fn against_time(section: &mut Section, data: &[Data]) {
     let x = Axis::around("time for the whole run", Unit::Seconds, times);
     let mut plots = plots(data, &x, |run| run.timing.minimum);
     for (plot, data) in plots.iter_mut().zip(data) {
-        plot.above = data.evaluation_time();
+        plot.above = data.evaluation_time().map(|time| (time, "evaluations"));
         let points = plot.curves.iter_mut().flat_map(|curve| &mut curve.points);
         let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
         for (point, run) in points.zip(runs) {
@@ -310,7 +292,7 @@ fn against_time(section: &mut Section, data: &[Data]) {
             "An error of 10⁻⁶ rad costs RK4 {} and Verlet {} of computing time for {} s of a free swing",
             seconds(rk4.timing.minimum),
             seconds(verlet.timing.minimum),
-            number(data.scene.duration())
+            number(data.scene.duration)
         ),
         _ => "Error against time".to_owned(),
     };
@@ -372,9 +354,9 @@ fn findings(section: &mut Section, data: &[Data]) {
         section.find(format!(
             "**To stay within 10⁻⁴ rad of the true motion on a free 2-link swing of {} s RK4 takes steps of {}**, and \
              {} evaluations per simulated second. Verlet needs {} times as many and Euler {euler} times.",
-            number(swing.scene.duration()),
+            number(swing.scene.duration),
             seconds(rk4.outcome.timestep),
-            number((evaluations(rk4) / swing.scene.duration()).round()),
+            number((evaluations(rk4) / swing.scene.duration).round()),
             times(evaluations(verlet)),
         ));
     }
@@ -414,7 +396,7 @@ fn verdicts(section: &mut Section, data: &[Data]) {
             f64::from(method.order())
         };
         let order = data.order(method)?;
-        let title = data.scene.title();
+        let title = data.scene.title;
         Some((
             (order - expected).abs(),
             format!("{method} in {title}, {order:.2} for {expected:.0}"),
@@ -434,7 +416,7 @@ fn verdicts(section: &mut Section, data: &[Data]) {
     let smallest = errors
         .filter(|error| *error > 0.0)
         .fold(f64::INFINITY, f64::min);
-    let uncertainty = worst(data.iter().map(|data| data.scene.uncertainty()));
+    let uncertainty = worst(data.iter().map(|data| data.scene.uncertainty));
     section.claim(
         "References are at least 100 times better known than the smallest error shown",
         format!(

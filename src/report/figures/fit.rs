@@ -1,8 +1,24 @@
-//! Slopes of lines through points, cells of a map, and the worst of many numbers.
+//! Slopes of lines through points, cells of a map, the cheapest of runs, and the worst of many numbers.
 //!
 //! **Invariant:** there is one more edge than cells, and a cell is measured between two of them.
 
 use crate::math::count::length_in_f64;
+use crate::study::fewest::StepSearch;
+
+/// The run of the fewest steps that is good enough, of those that a search makes.
+pub(super) fn fewest<R: Copy>(
+    mut search: StepSearch,
+    run: impl Fn(u64) -> R,
+    is_enough: impl Fn(&R) -> bool,
+) -> Option<R> {
+    let mut best = None;
+    while let Some(steps) = search.wanted() {
+        let made = run(steps);
+        search.tell(is_enough(&made));
+        best = Some(made).filter(&is_enough).or(best);
+    }
+    best
+}
 
 /// Slope of the least-squares line through `(log x, log y)` of positive numbers; `None` for fewer than two.
 pub(super) fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {

@@ -4,7 +4,7 @@
 
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveRun, LiveScene, live_scenes};
-use crate::report::section::{Cell, Section, Table};
+use crate::report::section::{Cell, Section, Table, lines};
 use crate::report::svg::{HEIGHT, Key, Panel, PlotNumber, WIDTH, escape, number, plain, seconds};
 
 pub(super) fn make(section: &mut Section) {
@@ -65,9 +65,9 @@ pub(super) fn make(section: &mut Section) {
         "scenarios",
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps. The scale is that of the largest angle, which is \
-         written at the right. A cross ends a run that would have left the finite numbers. Below: the time watched, \
-         and whether the scene does as theory says; the table has the details. A name opens the arm on the page of a \
-         running program at 127.0.0.1:9095, which applies the settings on a click.",
+         written below. A cross ends a run that would have left the finite numbers. Below: the time watched, the \
+         largest angle, and whether the scene does as theory says; the table has the details. A name opens the arm on \
+         the page of a running program at 127.0.0.1:9095, which applies the settings on a click.",
         &panels,
     );
     section.table(&table);
@@ -84,35 +84,32 @@ const SMALL_WIDTH: f64 = 0.5 * WIDTH;
 const SMALL_HEIGHT: f64 = 0.5 * HEIGHT;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = SMALL_WIDTH - LEFT;
-const TOP: f64 = 30.0;
+const TOP: f64 = 40.0;
 const MIDDLE: f64 = 0.5 * (TOP + SMALL_HEIGHT - 24.0);
 
 fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
-    /// Characters of a heading that fit above a picture.
-    const LONGEST: usize = 25;
+    /// A letter of a heading is no wider on average, in pixels.
+    const LETTER: f64 = 8.2;
     let bottom = SMALL_HEIGHT - 8.0;
     let (class, verdict) = match holds {
         Some(true) => ("good", "holds"),
         Some(false) => ("bad", "falls short"),
         None => ("soft", "not run"),
     };
-    let heading = match name.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", name.get(..end - 2).unwrap_or_default()),
-        None => name.to_owned(),
-    };
-    let heading = format!(
-        "<text class=\"title\" x=\"{LEFT}\" y=\"17\">{}</text>",
-        escape(&heading)
-    );
+    let mut heading = String::new();
+    for (y, line) in [15, 31].into_iter().zip(lines(name, RIGHT - LEFT, LETTER)) {
+        let line = escape(&line);
+        heading += &format!("<text class=\"title\" x=\"{LEFT}\" y=\"{y}\">{line}</text>");
+    }
     let (drawn, rows) = match live.watch() {
         Ok(watched) => {
             let link = escape(&live.fragment());
-            let watched_for = seconds(live.seconds());
-            let note =
-                format!("<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{watched_for}</text>");
+            let largest = largest(&watched);
+            let scale = format!("{}, ±{} rad", seconds(live.seconds()), number(largest));
             let drawn = format!(
-                "<a href=\"{PAGE}{link}\">{heading}</a>{}{note}",
-                curves(&watched)
+                "<a href=\"{PAGE}{link}\">{heading}</a>{}<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{scale}\
+                 </text>",
+                curves(&watched, largest)
             );
             (drawn, rows(name, &watched))
         }
@@ -131,6 +128,7 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
         keys: JOINTS
             .map(|(class, label)| Key::line(class, label))
             .to_vec(),
+        axes: ["time [s]", "angle from the start [rad]"].map(str::to_owned),
         rows,
     }
 }
@@ -147,9 +145,13 @@ fn rows(name: &str, watched: &LiveRun) -> Vec<PlotNumber> {
     samples.flat_map(row).collect()
 }
 
-fn curves(watched: &LiveRun) -> String {
+/// The largest angle from the start \[rad\].
+fn largest(watched: &LiveRun) -> f64 {
     let all = watched.samples.iter().flat_map(|(_, angles)| angles);
-    let largest = all.fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
+    all.fold(0.0, |largest, angle| largest.max(angle.abs()))
+}
+
+fn curves(watched: &LiveRun, largest: f64) -> String {
     let end = watched.samples.last().map_or(1.0, |(time, _)| *time);
     let x = |time: f64| LEFT + (RIGHT - LEFT) * time / end;
     let part = |angle: f64| if largest > 0.0 { angle / largest } else { 0.0 };
@@ -170,8 +172,5 @@ fn curves(watched: &LiveRun) -> String {
         out += "<g class=\"series ink\">";
         out += &format!("<path class=\"lost\" d=\"M{x} {y}l8 8m0 -8l-8 8\"/></g>");
     }
-    let (y, largest) = (TOP + 4.0, number(largest));
-    out + &format!(
-        "<text class=\"note\" x=\"{RIGHT}\" y=\"{y}\" text-anchor=\"end\">{largest} rad</text>"
-    )
+    out
 }

@@ -18,12 +18,11 @@ use crate::report::svg::{
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{
-    Limits, Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix,
-    step_matrix,
+    Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix, step_matrix,
 };
 
 pub(super) fn make(section: &mut Section) {
-    let lines = [two_links(), three_links()].concat();
+    let lines = loops();
     findings(section, &lines);
     map(section);
     regions(section);
@@ -31,89 +30,92 @@ pub(super) fn make(section: &mut Section) {
     section.table(&limits_table(&lines));
 }
 
-/// Predicted and measured limit of a loop, the smallest of all poses, and the advice.
-#[derive(Clone)]
+/// The limits of a loop with one kind of control, by method.
 struct LimitRow {
     loop_name: String,
-    method: Method,
     sampling: Sampling,
+    limits: [Option<MethodLimit>; Method::ALL.len()],
+}
+
+/// Predicted and measured limit with a method, the smallest of all poses, and the advice \[s\].
+#[derive(Clone, Copy)]
+struct MethodLimit {
     predicted: f64,
     measured: Option<f64>,
     others: [Option<f64>; 2],
 }
 
 impl LimitRow {
+    fn of(&self, method: Method) -> Option<MethodLimit> {
+        let mut all = Method::ALL.into_iter().zip(self.limits);
+        all.find(|(one, _)| *one == method)?.1
+    }
+}
+
+impl MethodLimit {
     /// How far the measured limit is from the predicted one, as a part of it.
     fn off(&self) -> f64 {
         let measured = self.measured.unwrap_or(f64::INFINITY);
         (measured / self.predicted - 1.0).abs()
     }
+
+    fn cell(&self) -> Cell {
+        let said = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), seconds);
+        let mut details = vec![format!("measured {}", said(self.measured))];
+        for (name, limit) in ["all poses", "advised"].into_iter().zip(self.others) {
+            details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
+        }
+        Cell::new(seconds(self.predicted)).detail(details.join(", "))
+    }
 }
 
-fn two_links() -> Vec<LimitRow> {
-    let gains = |kp, kd| Gains {
-        kp,
-        ki: [0.0; 2],
-        kd,
-    };
-    let at = [0.4, 0.8];
+/// The loops of 2 links and of 3.
+fn loops() -> Vec<LimitRow> {
+    let two = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8]);
+    let three = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8, -0.5]);
     [
-        rows("mild", gains([200.0, 100.0], [30.0, 12.0]), at),
-        rows("default", Gains::default(), at),
-        rows("stiff", gains([1e4; 2], [200.0, 60.0]), at),
-        rows("overdamped", gains([200.0; 2], [500.0; 2]), at),
+        two("mild", [200.0, 100.0], [30.0, 12.0]),
+        rows("default", Gains::default(), [0.4, 0.8]),
+        two("stiff", [1e4; 2], [200.0, 60.0]),
+        two("overdamped", [200.0; 2], [500.0; 2]),
+        rows("default", Gains::default(), [0.4, 0.8, -0.5]),
+        three("stiff", [1e4; 3], [300.0, 100.0, 30.0]),
+        three("overdamped", [200.0; 3], [500.0; 3]),
     ]
-    .concat()
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
-fn three_links() -> Vec<LimitRow> {
-    let gains = |kp, kd| Gains {
-        kp,
-        ki: [0.0; 3],
-        kd,
-    };
-    let at = [0.4, 0.8, -0.5];
-    [
-        rows("default", Gains::default(), at),
-        rows("stiff", gains([1e4; 3], [300.0, 100.0, 30.0]), at),
-        rows("overdamped", gains([200.0; 3], [500.0; 3]), at),
-    ]
-    .concat()
+fn proportional<const N: usize>(kp: [f64; N], kd: [f64; N]) -> Gains<N> {
+    let ki = [0.0; N];
+    Gains { kp, ki, kd }
 }
 
-/// A row for each method and sampling at which the loop is stable at some timestep.
-fn rows<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> Vec<LimitRow> {
+/// A row for each kind of control; a method with which the loop is stable at no timestep has no limit.
+fn rows<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> [LimitRow; 2] {
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
-    let of_method = |method| {
-        let control = control.with_method(method);
-        let limits = limits(&control);
-        Sampling::ALL.map(|sampling| row(name, &control, &limits, sampling))
-    };
-    Method::ALL
-        .into_iter()
-        .flat_map(of_method)
-        .flatten()
-        .collect()
-}
-
-fn row<const N: usize>(
-    name: &str,
-    control: &ControlLoop<N>,
-    limits: &Limits<N>,
-    sampling: Sampling,
-) -> Option<LimitRow> {
-    let (predicted, others) = match sampling {
-        Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
-        Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
-    };
-    let predicted = predicted.filter(|limit| *limit > 0.0)?;
-    Some(LimitRow {
-        loop_name: format!("{N} links, {name} gains"),
-        method: control.method,
-        sampling,
-        predicted,
-        measured: measured_limit(control, sampling, predicted),
-        others,
+    let all = Method::ALL.map(|method| limits(&control.with_method(method)));
+    Sampling::ALL.map(|sampling| {
+        let mut methods = Method::ALL.into_iter();
+        let limits = all.map(|limits| {
+            let control = control.with_method(methods.next()?);
+            let (predicted, others) = match sampling {
+                Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
+                Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
+            };
+            let predicted = predicted.filter(|limit| *limit > 0.0)?;
+            Some(MethodLimit {
+                predicted,
+                measured: measured_limit(&control, sampling, predicted),
+                others,
+            })
+        });
+        LimitRow {
+            loop_name: format!("{N} links, {name} gains"),
+            sampling,
+            limits,
+        }
     })
 }
 
@@ -127,46 +129,27 @@ fn limits_table(lines: &[LimitRow]) -> Table {
          period: the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         by_method(&["Loop", "Control"]),
     );
-    let mut rest = lines;
-    while let Some(first) = rest.first() {
-        let (of_loop, others) = rest.split_at(
-            rest.iter()
-                .take_while(|it| it.loop_name == first.loop_name)
-                .count(),
-        );
-        rest = others;
-        for sampling in Sampling::ALL {
-            let words = match sampling {
-                Sampling::Held => "effort held for the step (as the live arm does)",
-                Sampling::Continuous => "law in every stage",
-            };
-            let mut row = vec![Cell::new(&first.loop_name), Cell::new(words)];
-            row.extend(Method::ALL.map(|method| {
-                let mut of = of_loop.iter();
-                let of = of.find(|it| it.method == method && it.sampling == sampling);
-                of.map_or_else(|| Cell::new("none").class("bad"), limit_cell)
-            }));
-            table.rows.push(row);
-        }
+    for line in lines {
+        let control = match line.sampling {
+            Sampling::Held => "effort held for the step (as the live arm does)",
+            Sampling::Continuous => "law in every stage",
+        };
+        let mut row = vec![Cell::new(&line.loop_name), Cell::new(control)];
+        row.extend(line.limits.iter().map(|limit| match limit {
+            Some(limit) => limit.cell(),
+            None => Cell::new("none").class("bad"),
+        }));
+        table.rows.push(row);
     }
     table
 }
 
-fn limit_cell(line: &LimitRow) -> Cell {
-    let said = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), seconds);
-    let mut details = vec![format!("measured {}", said(line.measured))];
-    for (name, limit) in ["all poses", "advised"].into_iter().zip(line.others) {
-        details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
-    }
-    Cell::new(seconds(line.predicted)).detail(details.join(", "))
-}
-
 fn findings(section: &mut Section, lines: &[LimitRow]) {
     let at = |sampling, method| {
-        lines.iter().find(|line| {
-            (line.sampling, line.method) == (sampling, method)
-                && line.loop_name == "2 links, default gains"
-        })
+        let mut lines = lines.iter().filter(|line| line.sampling == sampling);
+        lines
+            .find(|line| line.loop_name == "2 links, default gains")?
+            .of(method)
     };
     if let (Some(verlet), Some(rk4), Some(continuous)) = (
         at(Sampling::Held, Method::Verlet),
@@ -184,18 +167,15 @@ fn findings(section: &mut Section, lines: &[LimitRow]) {
             seconds(rk4.others.first().copied().flatten().unwrap_or(f64::NAN)),
         ));
     }
-    let furthest = worst(lines.iter().map(LimitRow::off));
+    let all = || lines.iter().flat_map(|line| line.limits).flatten();
+    let (count, furthest) = (all().count(), worst(all().map(|limit| limit.off())));
     section.find(format!(
-        "**The linearised loop predicts the arm's own limit to {} %** in {} cases: 2 and 3 links, mild to overdamped \
-         gains, all methods, both kinds of control.",
+        "**The linearised loop predicts the arm's own limit to {} %** in {count} cases: 2 and 3 links, mild to \
+         overdamped gains, all methods, both kinds of control.",
         number(100.0 * furthest),
-        lines.len()
     ));
     section.claim(
-        format!(
-            "Predicted and measured limits agree to 1 % in all {} cases",
-            lines.len()
-        ),
+        format!("Predicted and measured limits agree to 1 % in all {count} cases"),
         format!("furthest apart {} %", number(100.0 * furthest)),
         furthest <= 0.01,
     );
@@ -205,17 +185,26 @@ fn findings(section: &mut Section, lines: &[LimitRow]) {
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
 
+/// The empty map, whose legend tells both kinds of control.
+fn map_plot() -> Plot {
+    let mut plot = Plot::new(
+        "All methods",
+        Axis::log("timestep", Unit::Seconds, TIMESTEPS),
+        Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
+    );
+    let held = Key::line("soft", "predicted, effort held for the step");
+    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
+    plot.curves.extend([held, continuous].map(Curve::named));
+    plot
+}
+
 /// Does a nudge of the arm die out or grow, by timestep and stiffness, beside the predicted line.
 fn map(section: &mut Section) {
     let columns = section.choose(48, 16);
     let timestep_edges = edges(TIMESTEPS, columns);
     let timesteps = centres(&timestep_edges);
     let factors = centres(&edges(FACTORS, columns * 3 / 4));
-    let mut plot = Plot::new(
-        "All methods",
-        Axis::log("timestep", Unit::Seconds, TIMESTEPS),
-        Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
-    );
+    let mut plot = map_plot();
     let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
     let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
     for (method, sampling) in all.into_iter().flatten() {

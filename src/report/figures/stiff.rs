@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a run that would take too many steps is shown as a prediction, and said to be one.
 
-use super::fit::worst;
+use super::fit::{fewest, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
@@ -85,14 +85,11 @@ pub(super) fn make(section: &mut Section) {
 /// The run within the error with the fewest steps, found to a part of [`RESOLUTION`].
 fn cheapest(scene: &StiffScene, solver: Solver, most: u64) -> Option<StiffRun> {
     // A run is compared at the outputs: its steps are a multiple of them.
-    let mut search = StepSearch::new(1, most / OUTPUTS).to_part(RESOLUTION);
-    let mut best = None;
-    while let Some(steps) = search.wanted() {
-        let run = scene.run(solver, OUTPUTS * steps);
-        search.tell(run.error <= TARGET);
-        best = Some(run).filter(|run| run.error <= TARGET).or(best);
-    }
-    best
+    fewest(
+        StepSearch::new(1, most / OUTPUTS).to_part(RESOLUTION),
+        |steps| scene.run(solver, OUTPUTS * steps),
+        |run| run.error <= TARGET,
+    )
 }
 
 fn of(costs: &[Cost], by: By, solver: Solver) -> impl Iterator<Item = &Cost> {
@@ -214,8 +211,6 @@ fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Panel; 2] {
         }
     }
     let key = Key::line("soft", "demand of stability, predicted").dashed();
-    evaluations
-        .curves
-        .push(Curve::line(key, [(f64::NAN, f64::NAN)]));
+    evaluations.curves.push(Curve::named(key));
     [evaluations.draw(), times.draw()]
 }

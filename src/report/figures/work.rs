@@ -94,174 +94,24 @@ fn particle(function: &str) -> f64 {
     })
 }
 
-/// A quantity of the table: its count, a factor, its unit and a detail.
-type Quantity = (&'static str, f64, &'static str, &'static str);
+/// What is left out, a line each: the work, the place where it is left out, the counts with it and without it, each
+/// with a detail behind a colon, and whether their difference is saved.
+const LEFT_OUT: &str = include_str!("left_out.txt");
 
-/// Work, the place where it is left out, the quantities with it and without it, and whether their difference is saved.
-type WorkRow = (&'static str, &'static str, Quantity, Quantity, bool);
-
-const STEP: &str = "instructions";
-const RATE: &str = "million instructions a second";
-const NOTHING: Quantity = ("", 0.0, "", "");
-
-const fn step(
-    work: &'static str,
-    place: &'static str,
-    with: &'static str,
-    without: &'static str,
-) -> WorkRow {
-    (
-        work,
-        place,
-        (with, 1.0, STEP, ""),
-        (without, 1.0, STEP, ""),
-        true,
-    )
+/// The factor and the unit in which a count is shown.
+fn unit(name: &str) -> (f64, &'static str) {
+    const RATE: &str = "million instructions a second";
+    match name {
+        // Ten a second.
+        "estimate-2-rk4" => (1e-5, RATE),
+        "program-size" | "program-size-bare" => (1e-6, "MB"),
+        _ if name.ends_with("-encoded") => (1.0, "messages encoded a second"),
+        _ if name.starts_with("server-") => (1e-6, RATE),
+        _ if name.starts_with("wakes-") => (1.0, "wake-ups a second"),
+        _ if name.starts_with("allocations-") => (1.0, "allocations"),
+        _ => (1.0, "instructions"),
+    }
 }
-
-const ROWS: [WorkRow; 17] = [
-    step(
-        "Control law with the controller off",
-        "math::simulation asks the law only while it is on",
-        "step-2-rk4-pid",
-        "step-2-rk4-free",
-    ),
-    step(
-        "Integral with ki = 0",
-        "kept: an integral that gathers at ki = 0 acts as soon as ki is set; one product and one clamp a joint",
-        "step-2-rk4-pid",
-        "step-2-rk4-pd",
-    ),
-    step(
-        "Damping with kd = 0",
-        "kept: asking whether it is zero would cost as much as its product",
-        "step-2-rk4-pid",
-        "step-2-rk4-pi",
-    ),
-    step(
-        "A disturbance of zeros",
-        "kept: there is none until somebody sends one, and one of zeros ends by itself",
-        "step-2-rk4-pushed",
-        "step-2-rk4-pid",
-    ),
-    step(
-        "First joint's sine and cosine at gravity 0, 2 links",
-        "kept: both angles are taken in one pass, and leaving out the first was worth some 4 %",
-        "step-2-rk4-free",
-        "step-2-rk4-weightless",
-    ),
-    step(
-        "First joint's sine and cosine at gravity 0, 3 links",
-        "math::simulation takes the recursion that does not look at the first angle; the same bits",
-        "step-3-rk4-free",
-        "step-3-rk4-weightless",
-    ),
-    step(
-        "Third link of a 2-link arm",
-        "links are a compile-time constant: each arm has its own code",
-        "step-3-rk4-free",
-        "step-2-rk4-free",
-    ),
-    step(
-        "Mass matrix in the 1-DOF service (instructions of the arm's code)",
-        "math::particle knows no arm: none of the arm's functions runs",
-        "arm-in-step-2-rk4-free",
-        "arm-in-particle-rk4-constant",
-    ),
-    (
-        "Stepping while paused",
-        "actors::arm::sim asks the pacer for no steps",
-        ("server-running", 1e-6, RATE, "running, nobody subscribed"),
-        ("server-paused", 1e-6, RATE, "paused"),
-        true,
-    ),
-    (
-        "JSON that nobody subscribes to",
-        "the registry tells the arm which topics are wanted",
-        (
-            "server-1-subscriber-encoded",
-            1.0,
-            "messages encoded a second",
-            "one subscriber of /joint_states",
-        ),
-        (
-            "server-running-encoded",
-            1.0,
-            "messages encoded a second",
-            "none",
-        ),
-        true,
-    ),
-    (
-        "Encoding once more for each further subscriber",
-        "one frame of shared bytes goes to every outbox",
-        (
-            "server-11-subscribers-json",
-            1e-6,
-            RATE,
-            "JSON for eleven subscribers",
-        ),
-        ("server-1-subscriber-json", 1e-6, RATE, "JSON for one"),
-        false,
-    ),
-    (
-        "Allocations for each further subscriber of a message",
-        "counting allocator, 10 against 110 subscribers",
-        ("allocations-per-subscriber", 1.0, "allocations", ""),
-        NOTHING,
-        false,
-    ),
-    (
-        "Goal and trial timers",
-        "a timer lives as long as its goal, or as a client watches a trial; wake-ups of the gateway's thread",
-        (
-            "wakes-trial",
-            1.0,
-            "wake-ups a second",
-            "a trial runs, its status is watched",
-        ),
-        ("wakes-idle", 1.0, "wake-ups a second", "nothing asked for"),
-        true,
-    ),
-    (
-        "Local error estimate, ten a second (2 links, RK4)",
-        "study::error_estimate is asked only for a subscriber of /arm_sim/error_estimate",
-        (
-            "estimate-2-rk4",
-            1e-5,
-            RATE,
-            "one subscriber or a hundred, beside the encoding",
-        ),
-        NOTHING,
-        false,
-    ),
-    (
-        "Web, record, report and commands without their features",
-        "cargo build --no-default-features --features runtime",
-        ("program-size", 1e-6, "MB", ""),
-        ("program-size-bare", 1e-6, "MB", ""),
-        true,
-    ),
-    (
-        "Allocation in the loop",
-        "every state is an array of constant length",
-        NOTHING,
-        (
-            "allocations-in-steps",
-            1.0,
-            "allocations",
-            "in 16 million steps",
-        ),
-        false,
-    ),
-    (
-        "A locked joint",
-        "there is none: every joint of this arm turns, and a link less is an arm of its own",
-        NOTHING,
-        NOTHING,
-        false,
-    ),
-];
 
 /// Claims about a count: its name, its unit, and a bound. Whole numbers below one half are none.
 const BELOW: [(&str, &str, &str, f64); 5] = [
@@ -302,7 +152,9 @@ impl Measured {
         self.counts.get(name).copied()
     }
 
-    fn cell(&self, (name, factor, unit, detail): Quantity) -> Cell {
+    /// The cell of a count and its detail.
+    fn cell(&self, told: &str) -> Cell {
+        let (name, detail) = told.split_once(": ").unwrap_or((told, ""));
         if name.is_empty() {
             return Cell::default();
         }
@@ -311,40 +163,38 @@ impl Measured {
         };
         let time = self.times.iter().find(|(one, _)| *one == name);
         let time = time.map(|(_, time)| seconds(*time));
-        let count = if unit == STEP { count.round() } else { count };
+        let (factor, unit) = unit(name);
+        let whole = unit == "instructions";
+        let count = if whole { count.round() } else { count };
         Cell::new(format!("{} {unit}", number(factor * count)))
             .detail(time.as_deref().unwrap_or(detail))
     }
 
     fn table(&self) -> Table {
+        let mut lines = LEFT_OUT.lines().map(|line| line.split('|').map(str::trim));
         let mut table = Table::new(
             "left-out",
             "What is left out, and the proof",
             "Instructions are counted by callgrind over the same number of steps on both sides, without the start of \
              the program. Times are the minimum of repeats on this machine. They follow the instructions only loosely, \
              since a step is one chain of dependent operations.",
-            [
-                "Work",
-                "Where it is left out",
-                "With it",
-                "Without it",
-                "Saved",
-            ],
+            lines.next().into_iter().flatten(),
         );
-        for (work, place, with, without, is_saved) in ROWS {
-            let both = self
-                .count(with.0)
-                .zip(self.count(without.0))
-                .filter(|_| is_saved);
+        let count = |told: &str| self.count(told.split(": ").next()?);
+        for line in lines {
+            let [work, place, with, without, saved] = line.collect::<Vec<_>>()[..] else {
+                continue;
+            };
+            let both = count(with).zip(count(without)).filter(|_| saved == "yes");
             let saved = both.map(|(with, without)| (100.0 * (1.0 - without / with)).round());
             let saved = saved.map(|percent| Cell::new(format!("{} %", number(percent))));
-            let cells = [
+            table.rows.push(vec![
+                Cell::new(work),
+                Cell::new(place),
                 self.cell(with),
                 self.cell(without),
                 saved.unwrap_or_default(),
-            ];
-            let words = [work, place].map(Cell::new);
-            table.rows.push(words.into_iter().chain(cells).collect());
+            ]);
         }
         table
     }

@@ -67,6 +67,14 @@ impl Axis {
         }
     }
 
+    /// Its label with the unit of its values.
+    pub(super) fn name(&self) -> String {
+        match self.unit {
+            Unit::Number => self.label.to_owned(),
+            Unit::Seconds => format!("{} [s]", self.label),
+        }
+    }
+
     /// The place of `value`: 0 at the start of the axis, 1 at its end.
     pub(crate) fn place(&self, value: f64) -> f64 {
         if self.is_log {

@@ -11,7 +11,7 @@ mod plot;
 
 pub(crate) use axis::{Axis, Unit};
 pub(crate) use numbers::{number, one_digit, plain, power, scientific, seconds};
-pub(crate) use plot::{Heat, Mark, Plot, bars};
+pub(crate) use plot::{Heat, Mark, Plot, bars, csv};
 
 use crate::math::integrator::Method;
 
@@ -154,6 +154,11 @@ impl Curve {
         }
     }
 
+    /// An entry of the legend alone.
+    pub(crate) fn named(key: Key) -> Self {
+        Self::line(key, Vec::<Point>::new())
+    }
+
     pub(crate) fn dots(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
         Self {
             has_line: false,
@@ -162,11 +167,13 @@ impl Curve {
     }
 }
 
-/// A drawn panel: an `<svg>` element without style, the keys of its curves, and its numbers.
+/// A drawn panel: an `<svg>` element without style, the keys of its curves, and its numbers with the names of its axes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Panel {
     pub(crate) svg: String,
     pub(crate) keys: Vec<Key>,
+    /// Names of x and y with their units; empty for an axis that is not there.
+    pub(crate) axes: [String; 2],
     pub(crate) rows: Vec<PlotNumber>,
 }
 

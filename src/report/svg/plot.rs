@@ -36,8 +36,8 @@ pub(crate) struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
-    /// A second scale above: `x` in this unit.
-    pub(crate) above: Option<f64>,
+    /// A second scale above: its unit on x, and its name.
+    pub(crate) above: Option<(f64, &'static str)>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
     pub(crate) curves: Vec<Curve>,
@@ -84,6 +84,7 @@ impl Plot {
                 self.frame()
             ),
             keys: self.curves.iter().map(|curve| curve.key.clone()).collect(),
+            axes: [self.x.name(), self.y.name()],
             rows: rows.chain(self.heat_rows()).collect(),
         }
     }
@@ -145,8 +146,9 @@ impl Plot {
         let grid = if self.heat.is_some() { "tick" } else { "grid" };
         for (value, label) in self.x.ticks(6.0) {
             let x = self.across(value);
-            // A label at the very end would leave the paper.
-            let (anchor, shown) = if x > RIGHT - 12.0 {
+            // A long label at the very end would leave the paper.
+            let half = 3.4 * length_in_f64(label.chars().count());
+            let (anchor, shown) = if x + half > WIDTH - 3.0 {
                 ("end", WIDTH - 3.0)
             } else {
                 ("middle", x)
@@ -160,7 +162,8 @@ impl Plot {
             out += &format!("<path class=\"{grid}\" d=\"M{LEFT} {y:.1}H{RIGHT}\"/>");
             out += &text("label", (LEFT - 6.0, y + 4.0), "end", &label);
         }
-        if let Some(unit) = self.above {
+        if let Some((unit, name)) = self.above {
+            out += &text("note", (WIDTH - 3.0, 17.0), "end", name);
             let other = Axis::log("", Unit::Number, (self.x.min / unit, self.x.max / unit));
             for (value, label) in other.ticks(5.0) {
                 let x = self.across(value * unit);
@@ -289,7 +292,57 @@ pub(crate) fn bars(title: &str, class: &str, rows: &[(&str, Option<f64>)]) -> Pa
     Panel {
         svg: out + "</g></svg>",
         keys: Vec::new(),
+        axes: [title.to_owned(), String::new()],
         rows: rows.iter().map(row).collect(),
+    }
+}
+
+/// The numbers of a figure as CSV: a column for each axis of its panels, named by it, and filled by the panels that
+/// have it.
+pub(crate) fn csv(panels: &[Panel]) -> String {
+    let mut axes: Vec<&str> = Vec::new();
+    for axis in panels.iter().flat_map(|panel| &panel.axes) {
+        if !axis.is_empty() && !axes.contains(&axis.as_str()) {
+            axes.push(axis);
+        }
+    }
+    let line = |curve: &str, columns: Vec<String>, note: &str| {
+        let columns = columns.join(",");
+        format!("{},{columns},{}\n", quoted(curve), quoted(note))
+    };
+    let mut out = line(
+        "curve",
+        axes.iter().map(|axis| quoted(axis)).collect(),
+        "note",
+    );
+    for panel in panels {
+        let [x_axis, y_axis] = &panel.axes;
+        for (curve, x, y, note) in &panel.rows {
+            let column = |axis: &&str| match *axis {
+                axis if axis == x_axis => spelled(*x),
+                axis if axis == y_axis => spelled(*y),
+                _ => String::new(),
+            };
+            out += &line(curve, axes.iter().map(column).collect(), note);
+        }
+    }
+    out
+}
+
+/// A field of a CSV file.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        return format!("\"{}\"", text.replace('"', "\"\""));
+    }
+    text.to_owned()
+}
+
+/// A number that reads back to the same bits; nothing where there is none.
+fn spelled(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:e}")
+    } else {
+        String::new()
     }
 }
 
@@ -315,5 +368,28 @@ mod tests {
         ];
         let names: BTreeSet<String> = plot.draw().rows.into_iter().map(|row| row.0).collect();
         assert_eq!(names.len(), plot.curves.len(), "{names:?}");
+    }
+
+    #[test]
+    fn a_column_is_named_by_its_axis_with_the_unit() {
+        let draw = |y| {
+            let x = Axis::log("timestep", Unit::Seconds, (1e-3, 1.0));
+            let mut plot = Plot::new("panel", x, y);
+            let key = Key::line("rk4", "rk4");
+            plot.curves = vec![Curve::line(key, [(0.5, 2.0)])];
+            plot.draw()
+        };
+        let panels = [
+            draw(Axis::linear("largest error [rad]", (0.0, 3.0))),
+            draw(Axis::linear("growth, per period", (0.0, 3.0))),
+            bars("Time per step [ns]", "c1", &[("one", Some(7.0))]),
+        ];
+        assert_eq!(
+            csv(&panels),
+            "curve,timestep [s],largest error [rad],\"growth, per period\",Time per step [ns],note\n\
+             panel: rk4,5e-1,2e0,,,\n\
+             panel: rk4,5e-1,,2e0,,\n\
+             Time per step [ns]: one,,,,7e0,\n"
+        );
     }
 }

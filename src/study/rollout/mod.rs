@@ -114,7 +114,10 @@ impl<const N: usize> Rollout<N> {
                     request.control.timestep,
                 ),
                 lost: false,
-                behind: Behind::default(),
+                behind: 0,
+                stretch: 0.0,
+                begun: false,
+                effort: [0.0; N],
             })
         });
         let mut rollout = Self {
@@ -177,8 +180,7 @@ impl<const N: usize> Rollout<N> {
     /// Whether a reference has not come to where the run is.
     fn is_behind(&self) -> bool {
         let mut references = self.references.iter().flatten();
-        references.any(|one| one.behind.steps > 0)
-            || self.ideals.iter().flatten().any(Ideal::is_behind)
+        references.any(|one| one.behind > 0) || self.ideals.iter().flatten().any(Ideal::is_behind)
     }
 
     /// Steps that are made in one go: a reference without control is asked for spans of [`MAX_SPAN`] at most, and
@@ -338,31 +340,15 @@ struct Reference<const N: usize> {
     hold: Hold<N>,
     /// Whether the motion was too wild to be followed.
     lost: bool,
-    behind: Behind<N>,
-}
-
-/// The stretches that a reference has to follow, to come to where the run is.
-#[derive(Debug, Clone)]
-struct Behind<const N: usize> {
-    /// Stretches that are left, each under one effort: steps under control, or all of them at once.
-    steps: u64,
+    /// Stretches that are left to come to where the run is, each under one effort: steps under control, or all of them
+    /// at once.
+    behind: u64,
     /// Length of each \[s\].
     stretch: f64,
     /// Whether the stretch is being followed.
     begun: bool,
-    /// The effort that drives the arm in it.
+    /// The effort that drives the arm in it \[N m\].
     effort: [f64; N],
-}
-
-impl<const N: usize> Default for Behind<N> {
-    fn default() -> Self {
-        Self {
-            steps: 0,
-            stretch: 0.0,
-            begun: false,
-            effort: [0.0; N],
-        }
-    }
 }
 
 impl<const N: usize> Reference<N> {
@@ -372,7 +358,7 @@ impl<const N: usize> Reference<N> {
         if self.lost || steps == 0 {
             return;
         }
-        (self.behind.steps, self.behind.stretch) = if self.pid.is_enabled() {
+        (self.behind, self.stretch) = if self.pid.is_enabled() {
             (steps, timestep)
         } else {
             (1, in_f64(steps) * timestep)
@@ -383,28 +369,27 @@ impl<const N: usize> Reference<N> {
     fn follow(&mut self, work: u64) -> u64 {
         let before = self.taylor.coefficients();
         let bound = before.saturating_add(work);
-        while self.behind.steps > 0 {
-            if !self.behind.begun {
-                let timestep = self.behind.stretch;
+        while self.behind > 0 {
+            if !self.begun {
                 if self.pid.is_enabled() {
                     let state = self.taylor.state();
                     let (control, held) = self.hold.begin_step(&self.pid, state);
-                    self.behind.effort = control.effort;
+                    self.effort = control.effort;
                     self.pid.commit(control.integral);
                     self.hold.commit(held);
                 }
-                self.taylor.begin(timestep);
-                self.behind.begun = true;
+                self.taylor.begin(self.stretch);
+                self.begun = true;
             }
-            match self.taylor.go_on(&self.arm, &self.behind.effort, bound) {
+            match self.taylor.go_on(&self.arm, &self.effort, bound) {
                 None => break,
                 Some(false) => {
                     self.lost = true;
-                    self.behind.steps = 0;
+                    self.behind = 0;
                 }
-                Some(true) => self.behind.steps -= 1,
+                Some(true) => self.behind -= 1,
             }
-            self.behind.begun = false;
+            self.begun = false;
         }
         self.taylor.coefficients() - before
     }
@@ -428,16 +413,11 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
 
 /// Largest distance of any two states in a joint position \[rad\]; NaN counts as the largest.
 fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
-    let mut largest = 0.0;
-    for (index, one) in states.iter().enumerate() {
-        for other in &states[..index] {
-            let distance = apart(one, other);
-            if distance > largest || distance.is_nan() {
-                largest = distance;
-            }
-        }
-    }
-    largest
+    let pairs = states.iter().enumerate().flat_map(|(index, one)| {
+        let others = &states[..index];
+        others.iter().map(|other| apart(one, other))
+    });
+    largest(pairs)
 }
 
 /// The worth of the last digit of a joint position \[rad\].

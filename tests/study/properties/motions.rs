@@ -49,7 +49,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         let spacing = candidate.timestep * every as f64;
         let truth = ReferenceMotion::of(&arm, &start, &Law::FREE, spacing, steps / every);
         let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
-        for index in 0..truth.len() {
+        for index in 0..truth.samples.len() {
             live.advance(every as u64);
             let off = tip(live.state()).distance(tip(&truth.state(index).unwrap()));
             assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
@@ -88,7 +88,7 @@ fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Ta
         .map(|time| time - std::mem::replace(&mut before, *time))
         .collect();
     let truth = ReferenceMotion::between(&arm, &start, &Law::FREE, &intervals);
-    let off = (0..truth.len()).map(|index| {
+    let off = (0..truth.samples.len()).map(|index| {
         let position = &rollout.positions()[index + 1];
         truth.angle_error(index, position).unwrap()
     });

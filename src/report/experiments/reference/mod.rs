@@ -211,8 +211,10 @@ impl<'a, const N: usize> Followed<'a, N> {
 /// A motion at chosen times.
 #[derive(Debug, Clone)]
 pub struct ReferenceMotion<const N: usize> {
-    samples: Vec<Exact<N>>,
-    uncertainty: Vec<f64>,
+    /// Joint angles \[rad\] and rates \[rad/s\] of every sample.
+    pub samples: Vec<([DoubleDouble; N], [DoubleDouble; N])>,
+    /// How far the angles of each sample may be off: the largest difference between two settings \[rad\].
+    pub uncertainty: Vec<f64>,
 }
 
 impl<const N: usize> ReferenceMotion<N> {
@@ -246,30 +248,6 @@ impl<const N: usize> ReferenceMotion<N> {
             uncertainty: fine.iter().zip(&coarse).map(off).collect(),
             samples: fine,
         }
-    }
-
-    /// How many samples there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.samples.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.samples.is_empty()
-    }
-
-    /// How far the angles of each sample may be off: the largest difference between two settings \[rad\].
-    #[must_use]
-    pub fn uncertainty(&self) -> &[f64] {
-        &self.uncertainty
-    }
-
-    /// Joint angles \[rad\] and rates \[rad/s\] of every sample.
-    #[must_use]
-    pub fn samples(&self) -> &[([DoubleDouble; N], [DoubleDouble; N])] {
-        &self.samples
     }
 
     /// The state of sample `index`, rounded to doubles.

@@ -9,15 +9,14 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{Observation, Scenario, arm, each, held, is_near, short, verdict};
+use super::support::{Check, Observation, arm, each, held, is_near, short, verdict};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::state_after;
 use crate::report::experiments::measure::{
-    growth, measured_limit, measured_period, sampled_growth,
+    growth, in_substeps, live_at, measured_limit, measured_period,
 };
-use crate::report::experiments::sampled::SampledLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, equilibrium};
 use crate::study::matrix::largest;
@@ -25,66 +24,17 @@ use crate::study::stability::{
     Sampling, largest_delayed_period, largest_period, largest_timestep, step_matrix,
 };
 
-pub(super) const SCENES: [Scenario; 9] = [
-    Scenario::new(
-        "S07",
-        "2 links, kp 1e4, kd 200 and 60, setpoint (0.5, 0.8); all methods, held and continuous",
-        "measured limit within 1 % of the predicted one",
-        || limits_hold(gains(1e4, 0.0, [200.0, 60.0])),
-    ),
-    Scenario::new(
-        "S08",
-        "2 links, kp 1e6, kd 2000 and 600, setpoint (0.5, 0.8); all methods, held and continuous",
-        "measured limit within 1 % of the predicted one, a tenth of that at kp 1e4",
-        || limits_hold(gains(1e6, 0.0, [2000.0, 600.0])),
-    ),
-    Scenario::new(
-        "S09",
-        "2 links, kp 200, kd 500, setpoint (0.5, 0.8); all methods, held and continuous",
-        "measured limit within 1 % of the predicted one; 1 % beyond it the held arm chatters with period 2, bounded",
-        overdamped,
-    ),
-    Scenario::new(
-        "S10",
-        "2 links, gravity as usual, kp 1e4, kd 0, setpoint (0.5, 0.8)",
-        "held: every method unstable at every timestep; continuous: Euler and midpoint too, Verlet up to 2/ω, \
-         Runge-Kutta 4 up to 2.828/ω",
-        undamped,
-    ),
-    Scenario::new(
-        "S11",
-        "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); control period of 1, 10 and 100 steps, measured \
-         with 1 and 10",
-        "midpoint, Verlet and Runge-Kutta 4 share one limit of the period to 1 %, predicted and measured",
-        slow_control,
-    ),
-    Scenario::new(
-        "S12",
-        "2 links without gravity, kp 1000, kd 5 and 2; control period 20 ms of 100 steps of 0.2 ms, Runge-Kutta 4",
-        "unstable in period 20 ms although stable with control in every step of 0.2 ms: the controller, not the \
-         integrator",
-        held_push,
-    ),
-    Scenario::new(
-        "S13",
-        "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); each effort acts one period late",
-        "measured limit of the period within 1 % of the predicted one, and less than half of that without delay",
-        late_control,
-    ),
-    Scenario::new(
-        "S14",
-        "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a setpoint \
-         in reach",
-        "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after release the \
-         arm comes back",
-        windup,
-    ),
-    Scenario::new(
-        "S15",
-        "2 links, kp 100, kd 20, ki 2000, setpoint (0.5, 0.8); 1 ms, Runge-Kutta 4",
-        "unstable at every timestep, at the rate of the loop's own eigenvalue: the gains, not the integrator",
-        too_much_integral,
-    ),
+/// The checks of S07 to S15, in order.
+pub(super) const CHECKS: [Check; 9] = [
+    || limits_hold(gains(1e4, 0.0, [200.0, 60.0])),
+    || limits_hold(gains(1e6, 0.0, [2000.0, 600.0])),
+    overdamped,
+    undamped,
+    slow_control,
+    held_push,
+    late_control,
+    windup,
+    too_much_integral,
 ];
 
 const POSE: [f64; 2] = [0.5, 0.8];
@@ -221,8 +171,8 @@ fn held_push() -> Observation {
     };
     let limit = largest_period(&Linear::at_setpoint(&control), Method::Rk4, 100);
     let grows = |period, substeps| {
-        let growth = sampled_growth(&control.with_timestep(period), substeps, false);
-        growth.is_none_or(|growth| growth > 1.0)
+        let control = in_substeps(&control.with_timestep(period), substeps, false);
+        growth(&control, Sampling::Held).is_none_or(|growth| growth > 1.0)
     };
     let (slow, fast) = (grows(0.02, 100), grows(2e-4, 1));
     let words = |grows| if grows { "grows" } else { "decays" };
@@ -319,11 +269,11 @@ fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
     let rest = equilibrium(control);
     let mut start = State::at_rest(rest.position);
     start.position[0] += 1e-9;
-    let mut sampled = SampledLoop::new(&control.with_timestep(h), 1, &rest, start);
+    let mut live = live_at(&control.with_timestep(h), &rest, start);
     let windows = [(); 4].map(|()| {
         largest((0..STEPS).map(|_| {
-            sampled.advance();
-            (sampled.state.position[0] - rest.position[0]).abs()
+            live.step();
+            (live.state().position[0] - rest.position[0]).abs()
         }))
     });
     (windows[3] / windows[2]).ln() / (2.0 * swing)

@@ -10,9 +10,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{
-    Observation, Scenario, apart, arm, each, fastest, free, held, is_near, verdict,
-};
+use super::support::{Check, Observation, apart, arm, each, fastest, free, held, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -25,62 +23,17 @@ use crate::study::matrix::largest;
 use crate::study::rollout::{Deviation, Rollout, RolloutRequest};
 use crate::study::stability::{Sampling, largest_timestep};
 
-pub(super) const SCENES: [Scenario; 9] = [
-    Scenario::new(
-        "S27",
-        "2 links, 9.81, 981, 1e-12 and negative gravity; Runge-Kutta 4",
-        "the error goes with (timestep² gravity)²; tiny gravity lets the arm fall by it; negative gravity is refused",
-        gravity,
-    ),
-    Scenario::new(
-        "S28",
-        "2 links, 0.3 rad from hanging, 10^7 steps of 1 µs, Runge-Kutta 4",
-        "error at the floor of rounding, under 1e-13 rad; the time is exactly 10^7 times 1 µs",
-        tiny_steps,
-    )
-    .slow(),
-    Scenario::new(
-        "S29",
-        "2 links, 0.01 rad from hanging, free, and held by the default gains; all methods",
-        "flies apart exactly where that is predicted; the state stays finite in any case",
-        huge_steps,
-    ),
-    Scenario::new(
-        "S30",
-        "2 links, first joint wound by 1e8 rad; 1 s at 1 ms, Runge-Kutta 4",
-        "as the unwound arm, to ten times the spacing of doubles at 1e8 (1.5e-8 rad); accelerations to 1e-13",
-        wound,
-    ),
-    Scenario::new(
-        "S31",
-        "2 links, default gains, 1000 steps of 1 ms",
-        "every state finite; a step that overflows is not taken and is reported",
-        huge_setpoints,
-    ),
-    Scenario::new(
-        "S32",
-        "2 links without gravity, kp 100, kd 10, 1e-310 rad from the setpoint",
-        "linear: 1e-10 times the motion from 1e-300 rad, to the few digits that subnormals keep",
-        subnormal_start,
-    ),
-    Scenario::new(
-        "S33",
-        "2 links of 1e-160 m, so that m l² is subnormal; 1000 steps of 1 ms",
-        "taken, as the contract says, and every state finite: a step that overflows is not taken and is reported",
-        subnormal_inertia,
-    ),
-    Scenario::new(
-        "S34",
-        "NaN, infinite, negative and zero masses, lengths and gravity",
-        "refused by name",
-        refused,
-    ),
-    Scenario::new(
-        "S35",
-        "2 links, inner mass 0",
-        "refused by name: a mass matrix without inertia can't be solved",
-        || refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be"),
-    ),
+/// The checks of S27 to S35, in order.
+pub(super) const CHECKS: [Check; 9] = [
+    gravity,
+    tiny_steps,
+    huge_steps,
+    wound,
+    huge_setpoints,
+    subnormal_start,
+    subnormal_inertia,
+    refused,
+    || refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be"),
 ];
 
 /// The largest error of a free swing against the study's reference, and the run \[rad\].

@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::control::MODERATE;
 use super::support::{
-    Observation, Scenario, arm, digits_lost, each, fastest, free, held, is_near, short, states,
+    Check, Observation, arm, digits_lost, each, fastest, free, held, is_near, short, states,
 };
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
@@ -26,87 +26,27 @@ use crate::study::stability::{Sampling, largest_timestep, limits};
 /// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
 const DIGITS: f64 = 2.5;
 
-const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured \
-                     within 1 % of predicted";
-const ANYWHERE: &str = "worst of 200 states loses at most 2.5 digits";
-
-pub(super) const SCENES: [Scenario; 11] = [
-    Scenario::new(
-        "S16",
-        "2 links, outer mass 1e-3 kg, kp 200 and 100, kd 30 and 12",
-        LIGHT,
-        || light_outer_link(1e-3),
-    ),
-    Scenario::new(
-        "S17",
-        "2 links, outer mass 1e-6 kg, kp 200 and 100, kd 30 and 12",
-        LIGHT,
-        || light_outer_link(1e-6),
-    ),
-    Scenario::new(
-        "S18",
-        "2 links, outer mass 1e-9 kg, kp 200 and 100, kd 30 and 12",
-        LIGHT,
-        || light_outer_link(1e-9),
-    ),
-    Scenario::new(
-        "S19",
-        "3 links, outer mass 1e3 kg, anywhere",
-        ANYWHERE,
-        || heavy_outer_link(1e3),
-    ),
-    Scenario::new(
-        "S20",
-        "3 links, outer mass 1e6 kg, anywhere",
-        ANYWHERE,
-        || heavy_outer_link(1e6),
-    ),
-    Scenario::new(
-        "S21",
-        "3 links, outer mass 1e9 kg, anywhere",
-        ANYWHERE,
-        || heavy_outer_link(1e9),
-    ),
-    Scenario::new(
-        "S22",
-        "3 links, outer mass 1e9 kg, hanging within 1e-6 rad of straight",
-        "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 swings on \
-         at 1.6e-5 s and flies apart at 2e-5 s",
-        heavy_link_stretched,
-    ),
-    Scenario::new(
-        "S23",
-        "3 links, outer length 1e3 m, then 1e-3 m, anywhere",
-        ANYWHERE,
-        || each([1e3, 1e-3].map(long_outer_link)),
-    ),
-    Scenario::new(
-        "S24",
-        "3 links exactly in line, any direction, rates within 2 rad/s",
-        "accelerations finite, at most 2.5 digits lost",
-        || each([loses_few(&Arm::default(), [0.0; 3], 0.0)]),
-    ),
-    Scenario::new(
-        "S25",
-        "3 links folded back at the double next to π, any direction; default gains",
-        "as stretched; and no pose's limit is below the minimum over poses by more than 1 %",
-        folded,
-    ),
-    Scenario::new(
-        "S26",
-        "2 and 3 links stretched, no gravity, 1000 rad/s",
-        "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 %, \
-         predicted and measured",
-        || {
-            each(
-                [
-                    whirl::<2>([0.76376, 1.0801]),
-                    whirl::<3>([0.42370, 0.59920]),
-                ]
-                .concat(),
-            )
-        },
-    ),
+/// The checks of S16 to S26, in order.
+pub(super) const CHECKS: [Check; 11] = [
+    || light_outer_link(1e-3),
+    || light_outer_link(1e-6),
+    || light_outer_link(1e-9),
+    || heavy_outer_link(1e3),
+    || heavy_outer_link(1e6),
+    || heavy_outer_link(1e9),
+    heavy_link_stretched,
+    || each([1e3, 1e-3].map(long_outer_link)),
+    || each([loses_few(&Arm::default(), [0.0; 3], 0.0)]),
+    folded,
+    || {
+        each(
+            [
+                whirl::<2>([0.76376, 1.0801]),
+                whirl::<3>([0.42370, 0.59920]),
+            ]
+            .concat(),
+        )
+    },
 ];
 
 /// Whether an arm loses few digits around a pose, and how many.

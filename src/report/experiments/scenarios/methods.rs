@@ -7,7 +7,7 @@
     reason = "indices name the joints of arrays of that length"
 )]
 
-use super::support::{Noise, Observation, Scenario, apart, each, free, verdict};
+use super::support::{Check, Noise, Observation, apart, each, free, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
@@ -18,32 +18,8 @@ use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
 use crate::study::taylor::TaylorReference;
 
-pub(super) const SCENES: [Scenario; 4] = [
-    Scenario::new(
-        "S36",
-        "20 000 random oscillators, all methods",
-        "one step is the step matrix to rounding; stable exactly where the closed forms say so",
-        one_joint,
-    ),
-    Scenario::new(
-        "S37",
-        "3 links swinging; method and timestep change between steps",
-        "position, velocity and time keep their bits at the change; a swing changed halfway keeps its order",
-        changes,
-    ),
-    Scenario::new(
-        "S38",
-        "2 links, 1 s forward, velocities turned round, 1 s back; at 8, 4 and 2 ms",
-        "comes back to within an error of the method's order; no method is exactly reversible here",
-        there_and_back,
-    ),
-    Scenario::new(
-        "S39",
-        "3 links, 50 random states, 1 ms, all methods",
-        "estimated per true local error, median 0.98 to 1.03",
-        step_doubling,
-    ),
-];
+/// The checks of S36 to S39, in order.
+pub(super) const CHECKS: [Check; 4] = [one_joint, changes, there_and_back, step_doubling];
 
 /// Stable by the closed forms, for `x'' = -ω² x - 2 z ω x'` with `w = (ω h)²`, `d = 2 z ω h`.
 fn closed_form(method: Method, w: f64, d: f64) -> bool {

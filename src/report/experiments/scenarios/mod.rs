@@ -2,7 +2,8 @@
 //!
 //! Expectations come from theory or from the arm's own prediction, never from an earlier run. Some are verdicts of the
 //! study alone: efforts that are capped or late, and arms that the contract allows but a careful user would not. A
-//! scene that falls short says so. `page/scenes.js` has the names, and a live arm for each.
+//! scene that falls short says so. `scenes.txt` has the expectations. `page/scenes.js` has the names, and a live arm
+//! for each.
 //!
 //! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. A seed in the source
 //! gives what is random.
@@ -16,15 +17,30 @@ mod support;
 
 pub use support::{Observation, Scenario};
 
+/// A line for each scene: its name, its parameters, the behaviour of a correct arm, and whether it is `slow`.
+const SCENES: &str = include_str!("scenes.txt");
+
 /// All scenes, in order.
 #[must_use]
 pub fn all() -> Vec<Scenario> {
-    [
-        motion::SCENES.as_slice(),
-        control::SCENES.as_slice(),
-        inertia::SCENES.as_slice(),
-        extreme::SCENES.as_slice(),
-        methods::SCENES.as_slice(),
+    let checks = [
+        motion::CHECKS.as_slice(),
+        control::CHECKS.as_slice(),
+        inertia::CHECKS.as_slice(),
+        extreme::CHECKS.as_slice(),
+        methods::CHECKS.as_slice(),
     ]
-    .concat()
+    .concat();
+    let scene = |(line, check): (&'static str, _)| {
+        let mut columns = line.split(" | ");
+        let mut next = || columns.next().unwrap_or_default();
+        Scenario {
+            id: next(),
+            parameters: next(),
+            expected: next(),
+            slow: next() == "slow",
+            check,
+        }
+    };
+    SCENES.lines().zip(checks).map(scene).collect()
 }

@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::support::{Observation, Scenario, apart, arm, each, free, is_near, verdict};
+use super::support::{Check, Observation, apart, arm, each, free, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
@@ -18,49 +18,14 @@ use crate::study::linear::Linear;
 use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
 
-pub(super) const SCENES: [Scenario; 6] = [
-    Scenario::new(
-        "S01",
-        "3 links, gravity 0, at rest, no control; 10^4 steps of 1 ms, all methods",
-        "the state keeps its bits",
-        rest_without_gravity,
-    ),
-    Scenario::new(
-        "S02",
-        "3 links hanging at the double next to -π/2; 10^6 steps of 1 ms",
-        "midpoint, Verlet and Runge-Kutta 4 drift less than 1e-12 rad; under Euler rounding grows at the rate of its \
-         step matrix, to 2 %",
-        hanging_at_rest,
-    )
-    .slow(),
-    Scenario::new(
-        "S03",
-        "2 links, 1e-12 rad off upright; 3 s at 1 ms, all methods",
-        "leaves at the rate that the step matrix has, which is the unstable eigenvalue to the method's order",
-        upright,
-    ),
-    Scenario::new(
-        "S04",
-        "2 links, 0.3 rad from hanging, 1000 s at 1 ms, all methods",
-        "energy: Euler gains over 1 J, midpoint gains under 1e-3 J, Verlet stays within 1e-4 J, Runge-Kutta 4 within \
-         1e-9 J",
-        regular_swing,
-    )
-    .slow(),
-    Scenario::new(
-        "S05",
-        "2 links released from horizontal; 200 s at 1 ms, Runge-Kutta 4",
-        "neighbours part at 1.2 per second, give or take a quarter",
-        || chaotic::<2>(1.2),
-    )
-    .slow(),
-    Scenario::new(
-        "S06",
-        "3 links released from horizontal; 200 s at 1 ms, Runge-Kutta 4",
-        "neighbours part at 1.9 per second, give or take a quarter",
-        || chaotic::<3>(1.9),
-    )
-    .slow(),
+/// The checks of S01 to S06, in order.
+pub(super) const CHECKS: [Check; 6] = [
+    rest_without_gravity,
+    hanging_at_rest,
+    upright,
+    regular_swing,
+    || chaotic::<2>(1.2),
+    || chaotic::<3>(1.9),
 ];
 
 fn rest_without_gravity() -> Observation {

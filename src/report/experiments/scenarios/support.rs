@@ -27,29 +27,13 @@ pub struct Scenario {
     pub expected: &'static str,
     /// Whether it takes seconds.
     pub slow: bool,
-    check: fn() -> Observation,
+    pub(super) check: Check,
 }
 
+/// Runs a scene.
+pub(super) type Check = fn() -> Observation;
+
 impl Scenario {
-    pub(super) const fn new(
-        id: &'static str,
-        parameters: &'static str,
-        expected: &'static str,
-        check: fn() -> Observation,
-    ) -> Self {
-        Self {
-            id,
-            parameters,
-            expected,
-            slow: false,
-            check,
-        }
-    }
-
-    pub(super) const fn slow(self) -> Self {
-        Self { slow: true, ..self }
-    }
-
     /// Runs the scene.
     #[must_use]
     pub fn run(&self) -> Observation {
