@@ -1,7 +1,6 @@
-//! One slow or dead client never delays another, and costs a bounded amount of memory.
+//! A provider that never reads costs its callers a refusal, and the program a bounded amount of memory.
 //!
-//! **Invariant:** nothing here is told by a clock: the fast client goes in lockstep, the slow one is shown by counts and
-//! by the program's peak memory.
+//! **Invariant:** nothing here is timed: refusals are counted, and memory is the program's peak.
 
 use crate::common::{Runtime, provide};
 use pendularm::actors::gateway::limits::MAX_BACKLOG;

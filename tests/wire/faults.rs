@@ -1,4 +1,4 @@
-//! Faults of a running program: computations that don't end, an end in the middle of everything.
+//! The end of a program in the middle of everything.
 //!
 //! **Invariant:** what a client is owed it gets, or it is told; nobody else notices.
 
