@@ -18,7 +18,7 @@ cd "$(dirname "$0")/.."
 seconds=${TIME:-60}
 runs=${RUNS:-}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
-all="frame op fields cbor http connection websocket runtime"
+all="frame op fields cbor http session"
 
 say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }
@@ -84,8 +84,7 @@ repeat() {
 # Executions of a target for each of RUNS: about what it does in five milliseconds.
 share() {
     case $1 in
-        runtime) echo 5 ;;
-        connection | websocket) echo 10 ;;
+        session) echo 20 ;;
         http) echo 50 ;;
         *) echo 100 ;;
     esac

@@ -130,20 +130,6 @@ fn a_solution_is_the_closed_form_for_the_arms_present_lengths_and_pose() {
 }
 
 #[test]
-fn two_links_ignore_phi_even_a_malformed_one() {
-    in_virtual_time(async {
-        let mut bench = IkBench::new([1.0, 1.0], [0.0; 2]);
-        let plain = bench.read_and_solve(json!({"x": 0.5, "y": 0.5})).await;
-        for phi in [json!(3), json!("north"), json!([1]), json!(null)] {
-            let with_phi = bench
-                .read_and_solve(json!({"x": 0.5, "y": 0.5, "phi": phi}))
-                .await;
-            assert_eq!(with_phi, plain);
-        }
-    });
-}
-
-#[test]
 fn a_node_that_asks_gets_what_a_client_gets() {
     in_virtual_time(async {
         let mut bench = IkBench::new([1.0; 3], [0.0; 3]);

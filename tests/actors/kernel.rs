@@ -6,10 +6,9 @@
 use std::cell::Cell;
 use std::time::Duration;
 
+use crate::nodes::work_in_this_thread;
 use crate::stage::{Client, Stage, ms, pass};
 use crate::system::in_virtual_time;
-use pendularm::actors::compute::study::Study;
-use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm_wasm::Kernel;
@@ -42,19 +41,8 @@ where
     Gains<N>: Default,
 {
     async fn start() -> Self {
-        let workers = WorkerPool::without_threads();
-        let pool = workers.clone();
-        actix::spawn(async move {
-            loop {
-                while workers.turn() {}
-                pass(ms(1)).await;
-            }
-        });
-        let stage = Stage::<N>::with_nodes(SEED, |arm, nodes| {
-            let study = Study::new(arm.clone().recipient(), pool);
-            Study::attach(&actix::Actor::start(study), nodes);
-        });
-        let stage = stage.await;
+        let stage = Stage::<N>::with_seed(SEED).await;
+        work_in_this_thread(stage.pool.clone());
         BEGAN.set(Some(Instant::now()));
         let kernel = Kernel::new(clock, SEED);
         let client = stage.connect();

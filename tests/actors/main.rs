@@ -37,9 +37,10 @@ mod kernel;
 mod listener;
 mod log_repeats;
 mod memory;
+#[path = "../support/nodes.rs"]
+mod nodes;
 mod pacing;
 mod paths;
-#[cfg(feature = "record")]
 #[cfg(feature = "record")]
 mod recorder;
 mod refusals;

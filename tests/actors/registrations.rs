@@ -5,7 +5,6 @@
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use pendularm::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
-use pendularm::protocol::limits::MAX_NAME;
 use serde_json::{Value, json};
 
 /// Registrations that fit, each with names of so many bytes.
@@ -124,32 +123,5 @@ fn so_many_calls_and_goals_of_a_connection_wait_for_other_clients() {
             );
             assert!(refused[0].contains("keeps too much"), "{refused:?}");
         }
-    });
-}
-
-#[test]
-fn a_name_has_so_many_bytes() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut client = gateway.connect(WIDE);
-        let name = |length: usize| format!("/{}", "x".repeat(length - 1));
-        client.subscribe(&name(MAX_NAME)).await;
-        client
-            .send(json!({"op": "subscribe", "topic": name(MAX_NAME + 1)}))
-            .await;
-        let status = client.receive().await;
-        assert_eq!(status["level"], "error");
-        assert!(
-            status["msg"].as_str().unwrap().contains("topic"),
-            "{status}"
-        );
-        assert!(
-            status.to_string().len() < MAX_NAME,
-            "the name is not repeated at length"
-        );
-        client
-            .send(json!({"op": "subscribe", "topic": "/t", "id": name(MAX_NAME)}))
-            .await;
-        assert_eq!(client.receive().await["level"], "error", "quotes count");
     });
 }

@@ -2,43 +2,32 @@
 
 use crate::system::in_virtual_time;
 use actix::prelude::*;
-use pendularm::actors::arm::ik_action::GoalTracker;
-use pendularm::actors::arm::sim::{ArmSim, SetParams};
-use pendularm::actors::compute::integration::Integration;
-use pendularm::actors::compute::study::Study;
+use pendularm::actors::arm::sim::SetParams;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::node::ask;
 #[cfg(feature = "record")]
 use pendularm::actors::recorder::Recorder;
 use pendularm::actors::resources::aside::{PLACES, WorkKind, aside};
-use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{
-    ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, RosapiNode, SetParam,
+    GetParam, NotSet, ParamChange, ParameterValue, RosapiNode, SetParam,
 };
-use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
-use pendularm::math::arm::Arm;
-use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{self, Service};
 use pendularm::protocol::ros::parameters::Parameter;
 use serde_json::{Value, json};
 
-use crate::stage::start_goal_nodes;
+use crate::nodes::start_nodes;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 
-/// A gateway with the arm and `rosapi` behind it.
+/// A gateway with all nodes, and `rosapi`.
 async fn start() -> (Gateway, Addr<RosapiNode<2>>) {
     let gateway = Gateway::bare().await;
-    let publish = gateway.registry.clone().recipient();
-    let gauges = std::sync::Arc::clone(&gateway.gauges);
-    let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish, gauges).start();
-    let parameters = ArmParameters::of(&arm);
-    let rosapi = RosapiNode::new(gateway.registry.clone().recipient(), parameters).start();
     let mut nodes = Nodes::default();
-    RosapiNode::attach(&rosapi, &mut nodes);
+    let pool = WorkerPool::without_threads();
+    let started = start_nodes(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
     gateway.registry.send(Attach(nodes)).await.unwrap();
-    (gateway, rosapi)
+    (gateway, started.rosapi)
 }
 
 #[test]
@@ -69,28 +58,13 @@ fn a_parameter_is_set_and_read_as_a_value() {
 fn every_service_that_is_listed_is_served() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let publish = || gateway.registry.clone().recipient();
-        let gauges = std::sync::Arc::clone(&gateway.gauges);
-        let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish(), gauges).start();
         let mut nodes = Nodes::default();
-        ArmSim::attach(&arm, &mut nodes);
-        let tracker = GoalTracker::of(&arm);
-        let pose = arm.clone().recipient();
-        start_goal_nodes(&gateway.registry, pose, tracker, 1, &mut nodes);
         let pool = WorkerPool::without_threads();
-        let study = Study::<2>::new(arm.clone().recipient(), pool.clone()).start();
-        Study::attach(&study, &mut nodes);
-        Integration::attach(&Integration::new(pool).start(), &mut nodes);
-        let parameters = ArmParameters::of(&arm);
-        Parameters::attach(&Parameters::new(parameters.clone()).start(), &mut nodes);
-        let rosapi = RosapiNode::new(gateway.registry.clone().recipient(), parameters).start();
-        RosapiNode::attach(&rosapi, &mut nodes);
-        let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();
-        TfRepublisher::attach(&frames, &mut nodes);
+        let started = start_nodes::<2>(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
         #[cfg(feature = "record")]
         {
             let registry = gateway.registry.clone().recipient();
-            let recorder = Recorder::<2>::new(arm.recipient(), registry, None, 1).start();
+            let recorder = Recorder::new(started.arm.recipient(), registry, None, 1).start();
             Recorder::attach(&recorder, &mut nodes);
         }
         let questions = catalog::Rosapi::ALL.map(Service::Rosapi);

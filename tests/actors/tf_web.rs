@@ -178,24 +178,6 @@ async fn heard_of(viewer: &mut Client, feedback: &str) -> Vec<Value> {
 }
 
 #[test]
-fn a_page_that_is_reloaded_leaves_no_wishes_behind() {
-    in_virtual_time(async {
-        let (stage, mut viewer) = Stage::<2>::with_a_floating_arm().await;
-        let feedback = format!("{ACTION}/feedback");
-        viewer.subscribe(&feedback).await;
-        viewer.send(&published("mine")).await;
-        for load in 0..70 {
-            let mut page = stage.connect();
-            page.subscribe(&feedback).await;
-            page.send(&published(&format!("page {load}"))).await;
-            page.settle().await;
-        }
-        viewer.messages_for(ms(100), &feedback).await;
-        assert_eq!(heard_of(&mut viewer, &feedback).await, ["mine"]);
-    });
-}
-
-#[test]
 fn a_published_wish_ends_with_its_connection_or_when_that_unsubscribes_from_feedback() {
     in_virtual_time(async {
         let (stage, mut viewer) = Stage::<2>::with_a_floating_arm().await;

@@ -1,10 +1,9 @@
 //! The one seeded generator, the log of all that it drew and of all that was heard, and the first thing that went wrong.
 
 use std::cell::{Cell, RefCell};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt;
 
-use serde_json::Value;
 use tokio::time::Instant;
 
 /// Prefix of a count that is the largest of many, and no sum.
@@ -52,10 +51,6 @@ pub struct Court {
     pub turns: Cell<u64>,
     /// How often the clock has jumped.
     pub jumps: Cell<u64>,
-    /// The arm's answer to the call of that id, as the model has it: the values, and whether all was done.
-    pub expected: RefCell<BTreeMap<String, (Value, bool)>>,
-    /// All that has ever kept the arm from its setpoint, as a warning says it.
-    pub obstacles: RefCell<BTreeSet<String>>,
     /// Counts of what was done, for those who want to know what a run was made of.
     pub tally: RefCell<BTreeMap<&'static str, u64>>,
 }
@@ -71,8 +66,6 @@ impl Court {
             failure: RefCell::default(),
             turns: Cell::new(0),
             jumps: Cell::new(0),
-            expected: RefCell::default(),
-            obstacles: RefCell::default(),
             tally: RefCell::default(),
         }
     }

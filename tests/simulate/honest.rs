@@ -14,41 +14,20 @@ use crate::pipe::Fate;
 /// The answer that a call must have.
 #[derive(Debug, Clone)]
 pub enum Expect {
-    /// As the arm's double has it; false where a field was wrong.
-    Arm { is_good: bool },
+    /// Success.
+    Success,
     /// A refusal.
     Refusal,
     /// Success, with values that have this member.
     Member(&'static str),
-    /// Joints that put the hand there.
-    Solution { x: f64, y: f64 },
-    /// The result of the offline computation.
-    Computed(Computed),
+    /// A computation with so many entries in each column; a short one takes a few turns.
+    Computed { entries: usize, is_short: bool },
     /// The answer of another client, or a failure that has its reason: the number of the call.
     Forwarded(u64),
     /// The result of a goal, and whether feedback may come before it.
     Goal { has_feedback: bool },
     /// One answer, whatever it says.
     Anything,
-}
-
-/// A computation that can be made offline.
-#[derive(Debug, Clone)]
-pub enum Computed {
-    Particle {
-        function: &'static str,
-        x0: f64,
-        dt: f64,
-        steps: u64,
-        method: usize,
-    },
-    Rollout {
-        q0: Vec<f64>,
-        duration: f64,
-        timestep: f64,
-        method: usize,
-        samples: u64,
-    },
 }
 
 /// A call that waits for its answer.
@@ -69,7 +48,7 @@ pub struct Call {
 impl Call {
     /// Whether the pool of computations answers it.
     pub fn is_computation(&self) -> bool {
-        matches!(self.expect, Expect::Computed(_))
+        matches!(self.expect, Expect::Computed { .. })
             || self.what.starts_with("/study/")
             || self.what.starts_with("study/")
             || self.what.contains("arm_sim/integration_step")

@@ -6,7 +6,7 @@
 //! | `court` | the one generator, the log, the first failure |
 //! | `world`, `pipe` | the runtime, its pool and its pipes |
 //! | `workload`, `honest` | what clients ask, and what they wait for |
-//! | `model`, `mirror` | what must come back; the arm's double |
+//! | `model` | what must come back |
 //! | `hostile` | clients that keep no rule |
 //! | `play` | the course of a seed, and what is checked in it |
 //!
@@ -42,8 +42,10 @@ mod hostile;
 #[path = "../../fuzz/src/json.rs"]
 #[allow(dead_code, reason = "the fuzz targets use its other parts too")]
 mod json;
-mod mirror;
 mod model;
+#[path = "../support/nodes.rs"]
+#[allow(dead_code, reason = "the tests of the actors use its other parts too")]
+mod nodes;
 mod pipe;
 mod plan;
 mod play;

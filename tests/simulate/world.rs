@@ -1,4 +1,4 @@
-//! The whole runtime in one thread and in virtual time: registry, connections on pipes, the arm behind its tap, every node, and the
+//! The whole runtime in one thread and in virtual time: registry, connections on pipes, every node, and the
 //! pool of computations, which has its turns when the simulation has.
 
 use std::cell::Cell;
@@ -8,27 +8,19 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use actix::prelude::*;
-use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::arm::sim::{ArmSim, Consult};
-use pendularm::actors::compute::integration::Integration;
-use pendularm::actors::compute::study::Study;
+use pendularm::actors::arm::sim::Consult;
 use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::resources::work_clock;
-use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
-use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
-use pendularm::protocol::catalog::{Node, Service, Topic};
 use tokio::io::{DuplexStream, duplex};
 use tokio::time::sleep;
 
 use crate::court::Court;
-use crate::mirror::{Called, Compare, Sent, Tap};
+use crate::nodes::start_nodes;
 use crate::pipe::{Fate, MEANT, Pipe};
 
 /// The cost of a look at the clock of work: a dozen to what the arm may work at a time, three to a slice.
@@ -60,7 +52,6 @@ pub struct World {
     pub registry: Addr<Registry>,
     pub gauges: Arc<Gauges>,
     pub pool: WorkerPool,
-    tap: Recipient<Compare>,
     court: Rc<Court>,
     /// Bytes that all pipes have moved so far.
     moved: Rc<Cell<u64>>,
@@ -77,19 +68,13 @@ impl World {
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let pool = WorkerPool::without_threads();
         let mut nodes = Nodes::default();
-        let start = if links == 2 {
-            start_nodes::<2>
-        } else {
-            start_nodes::<3>
-        };
-        let tap = start(&registry, &gauges, &pool, seed, court, &mut nodes);
-        Integration::attach(&Integration::new(pool.clone()).start(), &mut nodes);
+        let start = if links == 2 { start::<2> } else { start::<3> };
+        start(&registry, &gauges, &pool, seed, &mut nodes);
         registry.send(Attach(nodes)).await.expect("a registry");
         Self {
             registry,
             gauges,
             pool,
-            tap,
             court: Rc::clone(court),
             moved: Rc::default(),
         }
@@ -141,19 +126,10 @@ impl World {
         step
     }
 
-    /// The arm is what its double is.
-    pub async fn compare(&self) {
-        if self.tap.send(Compare).await.is_err() {
-            self.court.wrong("the arm's tap does not answer".to_owned());
-        }
-    }
-
     /// The clock jumps.
     pub async fn jump(&self, time: Duration) {
-        self.compare().await;
         tokio::time::advance(time).await;
         self.court.jumps.set(self.court.jumps.get() + 1);
-        self.compare().await;
     }
 
     /// A computation of nobody's that panics.
@@ -182,65 +158,16 @@ impl Computation for Trap {
     fn refuse(&mut self, _: &str) {}
 }
 
-/// All that `actors/runtime.rs` starts, in one thread, with the tap before the arm.
-fn start_nodes<const N: usize>(
+/// All that `actors/runtime.rs` starts, in one thread.
+fn start<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     pool: &WorkerPool,
     seed: u64,
-    court: &Rc<Court>,
     nodes: &mut Nodes,
-) -> Recipient<Compare>
-where
+) where
     Gains<N>: Default,
 {
-    let publish = registry.clone().recipient();
-    let arm = ArmSim::<N>::new(
-        Arm::default(),
-        Gains::default(),
-        publish.clone(),
-        Arc::clone(gauges),
-    );
-    let arm = arm.start();
-    ArmSim::attach(&arm, nodes);
-    let tap = Tap::new(arm.clone(), Gains::default(), Rc::clone(court)).start();
-    for service in Service::ALL {
-        if service.owner() == Node::ArmSim && !service.is_computation() {
-            let tap = tap.clone();
-            let route = Box::new(move |call| tap.do_send(Called(call)));
-            nodes.services.insert(service, route);
-        }
-    }
-    let listener = tap.clone();
-    let route = Box::new(move |message| listener.do_send(Sent(message)));
-    nodes.listeners.insert(Topic::JointTrajectory, route);
-    let parameters = ArmParameters {
-        params: tap.clone().recipient(),
-        gains: tap.clone().recipient(),
-        integrator: tap.clone().recipient(),
-        period: arm.clone().recipient(),
-        time: tap.clone().recipient(),
-    };
-    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
-    RosapiNode::attach(&rosapi, nodes);
-    let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
-    Study::attach(&study, nodes);
-    arm.do_send(Consult(study.recipient()));
-    let ik = Ik::<N>::new(arm.clone().recipient()).start();
-    Ik::attach(&ik, nodes);
-    let tracker = GoalTracker {
-        command: tap.clone().recipient(),
-        ..GoalTracker::of(&arm)
-    };
-    let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
-    IkAction::attach(&action, nodes);
-    let goals = GoalClient {
-        send: action.clone().recipient(),
-        cancel: action.clone().recipient(),
-        barrier: action.recipient(),
-    };
-    let rng = fastrand::Rng::with_seed(seed);
-    let trial = IkTrial::<N>::new(arm.recipient(), goals, publish, rng).start();
-    IkTrial::attach(&trial, nodes);
-    tap.recipient()
+    let started = start_nodes::<N>(registry, gauges, pool, seed, nodes);
+    started.arm.do_send(Consult(started.study.recipient()));
 }

@@ -1,8 +1,8 @@
-//! Parts that the tests of the arm share: reading its messages, sending it somewhere, and the gravity load by another route.
+//! Parts that the tests of the arm share: reading its messages, and waiting for its time.
 
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::common::{Client, PATIENCE};
 
@@ -25,16 +25,6 @@ pub fn time(stamp: &Value) -> f64 {
     assert!(nanosec < 1_000_000_000, "{stamp}");
     // Divided, which is rounded rightly: the time that was stamped comes back.
     sec + nanosec as f64 / 1e9
-}
-
-/// A trajectory of one point for these positions.
-pub fn trajectory(positions: &[f64]) -> Value {
-    json!({"points": [{"positions": positions}]})
-}
-
-/// Sends a message to `/joint_trajectory`; later calls happen after it.
-pub fn send_trajectory(client: &mut Client, msg: &Value) {
-    client.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg}));
 }
 
 /// The state as it is now: the first `/joint_states` after the response to a call, which none from before it follows.

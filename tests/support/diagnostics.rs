@@ -29,9 +29,3 @@ pub fn number(status: &Value, key: &str) -> f64 {
 pub fn arm_status(client: &mut Client) -> Value {
     status(&client.message("/diagnostics"), "arm_sim").clone()
 }
-
-/// A count of the gateway's in the next message.
-pub fn gateway_count(client: &mut Client, key: &str) -> u64 {
-    let message = client.message("/diagnostics");
-    text(status(&message, "gateway"), key).parse().unwrap()
-}

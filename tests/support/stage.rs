@@ -8,24 +8,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub(crate) use crate::json::{number, numbers};
+use crate::nodes::{Started, start_nodes};
 use actix::prelude::*;
-use pendularm::actors::arm::follow::{PathArm, PathFollower};
-use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalTracker, IkAction, SendGoal,
 };
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::arm::ik_trial::IkTrial;
 use pendularm::actors::arm::sim::{
     AddBarrier, ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset,
     SetParams, SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
+use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Ask, Call, Publish, Reply};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
-use pendularm::math::arm::Arm;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
@@ -49,6 +47,8 @@ pub struct Stage<const N: usize> {
     pub arm: Addr<ArmSim<N>>,
     pub action: Addr<IkAction<N>>,
     pub trial: Addr<IkTrial<N>>,
+    /// Computations, which nobody does unless a test has its turns.
+    pub pool: WorkerPool,
     gauges: Arc<Gauges>,
 }
 
@@ -61,35 +61,21 @@ where
     }
 
     pub async fn with_seed(seed: u64) -> Self {
-        Self::with_nodes(seed, |_, _| {}).await
-    }
-
-    /// The same with other nodes beside the arm.
-    pub async fn with_nodes(seed: u64, others: impl FnOnce(&Addr<ArmSim<N>>, &mut Nodes)) -> Self {
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let mut nodes = Nodes::default();
-        let arm = ArmSim::<N>::new(
-            Arm::default(),
-            Gains::default(),
-            registry.clone().recipient(),
-            Arc::clone(&gauges),
-        )
-        .start();
-        ArmSim::attach(&arm, &mut nodes);
-        PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
-        let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient());
-        TfRepublisher::attach(&frames.start(), &mut nodes);
-        let tracker = GoalTracker::of(&arm);
-        let pose = arm.clone().recipient();
-        let (action, trial) = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
-        others(&arm, &mut nodes);
+        let pool = WorkerPool::without_threads();
+        let started = start_nodes(&registry, &gauges, &pool, seed, &mut nodes);
+        let Started {
+            arm, action, trial, ..
+        } = started;
         registry.send(Attach(nodes)).await.unwrap();
         Self {
             registry,
             arm,
             action,
             trial,
+            pool,
             gauges,
         }
     }
@@ -184,30 +170,6 @@ where
         "nobody sends the end of a call: it is dropped"
     );
     answer
-}
-
-/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to; gives the last two.
-pub fn start_goal_nodes<const N: usize>(
-    registry: &Addr<Registry>,
-    pose: Recipient<ArmPose<N>>,
-    tracker: GoalTracker<N>,
-    seed: u64,
-    nodes: &mut Nodes,
-) -> (Addr<IkAction<N>>, Addr<IkTrial<N>>) {
-    let publish = || registry.clone().recipient();
-    let ik = Ik::<N>::new(pose.clone()).start();
-    Ik::attach(&ik, nodes);
-    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
-    IkAction::attach(&action, nodes);
-    let goals = GoalClient {
-        send: action.clone().recipient(),
-        cancel: action.clone().recipient(),
-        barrier: action.clone().recipient(),
-    };
-    let rng = fastrand::Rng::with_seed(seed);
-    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
-    IkTrial::attach(&trial, nodes);
-    (action, trial)
 }
 
 /// A client in the registry's own thread, through an in-memory pipe.

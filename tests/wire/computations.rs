@@ -57,16 +57,3 @@ fn the_largest_answers_are_given_while_others_are_served() {
         assert_eq!(values.len(), 100_000, "{key}");
     }
 }
-
-#[test]
-fn a_client_that_leaves_takes_its_computations_along() {
-    let runtime = Runtime::start();
-    let mut gone = runtime.connect();
-    for _ in 0..17 {
-        send_heavy(&mut gone);
-    }
-    drop(gone);
-    // Were they finished first, this would wait for a minute or so.
-    let few = json!({"function": "t", "x0": 0, "dt": 1, "steps": 10, "integrator": "rk4"});
-    runtime.connect().ask("/arm_sim/integration_step", few);
-}

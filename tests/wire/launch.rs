@@ -99,41 +99,6 @@ fn the_number_of_links_comes_from_the_environment_and_two_is_the_default() {
 }
 
 #[test]
-fn the_address_comes_from_the_environment_too() {
-    let serving = Serving::start(&[], &[("ARM_SIM_BIND", "127.0.0.1:0")]);
-    assert!(
-        serving.first_line.starts_with("listening on 127.0.0.1:"),
-        "{}",
-        serving.first_line
-    );
-    serving.connect().settle();
-}
-
-#[test]
-fn bad_usage_is_told_in_one_line_with_status_2() {
-    type Case = (
-        &'static [&'static str],
-        &'static [(&'static str, &'static str)],
-        &'static str,
-    );
-    let cases: [Case; 8] = [
-        (&[], &[("ARM_SIM_LINKS", "1")], "ARM_SIM_LINKS"),
-        (&[], &[("ARM_SIM_LINKS", " 2")], "ARM_SIM_LINKS"),
-        (&["--links", "4"], &[], "--links must be 2 or 3, got \"4\""),
-        (&["--what"], &[], "--what"),
-        (&["serve"], &[], "'serve'"),
-        (&["--bind", "0.0.0.0:0"], &[], "loopback"),
-        (&[], &[("ARM_SIM_BIND", "0.0.0.0:0")], "ARM_SIM_BIND"),
-        (&[], &[("ARM_SIM_LOG", "nonsense")], "ARM_SIM_LOG"),
-    ];
-    for (arguments, variables, part) in cases {
-        let output = outcome(arguments, variables);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?} {variables:?}");
-        assert_one_line(&output, &[part]);
-    }
-}
-
-#[test]
 fn a_port_in_use_is_told_in_one_line_with_status_1() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();

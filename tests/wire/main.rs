@@ -22,7 +22,6 @@ mod advice;
 mod arm;
 mod backpressure;
 mod clock_diagnostics;
-mod closing;
 #[cfg(feature = "cli")]
 mod command;
 #[path = "../support/common.rs"]
@@ -37,9 +36,7 @@ mod faults_threads;
 mod hostile_log;
 mod hostile_pages;
 mod http;
-mod ik_action;
 mod launch;
-mod memory_slow;
 mod mishaps;
 mod opening;
 mod options;

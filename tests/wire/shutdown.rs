@@ -5,7 +5,7 @@
 use std::io::Write;
 use std::time::Duration;
 
-use crate::common::{Client, Runtime, provide, signal};
+use crate::common::{Client, Runtime, signal};
 use pendularm::protocol::op::GoalStatus;
 use pendularm_client::websocket::{self as frames, LAST, opcode};
 use serde_json::{Value, json};
@@ -45,49 +45,6 @@ fn a_signal_ends_an_idle_program_and_one_that_is_only_watched() {
                 assert!(client.is_closed());
             }
         }
-    }
-}
-
-#[test]
-fn pending_calls_are_told_that_the_program_is_shutting_down() {
-    let mut runtime = Runtime::start();
-    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provide(&mut provider, "/s");
-    for id in 0..5 {
-        caller.send(&json!({"op": "call_service", "service": "/s", "id": id}));
-    }
-    // Many seconds of work each, of which one runs and fifteen wait; behind a sixteenth that waits nothing would be
-    // read.
-    let term = "sin(sin(sin(sin(t))))^2+cos(cos(cos(t)))^3+exp(sin(t))";
-    let sum = [term; 10].join("+");
-    for id in 5..21 {
-        caller.send(
-            &json!({"op": "call_service", "service": "/arm_sim/integration_step", "id": id,
-            "args": {"function": sum, "x0": 0, "dt": 1e-3,
-                "steps": 1_000_000, "integrator": "rk4"}}),
-        );
-    }
-    for _ in 0..5 {
-        provider.receive();
-    }
-    // A connection's calls are taken in order: all have come when a light one is answered.
-    caller.settle();
-    ends_on(&mut runtime, "INT");
-    let frames = rest(&mut caller);
-    let mut ids: Vec<u64> = frames
-        .iter()
-        .filter_map(|frame| frame["id"].as_u64())
-        .collect();
-    ids.sort_unstable();
-    assert_eq!(
-        ids,
-        (0..21).collect::<Vec<_>>(),
-        "every call is answered once"
-    );
-    for frame in frames {
-        assert_eq!(frame["result"], false, "{frame}");
-        assert_eq!(frame["values"], json!({}));
-        assert_eq!(frame["status"], "shutting down");
     }
 }
 

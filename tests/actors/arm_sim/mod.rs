@@ -3,7 +3,6 @@
 //!
 //! The arm is asked as another node asks it. A client's calls are here where it is meant what is made of their fields.
 
-mod answers;
 mod steps;
 mod topics;
 
@@ -12,7 +11,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::askers::{CALLER, hand_on};
+use crate::askers::hand_on;
 use crate::stage::ms;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
@@ -25,14 +24,12 @@ use pendularm::actors::node::{
     Ask, Asker, Call, Done, Interest, Publish, Reply, Respond, Unserved,
 };
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::wire::{Nodes, TopicMessage};
+use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::{Service, Topic};
-use pendularm::protocol::wire::payload::Payload;
-use serde_json::value::to_raw_value;
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
 use tokio::time::{Instant, sleep};
@@ -213,25 +210,6 @@ where
             .await
             .unwrap();
         self.heard.0.borrow_mut().pop();
-    }
-
-    /// Publishes on `/joint_trajectory` as a client does.
-    async fn trajectory(&self, msg: Value, id: Option<Value>) {
-        let (done, ended) = oneshot::channel();
-        self.routes.listeners[&Topic::JointTrajectory](TopicMessage {
-            present: std::sync::Weak::new(),
-            heard: Payload::from(to_raw_value(&msg).unwrap()).into(),
-            respond: self.ear.clone().recipient(),
-            connection: CALLER,
-            listening: std::sync::Weak::new(),
-            id: id.map(|id| to_raw_value(&id).unwrap().into()),
-            done,
-        });
-        assert!(
-            ended.await.is_err(),
-            "dropped when the message has taken effect"
-        );
-        self.heard_all().await;
     }
 
     pub async fn want(&self, topic: Topic, wanted: bool) {

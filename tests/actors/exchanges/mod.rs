@@ -28,25 +28,15 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::stage::start_goal_nodes;
+use crate::nodes::{start_nodes, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
-use actix::prelude::*;
-use pendularm::actors::arm::follow::{PathArm, PathFollower};
-use pendularm::actors::arm::ik_action::GoalTracker;
-use pendularm::actors::arm::sim::ArmSim;
-use pendularm::actors::compute::integration::Integration;
-use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::Attach;
-use pendularm::actors::ros::parameters::Parameters;
-use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
-use pendularm::actors::ros::tf_web::{MAX_FRAMES, TfRepublisher};
+use pendularm::actors::ros::tf_web::MAX_FRAMES;
 use pendularm::actors::wire::Nodes;
-use pendularm::math::arm::Arm;
-use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{Rosapi, Service};
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME};
 use pendularm::protocol::op::follow::MAX_POINTS;
@@ -167,32 +157,11 @@ impl World {
     async fn start() -> Self {
         let gateway = Gateway::bare().await;
         let registry = gateway.registry.clone();
-        let publish = || registry.clone().recipient();
-        let gauges = Arc::clone(&gateway.gauges);
-        let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish(), gauges).start();
-        let mut nodes = Nodes::default();
-        ArmSim::attach(&arm, &mut nodes);
-        let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(&arm));
-        start_goal_nodes(&registry, pose, tracker, 1, &mut nodes);
-        PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
         let pool = WorkerPool::without_threads();
-        let study = Study::new(arm.clone().recipient(), pool.clone()).start();
-        Study::attach(&study, &mut nodes);
-        Integration::attach(&Integration::new(pool.clone()).start(), &mut nodes);
-        let parameters = ArmParameters::of(&arm);
-        Parameters::attach(&Parameters::new(parameters.clone()).start(), &mut nodes);
-        let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
-        RosapiNode::attach(&rosapi, &mut nodes);
-        let frames = TfRepublisher::new(arm.recipient(), publish()).start();
-        TfRepublisher::attach(&frames, &mut nodes);
+        let mut nodes = Nodes::default();
+        start_nodes::<2>(&registry, &gateway.gauges, &pool, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
-        // The pool's work, in this thread.
-        actix_rt::spawn(async move {
-            loop {
-                while pool.turn() {}
-                sleep(Duration::from_millis(1)).await;
-            }
-        });
+        work_in_this_thread(pool);
         let (peers, bound) = (BTreeMap::new(), BTreeMap::new());
         Self {
             gateway,

@@ -154,18 +154,6 @@ fn cancelling_publishes_the_result_and_then_answers_with_nothing() {
 }
 
 #[test]
-fn cancelling_without_an_active_goal_is_rejected() {
-    in_virtual_time(async {
-        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
-        assert_eq!(stage.cancel().await, Err(CancelRejected::NotActive));
-        let goal = Meant::Called(stage.send_goal(elsewhere()).await);
-        assert_eq!(stage.cancel().await, Ok(()));
-        let again = asked(&stage.action, CancelGoal { goal }).await;
-        assert_eq!(again, Err(CancelRejected::NotActive));
-    });
-}
-
-#[test]
 fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;

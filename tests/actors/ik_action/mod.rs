@@ -19,7 +19,7 @@ use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{
-    CancelGoal, CancelRejected, GoalRejected, GoalTracker, IkAction, Meant, SendGoal,
+    CancelGoal, CancelRejected, GoalTracker, IkAction, Meant, SendGoal,
 };
 use pendularm::actors::arm::sim::{
     ArmPose, CommandGoal, GoalJudged, SetIntegrator, TrackGoal, Tracking,

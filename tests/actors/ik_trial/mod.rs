@@ -9,7 +9,6 @@
 mod duration;
 mod others;
 mod stand_ins;
-mod starting;
 mod status;
 mod whole;
 

@@ -1,4 +1,4 @@
-//! Trials while somebody else acts on goals.
+//! Trials while somebody else acts on goals, and what a trial leaves in flight.
 
 use super::*;
 
@@ -74,5 +74,40 @@ fn trials_outlive_the_client_that_started_them() {
         let end = client.messages(STATUS).pop().unwrap();
         assert_eq!(end["running"], false);
         assert!(number(&end["targets_reached"]) > 10.0);
+    });
+}
+
+#[test]
+fn the_goal_is_under_way_when_start_is_answered_and_what_follows_finds_it() {
+    in_virtual_time(async {
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(60.0)).await;
+        assert_eq!(stage.cancel().await, Ok(()));
+        assert_eq!(asked(&stage.trial, SkipTarget).await, Ok(()));
+        stage.send_goal(theirs()).await;
+        client.settle().await;
+        assert_eq!(client.messages(RESULT).len(), 2);
+    });
+}
+
+#[test]
+fn stop_ends_the_trial_and_leaves_nothing_in_flight() {
+    in_virtual_time(async {
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(60.0)).await;
+        let before = status(&mut client).await;
+        assert!(before["error"].is_number());
+        client.heard.clear();
+        assert_eq!(asked(&stage.trial, StopTrial).await, Ok(()));
+        client.settle().await;
+        assert_eq!(client.messages(RESULT).len(), 1);
+        assert!(stage.cancel().await.is_err(), "no goal is left");
+        for after in client.messages_for(ms(1000), STATUS).await {
+            assert_eq!(after["running"], false);
+            assert_nothing_in_flight(&after);
+            // Its clock has stopped.
+            assert!(number(&after["elapsed"]) - number(&before["elapsed"]) < 0.11);
+        }
+        assert_eq!(client.messages(RESULT).len(), 1, "and no replacement");
     });
 }

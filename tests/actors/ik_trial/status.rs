@@ -125,7 +125,7 @@ fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
         let arm = SilentArm.start();
         let tracker = SilentArm::tracker(&arm);
         let (action, trial) =
-            crate::stage::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
+            crate::nodes::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = connect(&registry, &gauges);
         client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;

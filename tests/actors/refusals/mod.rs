@@ -4,25 +4,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::stage::start_goal_nodes;
+use crate::nodes::{start_nodes, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
-use actix::prelude::*;
-use pendularm::actors::arm::ik_action::GoalTracker;
-use pendularm::actors::arm::sim::ArmSim;
-use pendularm::actors::compute::integration::Integration;
-use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Attach;
-use pendularm::actors::ros::parameters::Parameters;
-use pendularm::actors::ros::rosapi::ArmParameters;
-use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
-use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
-use tokio::time::sleep;
 
 /// Fields that take any value: unknown parts of other people's types, and the name of a record, which has a disk.
 const TAKE_ANYTHING: [&str; 6] = [
@@ -83,41 +73,17 @@ fn first_rows(service: Service) -> Vec<Row> {
     fields.filter_map(|field| of(field.name)).copied().collect()
 }
 
-/// A gateway with the nodes of all services but rosapi and the recorder; the arm is paused.
+/// A gateway with the nodes of all services but the recorder; the arm is paused.
 async fn start<const N: usize>() -> (Gateway, Peer)
 where
     Gains<N>: Default,
 {
     let gateway = Gateway::bare().await;
-    let publish = || gateway.registry.clone().recipient();
-    let gauges = std::sync::Arc::clone(&gateway.gauges);
-    let arm = ArmSim::<N>::new(Arm::default(), Gains::default(), publish(), gauges).start();
-    let mut nodes = Nodes::default();
-    ArmSim::attach(&arm, &mut nodes);
-    let pose = arm.clone().recipient();
-    start_goal_nodes(
-        &gateway.registry,
-        pose,
-        GoalTracker::of(&arm),
-        1,
-        &mut nodes,
-    );
     let pool = WorkerPool::without_threads();
-    let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
-    Study::attach(&study, &mut nodes);
-    Integration::attach(&Integration::new(pool.clone()).start(), &mut nodes);
-    let parameters = Parameters::new(ArmParameters::of(&arm)).start();
-    Parameters::attach(&parameters, &mut nodes);
-    let frames = TfRepublisher::new(arm.recipient(), publish()).start();
-    TfRepublisher::attach(&frames, &mut nodes);
+    let mut nodes = Nodes::default();
+    start_nodes::<N>(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
     gateway.registry.send(Attach(nodes)).await.unwrap();
-    // The pool's work, in this thread.
-    actix_rt::spawn(async move {
-        loop {
-            while pool.turn() {}
-            sleep(std::time::Duration::from_millis(1)).await;
-        }
-    });
+    work_in_this_thread(pool);
     let mut client = gateway.connect(WIDE);
     call(&mut client, "/arm_sim/pause", "{\"data\":true}").await;
     call(&mut client, "/arm_sim/reset", "{}").await;

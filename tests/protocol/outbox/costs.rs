@@ -1,6 +1,7 @@
-//! Bytes and costs of frames until they have been written.
+//! Bytes and costs of frames until they have been written, and the feedback of goals.
 
 use pendularm::protocol::limits::{MEDIUM, SHORT};
+use pendularm::protocol::outbox::MAX_MESSAGE;
 
 use super::Bench;
 
@@ -54,4 +55,22 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
     assert!(bench.outbox.has_long());
     bench.outbox.written(1);
     assert!(!bench.outbox.has_long());
+}
+
+/// A topic may have the action's name.
+#[test]
+fn feedback_is_past_all_throttles_and_drops_nothing_if_it_cannot_fit() {
+    let mut bench = Bench::new();
+    bench.throttle("/a", 1000, 1);
+    bench.push("/a", "1");
+    bench.push("/a", "held back");
+    bench.outbox.push_feedback("2".into(), bench.now);
+    bench.outbox.push_feedback("3".into(), bench.now);
+    bench
+        .outbox
+        .push_feedback(vec![b'x'; MAX_MESSAGE + 1].into(), bench.now);
+    assert_eq!(bench.outbox.dropped(), 1);
+    assert_eq!(bench.take_all(), ["1", "2", "3"]);
+    bench.advance(1000);
+    assert_eq!(bench.take_all(), ["held back"]);
 }

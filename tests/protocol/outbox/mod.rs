@@ -5,17 +5,13 @@
 mod age;
 mod costs;
 mod properties;
-mod queue;
 mod series;
-mod throttles;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use pendularm::protocol::outbox::Outbox;
-
-const MIB: usize = 1024 * 1024;
 
 /// An outbox under test, with a clock of its own.
 struct Bench {

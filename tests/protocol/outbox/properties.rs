@@ -105,7 +105,8 @@ impl Model {
     }
 
     fn set_throttle(&mut self, topic: usize, throttle: Option<(Duration, usize)>) {
-        if let Some((interval, queue_length)) = throttle {
+        // No time at all is no throttle.
+        if let Some((interval, queue_length)) = throttle.filter(|(time, _)| !time.is_zero()) {
             let last = self.throttles.get(&topic).and_then(|throttle| throttle.2);
             self.throttles.insert(topic, (interval, queue_length, last));
             self.trim(topic);
@@ -205,7 +206,7 @@ fn action() -> impl Strategy<Value = Action> {
         Just(MAX_MESSAGE + 1)
     ];
     let throttle =
-        (1_u64..20, 1_usize..5).prop_map(|(ms, length)| (Duration::from_millis(ms), length));
+        (0_u64..20, 1_usize..5).prop_map(|(ms, length)| (Duration::from_millis(ms), length));
     prop_oneof![
         10 => (topic(), size).prop_map(|(topic, size)| Action::Push(topic, size)),
         2 => (1_usize..1000, proptest::collection::vec(topic(), 0..2))

@@ -6,7 +6,6 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 use tokio::time::Instant;
 
-use super::offline::compute;
 use super::{Asked, Model, NodeMessage, absolute};
 use crate::court::Court;
 use crate::honest::{Expect, Honest};
@@ -89,14 +88,18 @@ impl Model {
             return court.wrong(format!("result and status disagree: {text:.200}"));
         }
         let why = match call.expect {
-            Expect::Arm { is_good } => arm_answer(court, id, values, result, is_good),
+            Expect::Success => (!result).then(|| "it should succeed".to_owned()),
             Expect::Refusal => result.then(|| "it should be refused".to_owned()),
             Expect::Member(name) => {
                 let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
                 (!result || value.get(name).is_none()).then(|| format!("it should have {name}"))
             }
-            Expect::Solution { x, y } => self.solution(values, result, x, y),
-            Expect::Computed(ref computed) => compute(computed, self.links, values, result),
+            Expect::Computed { entries, .. } => {
+                let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
+                let came = value["times"].as_array().map(Vec::len);
+                (!result || came != Some(entries))
+                    .then(|| format!("{came:?} entries instead of {entries}"))
+            }
             Expect::Forwarded(number) => {
                 self.forwarded(honest.is_hampered, number, values.get(), result, &status)
             }
@@ -202,26 +205,4 @@ impl FromRaw for Value {
     fn from_raw(raw: &RawValue) -> Option<String> {
         serde_json::from_str(raw.get()).ok()
     }
-}
-
-fn arm_answer(
-    court: &Court,
-    id: &str,
-    values: &RawValue,
-    result: bool,
-    is_good: bool,
-) -> Option<String> {
-    let Some((expected, is_done)) = court.expected.borrow_mut().remove(id) else {
-        return Some("the arm's double has not seen it".to_owned());
-    };
-    let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
-    if expected.is_null() {
-        let is_answer = value["steps"].is_u64() && value["time"].is_f64();
-        return (!is_answer).then(|| "steps and time should have come".to_owned());
-    }
-    let should = is_good && is_done;
-    // Over WebSocket the answer to what is wrong is its text.
-    let is_text = !result && value.is_string();
-    ((value != expected && !is_text) || result != should)
-        .then(|| format!("the arm's double has {should} {expected}"))
 }

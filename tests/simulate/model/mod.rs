@@ -3,11 +3,11 @@
 mod body;
 mod calls;
 mod messages;
-mod offline;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use pendularm::actors::arm::sim::Obstacle;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 use serde_json::value::RawValue;
@@ -109,11 +109,8 @@ pub struct Model {
     pub missed: u64,
     /// Whether little room excuses refusals and losses.
     pub is_scarce: bool,
-    /// Whether somebody has changed, or may have changed, the lengths of the arm's links.
-    pub is_reshaped: bool,
     /// Whether somebody has ended goals without saying whose.
     pub ends_any_goal: bool,
-    pub links: usize,
 }
 
 impl Model {
@@ -177,7 +174,9 @@ impl Model {
         match frame.level.as_deref() {
             // A warning belongs to a call or a goal that has no answer yet.
             Some("warning")
-                if court.obstacles.borrow().contains(msg)
+                if [Obstacle::ControllerOff, Obstacle::Diverged]
+                    .iter()
+                    .any(|obstacle| obstacle.to_string() == msg)
                     && frame
                         .id
                         .is_some_and(|id| honest.calls.contains_key(id.get())) => {}

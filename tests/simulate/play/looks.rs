@@ -6,7 +6,7 @@ use tokio::time::Instant;
 
 use super::Course;
 use crate::court::Verdict;
-use crate::honest::{Computed, Expect};
+use crate::honest::Expect;
 
 /// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
 const LIGHT_TURNS: u64 = 30_000;
@@ -95,7 +95,7 @@ impl Course {
         // Its computations are done one behind the other.
         let computations = one.calls.values().filter(|call| call.is_computation());
         if let Some(next) = computations.min_by_key(|call| call.order)
-            && matches!(next.expect, Expect::Computed(_))
+            && let Expect::Computed { is_short, .. } = next.expect
         {
             let taken = turns - next.turns.max(one.computed);
             court.at_most("most turns that a computation waits", taken);
@@ -103,7 +103,6 @@ impl Course {
             // Where nothing is long on its way, what is over in a few turns has them soon, whatever others compute.
             // In small pieces a client's own frames hold up its next one.
             let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
-            let is_short = matches!(next.expect, Expect::Computed(Computed::Particle { .. }));
             let each = if is_wide && is_short {
                 court.at_most("most turns that a short one waits", taken);
                 SHORT_TURNS

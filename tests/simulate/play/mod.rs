@@ -74,8 +74,6 @@ impl Course {
         let world = World::start(court, plan.links, plan.scarce, seed).await;
         let model = Model {
             is_scarce: plan.scarce,
-            links: plan.links,
-            is_reshaped: plan.hostile > 0,
             ..Model::default()
         };
         let mut course = Self {

@@ -15,7 +15,7 @@ impl Workload<'_> {
                     .map(|_| self.number(-1.0, 1.0))
                     .collect();
                 let (duration, timestep) = (self.number(0.1, 1.0), 0.005);
-                let samples = 2 + self.court.below(40) as u64;
+                let samples = 2 + self.court.below(40);
                 let arm = Arm::<3>::default();
                 let (masses, lengths) = (
                     &arm.masses()[..self.plan.links],
@@ -24,42 +24,32 @@ impl Workload<'_> {
                 let gravity = arm.gravity();
                 let params =
                     serde_json::json!({"gravity": gravity, "masses": masses, "lengths": lengths});
-                let q = Value::from(q0.clone());
+                let q = Value::from(q0);
                 let args = format!(
                     "{{\"q0\":{q},\"duration\":{duration},\"timestep\":{timestep},\"integrator\":\"{name}\",\"params\":{params},\"samples\":{samples}}}"
                 );
-                let computed = Computed::Rollout {
-                    q0,
-                    duration,
-                    timestep,
-                    method,
-                    samples,
+                // A sample a step at most, and the start.
+                let steps = (duration / timestep) as usize;
+                let expect = Expect::Computed {
+                    entries: samples.min(steps + 1),
+                    is_short: false,
                 };
-                self.call("/study/rollout", &args, Expect::Computed(computed), false);
+                self.call("/study/rollout", &args, expect, false);
             }
             _ => {
                 let function = self.court.among(&FUNCTIONS);
                 let (x0, dt) = (self.number(-1.0, 1.0), self.number(0.001, 0.1));
                 let steps = 1 + self
                     .court
-                    .below(if self.plan.room < 1000 { 20 } else { 1500 })
-                    as u64;
+                    .below(if self.plan.room < 1000 { 20 } else { 1500 });
                 let args = format!(
                     "{{\"function\":\"{function}\",\"x0\":{x0},\"dt\":{dt},\"steps\":{steps},\"integrator\":\"{name}\"}}"
                 );
-                let computed = Computed::Particle {
-                    function,
-                    x0,
-                    dt,
-                    steps,
-                    method,
+                let expect = Expect::Computed {
+                    entries: steps + 1,
+                    is_short: true,
                 };
-                self.call(
-                    "/arm_sim/integration_step",
-                    &args,
-                    Expect::Computed(computed),
-                    false,
-                );
+                self.call("/arm_sim/integration_step", &args, expect, false);
             }
         }
     }

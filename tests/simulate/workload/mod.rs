@@ -16,7 +16,7 @@ use tokio::time::Instant;
 
 use crate::client::Door;
 use crate::court::Court;
-use crate::honest::{Call, Computed, Expect, Honest, Phase, Subscription};
+use crate::honest::{Call, Expect, Honest, Phase, Subscription};
 use crate::model::{Forward, Message, Model, absolute};
 use crate::plan::{Feature, Plan};
 

@@ -1,0 +1,21 @@
+//! Whole connections in virtual time: three clients over TCP or WebSocket, and a registry. Behind it is a node that is
+//! prompt, slow or forgetful, or the runtime's own nodes: the arm, inverse kinematics, goals, trials, rosapi.
+//!
+//! Asserted is all that [`pendularm_fuzz::session`] says, and that every position and velocity that the arm publishes is a
+//! number.
+//!
+//! Input: whether room is scarce, whether clients use WebSocket, whether the runtime's own nodes serve, the script.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use pendularm_fuzz::client::Door;
+use pendularm_fuzz::limits::{DOING, hold};
+use pendularm_fuzz::session::{Step, play, play_with_arm};
+
+fuzz_target!(|script: (bool, bool, bool, Vec<Step<'_>>)| {
+    let (is_scarce, is_socket, has_arm, steps) = script;
+    let door = if is_socket { Door::Socket } else { Door::Plain };
+    let play = if has_arm { play_with_arm } else { play };
+    hold(0, DOING, || play(door, is_scarce, &steps));
+});

@@ -1,0 +1,106 @@
+//! The runtime's nodes on one thread, joined as `actors/runtime.rs` joins them. The recorder, which has a disk, is left out.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use pendularm::actors::arm::follow::{PathArm, PathFollower};
+use pendularm::actors::arm::ik::Ik;
+use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::arm::sim::{ArmPose, ArmSim};
+use pendularm::actors::compute::integration::Integration;
+use pendularm::actors::compute::study::Study;
+use pendularm::actors::compute::workers::WorkerPool;
+use pendularm::actors::gateway::registry::Registry;
+use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::ros::parameters::Parameters;
+use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
+use pendularm::actors::ros::tf_web::TfRepublisher;
+use pendularm::actors::wire::Nodes;
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+
+/// The nodes that tests ask without a client.
+pub struct Started<const N: usize> {
+    pub arm: Addr<ArmSim<N>>,
+    pub action: Addr<IkAction<N>>,
+    pub trial: Addr<IkTrial<N>>,
+    pub study: Addr<Study<N>>,
+    pub rosapi: Addr<RosapiNode<N>>,
+}
+
+/// Starts all nodes for this registry and attaches them to `nodes`. Computations wait for the turns of `pool`.
+pub fn start_nodes<const N: usize>(
+    registry: &Addr<Registry>,
+    gauges: &Arc<Gauges>,
+    pool: &WorkerPool,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> Started<N>
+where
+    Gains<N>: Default,
+{
+    let publish = || registry.clone().recipient();
+    let arm = ArmSim::<N>::new(
+        Arm::default(),
+        Gains::default(),
+        publish(),
+        Arc::clone(gauges),
+    );
+    let arm = arm.start();
+    ArmSim::attach(&arm, nodes);
+    let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(&arm));
+    let (action, trial) = start_goal_nodes(registry, pose, tracker, seed, nodes);
+    PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
+    let study = Study::new(arm.clone().recipient(), pool.clone()).start();
+    Study::attach(&study, nodes);
+    Integration::attach(&Integration::new(pool.clone()).start(), nodes);
+    let parameters = ArmParameters::of(&arm);
+    Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
+    let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();
+    TfRepublisher::attach(&frames, nodes);
+    Started {
+        arm,
+        action,
+        trial,
+        study,
+        rosapi,
+    }
+}
+
+/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to; returns the last two.
+pub fn start_goal_nodes<const N: usize>(
+    registry: &Addr<Registry>,
+    pose: Recipient<ArmPose<N>>,
+    tracker: GoalTracker<N>,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> (Addr<IkAction<N>>, Addr<IkTrial<N>>) {
+    let publish = || registry.clone().recipient();
+    let ik = Ik::<N>::new(pose.clone()).start();
+    Ik::attach(&ik, nodes);
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        barrier: action.clone().recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(seed);
+    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
+    IkTrial::attach(&trial, nodes);
+    (action, trial)
+}
+
+/// Does the work of a pool without threads in this thread, at every millisecond.
+pub fn work_in_this_thread(pool: WorkerPool) {
+    actix_rt::spawn(async move {
+        loop {
+            while pool.turn() {}
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    });
+}
