@@ -1,6 +1,6 @@
 // @ts-check
 // The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and files to keep,
-// the recording as CSV, the plots as PNG or SVG.
+// the recording as CSV, the plots as PNG.
 // Invariant: pausing the plots stops only the drawing; recording goes on. A file is handed to the browser and released.
 
 import { STRONG, write } from "./chart.js";
@@ -12,7 +12,6 @@ import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
 import { PhasePlot, StripChart } from "./strip_chart.js";
 import { Surface } from "./surface.js";
-import { SvgContext } from "./svg_context.js";
 import { colors } from "./theme.js";
 
 /** No more than this is shown of an arm that has diverged: the blow-up is the end of it [s]. */
@@ -166,60 +165,36 @@ function reference() {
   return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;
 }
 
-/** Draws every plot, one below the other, on a context of `width`; gives the height. For pictures that are saved. */
-function drawAll(context, width) {
-  let top = 0;
-  for (const { id, chart, name, surface } of plots) {
-    const height = surface.height || HEIGHT;
-    context.save();
-    context.translate(0, top);
-    write(context, name, 8, 9, "left", colors.ink, STRONG);
-    context.translate(0, TITLE);
-    chart.draw(context, width, height, view(id));
-    context.restore();
-    top += TITLE + height + GAP;
-  }
-  redraw();
-  return top;
-}
-
-/** How high `drawAll` draws. */
-function heightOfAll() {
-  return plots.reduce((sum, { surface }) => sum + TITLE + (surface.height || HEIGHT) + GAP, 0);
-}
-
 const WIDTH = 640; // CSS pixels
 const DENSITY = 2; // of a PNG
 const KEPT_MS = 10000;
 
 export function startSave() {
   const choice = byId("plot-save");
-  choice.addEventListener("change", () => {
+  choice.addEventListener("change", async () => {
     const kind = choice.value;
     choice.value = "";
-    save(kind);
+    if (kind === "csv") hand(new Blob([csvText(state.links, presentSettings(state))], { type: "text/csv" }), "pendularm.csv");
+    if (kind === "png") hand(await png(), "pendularm.png");
   });
 }
 
-async function save(kind) {
-  const contents = { csv: () => new Blob([csvText(state.links, presentSettings(state))], { type: "text/csv" }), svg, png }[kind];
-  if (contents) hand(await contents(), `pendularm.${kind}`);
-}
-
-/** The plots as an SVG file. */
-export function svg() {
-  const context = new SvgContext(WIDTH, heightOfAll(), colors.panel);
-  drawAll(context, WIDTH);
-  return new Blob([context.toString()], { type: "image/svg+xml" });
-}
-
+/** All plots as one picture, one below the other. */
 function png() {
-  const canvas = el("canvas", { width: WIDTH * DENSITY, height: heightOfAll() * DENSITY });
+  const heights = plots.map(({ surface }) => surface.height || HEIGHT);
+  const total = heights.reduce((sum, height) => sum + TITLE + height + GAP, 0);
+  const canvas = el("canvas", { width: WIDTH * DENSITY, height: total * DENSITY });
   const context = canvas.getContext("2d");
   context.scale(DENSITY, DENSITY);
   context.fillStyle = colors.panel;
-  context.fillRect(0, 0, WIDTH, heightOfAll());
-  drawAll(context, WIDTH);
+  context.fillRect(0, 0, WIDTH, total);
+  plots.forEach(({ id, chart, name }, i) => {
+    write(context, name, 8, 9, "left", colors.ink, STRONG);
+    context.translate(0, TITLE);
+    chart.draw(context, WIDTH, heights[i], view(id));
+    context.translate(0, heights[i] + GAP);
+  });
+  redraw();
   return new Promise((done) => canvas.toBlob(done, "image/png"));
 }
 

@@ -11,7 +11,6 @@ import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
 import { state } from "../../page/store.js";
-import { SvgContext } from "../../page/svg_context.js";
 
 /** A run of one joint at 0.1 s through `seconds`, at `slope` rad/s. */
 function run(seconds, slope, energy = 1) {
@@ -79,11 +78,6 @@ test("place and value of a logarithmic scale are each other's inverse", () => {
   assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
 });
 
-function arm(method, timestep, enabled = false) {
-  const { params, gains } = DEFAULTS[2];
-  return { links: 2, params, gains, enabled, setpoint: Float64Array.of(0, 0, 0), integrator: { method, timestep } };
-}
-
 test("a place out of reach gives way to the nearest one within", () => {
   const near = (place, lengths, expected) => {
     const found = nearestInReach(place, lengths);
@@ -112,23 +106,6 @@ test("a file holds its settings, and what is not finite is empty", () => {
   const row = lines[lines.indexOf(header) + 1].split(",");
   assert.equal(header.split(",").length, row.length);
   assert.deepEqual(row.slice(0, 5), ["0.5", "", "0.25", "", ""]);
-});
-
-test("an SVG is well formed: every group that is opened is closed, texts are escaped", () => {
-  const context = new SvgContext(100, 50, "#fff");
-  context.save();
-  context.translate(1, 2);
-  context.beginPath();
-  context.rect(0, 0, 10, 10);
-  context.clip();
-  context.moveTo(0, 0);
-  context.lineTo(5, 5);
-  context.stroke();
-  context.fillText("a < b & c", 1, 1);
-  context.restore();
-  const text = context.toString();
-  assert.equal(text.match(/<g /g).length, text.match(/<\/g>/g).length);
-  assert.ok(text.includes("a &lt; b &amp; c"));
 });
 
 test("an error is told apart from one that the reference can't resolve, and from one that nobody can follow", () => {
