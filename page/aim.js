@@ -62,8 +62,7 @@ function finish(place) {
 /** The pose with the end effector at a place, within half a turn of where each joint is; a diverged arm has lost count of turns. */
 async function poseAt({ x, y }) {
   const answer = await solve({ x, y });
-  const diverged = state.diagnostics?.state === "diverged";
-  return { answer, pose: answer.values.positions?.map((q, i) => (diverged ? q : nearestTurn(q, state.position[i]))) };
+  return { answer, pose: answer.values.positions?.map((q, i) => (state.diverged ? q : nearestTurn(q, state.position[i]))) };
 }
 
 async function placeSetpoint(place) {

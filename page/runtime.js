@@ -177,6 +177,7 @@ function diagnostics(msg) {
   const before = state.diagnostics?.state;
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
+  keep("diverged", report.state === "diverged");
   if (motionHasChanged(state) && question(state)) askNow(question(state));
   if (before === report.state) return;
   poll(); // another client may have done what led here

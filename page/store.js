@@ -23,6 +23,7 @@ export const state = {
   paused: null,
   enabled: null, // is PID on
   diagnostics: null, // { level, message, state, ...numbers }
+  diverged: false,
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
