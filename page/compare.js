@@ -5,8 +5,8 @@
 // run that ends early is drawn as far as it goes, its last pose as a ghost.
 
 import { Chart, circle, links as drawLinks } from "./chart.js";
-import { announce, byId, el, setText } from "./dom.js";
-import { option, refusal } from "./field.js";
+import { announce, byId, el, fillTable, setText } from "./dom.js";
+import { busy, option, panel } from "./field.js";
 import { duration, fixed, METHODS, shortName, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
 import { commonSamples, describeRun, distances, divergedAt, partsAt, resample } from "./ladder.js";
@@ -26,33 +26,19 @@ const SECONDS = 5; // where no duration is given
 let view;
 let said;
 let rows = [];
-let seconds;
-let from;
-let controller;
-let go;
-let add;
+const seconds = option({ label: "duration", unit: "s", value: SECONDS, placeholder: String(SECONDS) });
+const from = option({ label: "start", choices: [["now", "as it is"], ["rest", "stretched out"]] });
+const controller = option({ label: "controller", choices: [["off", "off"], ["on", "on"]] });
 
 export function startCompare() {
-  seconds = option({ label: "duration", unit: "s", value: SECONDS, placeholder: String(SECONDS) });
-  from = select("start", [["now", "as it is"], ["rest", "stretched out"]]);
-  controller = select("controller", [["off", "off"], ["on", "on"]]);
-  go = el("button", { type: "submit", class: "primary" }, "Compare");
-  add = el("button", { type: "button", class: "small", onclick: () => addRow("rk4", 0.001) }, "Add a run");
-  said = refusal(go);
-  byId("compare-form").append(
-    el("div", { class: "compare-rows" }, el("div", { id: "compare-rows", class: "as-parts" }), add),
-    el("div", { class: "compare-row" }, seconds.element, from.element, controller.element, go), said.element,
-  );
+  said = panel(byId("compare-form"), [seconds, from, controller], [
+    ["Compare", () => busy(said.buttons[0], "Reckoning…", compare), { type: "submit", class: "primary" }],
+    ["Add a run", () => addRow("rk4", 0.001), { id: "compare-add", class: "small" }],
+  ]);
   addRow("euler", 0.01);
   addRow("rk4", 0.01);
-  byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
   view = new CompareView();
   watch("links", () => { byId("compare-result").hidden = true; });
-}
-
-function select(label, choices) {
-  const input = el("select", {}, ...choices.map(([value, text]) => el("option", { value }, text)));
-  return { input, element: el("label", { class: "option" }, el("span", {}, label), input) };
 }
 
 function addRow(method, timestep) {
@@ -77,7 +63,7 @@ function drop(row) {
 
 function number() {
   rows.forEach(({ element }, i) => { element.className = `side run${i + 1}`; });
-  add.disabled = rows.length >= MOST_RUNS;
+  byId("compare-add").disabled = rows.length >= MOST_RUNS;
 }
 
 function request(method, timestep, samples) {
@@ -104,16 +90,12 @@ async function compare() {
     said.show("There is no arm to compare with: not connected.");
     return;
   }
-  go.disabled = true;
-  setText(go, "Reckoning…");
   const wanted = rows.map(({ choice, step }) => [choice.value, step.value === "" ? state.integrator?.timestep : Number(step.value)]);
   const finest = Math.min(...wanted.map(([, timestep]) => timestep)) * REFERENCE_PART;
   wanted.push(["rk4", finest]);
   const samples = commonSamples(lasting(), wanted.map(([, timestep]) => timestep));
   const requests = wanted.map(([method, timestep]) => request(method, timestep, samples));
   const answers = await Promise.all(requests.map((args) => rollout(args)));
-  go.disabled = false;
-  setText(go, "Compare");
   const failed = answers.findIndex((answer) => !answer.result);
   if (failed >= 0) {
     const answer = answers[failed];
@@ -134,10 +116,7 @@ function showTable(runs, away, reference) {
   const lasted = lasting();
   const columns = [["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]];
   const lines = runs.map((run, i) => describeRun(run, away[i], lasted));
-  byId("compare-table").replaceChildren(
-    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "run"), ...columns.map(([, name]) => el("th", { scope: "col" }, name)))),
-    el("tbody", {}, ...lines.map((line, i) => el("tr", {}, el("th", { scope: "row", class: `run${i + 1}` }, line.name), ...columns.map(([key]) => el("td", {}, line[key]))))),
-  );
+  fillTable(byId("compare-table"), ["run", ...columns.map(([, name]) => name)], lines.map((line, i) => [[line.name, `run${i + 1}`], ...columns.map(([key]) => line[key])]));
   const words = runs.map((run, i) => {
     const ended = divergedAt(run, lasted);
     const parts = partsAt(reference.times, away[i], PARTED);

@@ -7,7 +7,7 @@ import { remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
 import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
-import { numberField } from "./field.js";
+import { busy, numberField } from "./field.js";
 import { duration, METHODS, shortName } from "./format.js";
 import { ENERGY, KINETIC, POTENTIAL, TIME, VELOCITY, record } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
@@ -214,7 +214,7 @@ function fillExtra(one) {
       type: "button", class: "small", onclick: () => setParams({ masses: [...state.params.masses.slice(0, -1), mass] }),
     }, `last link ${mass} kg`))));
   }
-  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: measure }, "Measure"));
+  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
   if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
 }
@@ -421,12 +421,9 @@ async function askMap({ params, gains }) {
 
 async function measure() {
   const mine = now;
-  const button = byId("course-measure");
   const key = settingsKey();
   Object.assign(now, { runs: [], runsKey: key });
-  button.disabled = true;
   const refused = await climb(1, () => mine === now && key === settingsKey(), (rung) => { mine.runs.push(rung); surface.redraw(); });
-  button.disabled = false;
   setText(byId("course-status"), refused);
   mine.seen.measured = mine.runs.length === rungs().length;
   look();

@@ -18,6 +18,15 @@ export function el(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** Fills a table: a row of heads, then rows that begin with a head of their own; a head is its text, or its text and its class. */
+export function fillTable(table, heads, rows) {
+  const head = (scope, one) => el("th", { scope, class: [one].flat()[1] }, [one].flat()[0]);
+  table.replaceChildren(
+    el("thead", {}, el("tr", {}, ...heads.map((one) => head("col", one)))),
+    el("tbody", {}, ...rows.map(([first, ...cells]) => el("tr", {}, head("row", first), ...cells.map((text) => el("td", {}, text))))),
+  );
+}
+
 /** @param {string} id @returns {any} the element, of whatever kind the document has it */
 export function byId(id) {
   return document.getElementById(id);

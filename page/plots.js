@@ -1,10 +1,10 @@
 // @ts-check
 // The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and files to keep,
 // the recording as CSV, the plots as PNG.
-// Invariant: pausing the plots stops only the drawing; recording goes on. A file is handed to the browser and released.
+// Invariant: a file is handed to the browser and released.
 
 import { STRONG, write } from "./chart.js";
-import { announce, byId, el, setText } from "./dom.js";
+import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
 import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, POSITION, POTENTIAL, record, SETPOINT, shown as pose, TIME, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
@@ -24,7 +24,6 @@ const shown = [true, true, true];
 /** @type {{id: string, chart: any, name: string, surface: Surface}[]} */
 let plots = [];
 let span = 10; // s
-let frozenAt = NaN; // simulation time at which the plots were paused
 let drawnVersion = -1;
 let legends = [];
 
@@ -53,30 +52,17 @@ export function startPlots() {
   watch("cursor", () => { redraw(); showValues(); });
   watch("playback", () => { if (pose.playing) return; redraw(); showValues(); });
   watch("links", makeLegends);
-  let diverged = false;
-  watch("diagnostics", (report) => {
-    if ((report.state === "diverged") !== diverged) redraw();
-    diverged = report.state === "diverged";
-  });
+  watch("diverged", redraw);
   byId("plot-span").addEventListener("change", (event) => {
     span = Number(event.target.value);
     redraw();
   });
-  byId("plot-pause").addEventListener("click", togglePlots);
   byId("plot-fix").addEventListener("click", toggleScales);
 }
 
 /** What a plot shows now. @param {string} id */
 function view(id) {
   return { now: edge(), span: shownSpan(), links: state.links, shown, level: id === "energy" ? reference() : NaN };
-}
-
-export function togglePlots() {
-  const paused = Number.isNaN(frozenAt);
-  frozenAt = paused ? newest() : NaN;
-  press("plot-pause", paused, paused ? "Resume" : "Pause");
-  announce(paused ? "Plots paused." : "Plots running.");
-  redraw();
 }
 
 /** Shows less time for 1, more for -1. */
@@ -89,13 +75,9 @@ export function zoomPlots(way) {
 function toggleScales() {
   const kept = byId("plot-fix").getAttribute("aria-pressed") !== "true";
   for (const { chart } of plots) for (const axis of [chart.axis, chart.across]) if (axis) axis.fixed = kept;
-  press("plot-fix", kept, kept ? "Fixed" : "Fix");
+  byId("plot-fix").setAttribute("aria-pressed", String(kept));
+  setText(byId("plot-fix"), kept ? "Fixed" : "Fix");
   redraw();
-}
-
-function press(id, pressed, text) {
-  byId(id).setAttribute("aria-pressed", String(pressed));
-  setText(byId(id), text);
 }
 
 function newest() {
@@ -103,12 +85,12 @@ function newest() {
 }
 
 function shownSpan() {
-  return state.diagnostics?.state === "diverged" && pose.live ? Math.min(span, BLOW_UP_SECONDS) : span;
+  return state.diverged && pose.live ? Math.min(span, BLOW_UP_SECONDS) : span;
 }
 
-/** The right edge of the plots: now, where they were paused, or so that what is looked at of the recording is within. */
+/** The right edge of the plots: now, or so that what is looked at of the recording is within. */
 function edge() {
-  const end = Number.isNaN(frozenAt) ? newest() : frozenAt;
+  const end = newest();
   if (pose.live || pose.time > end - span) return end;
   return pose.time + span / 2;
 }
@@ -119,7 +101,7 @@ export function redraw() {
 
 /** Draws the lines as they are now, if anything has moved since. */
 export function movePlots() {
-  const moves = pose.playing || (pose.live && drawnVersion !== state.version && Number.isNaN(frozenAt));
+  const moves = pose.playing || (pose.live && drawnVersion !== state.version);
   drawnVersion = state.version;
   if (moves) redraw();
 }

@@ -111,7 +111,7 @@ async function moveTo(timestep, factor) {
   if (Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
   if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
   await Promise.all(changes);
-  if (state.diagnostics?.state === "diverged") beginAnew();
+  if (state.diverged) beginAnew();
 }
 
 function byArrows(event) {

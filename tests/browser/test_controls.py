@@ -203,9 +203,9 @@ class Controls(PageTest):
     def test_any_number_of_runs_is_compared_with_a_reference(self):
         self.tab("compare")
         for _ in range(2):
-            self.page.click("#compare-form .compare-rows > button")
+            self.page.click("#compare-add")
         self.page.run("document.querySelectorAll('#compare-rows select')[2].value = 'verlet'")
-        self.page.fill("#compare-form .compare-row input", "")  # five seconds
+        self.page.fill(f"#compare-form {NUMBER}", "")  # five seconds
         self.page.click("#compare-form button[type=submit]")
         self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
         self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 30, "played to its end")
@@ -275,7 +275,7 @@ class Controls(PageTest):
         for _ in range(120):
             self.page.key("Tab")
             seen.add(self.page.run("document.activeElement.id"))
-        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "controller", "plot-pause", "plot-save", "tab-plots", "defaults", "history-scrub"} - seen
+        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "controller", "plot-save", "tab-plots", "defaults", "history-scrub"} - seen
         self.assertEqual(missing, set())
 
     # Links to share
