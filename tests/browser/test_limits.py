@@ -280,15 +280,3 @@ class Right(PageTest):
         self.page.run("own('runtime.js').then((arm) => arm.sendSetpoint([0.9, -1.3]))")
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.until("['stable here only', 'beyond the limit'].includes(document.querySelector('#verdict-pill').textContent)")
-
-    def test_the_pose_that_bears_least_is_named_and_whether_that_is_proven(self):
-        self.page.click("#controller")
-        self.page.until("document.querySelector('#out-certified').textContent === 'bounded'")
-        served = self.values("/study/stability")
-        self.tab("stability")
-        shown = "document.querySelector('#worst-text').textContent"
-        text = self.page.until(f"{shown}.includes('bounded by an estimate to 1 %') && {shown}")
-        self.assertIn(f"joint {served['critical']['joint'] + 1} moves most", text)
-        self.assertIn(f"{served['critical']['frequency']:.3g} Hz", text)
-        self.page.click("#controller")
-        self.page.until("document.querySelector('#worst-text').textContent === ''")

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, limitInForce, limitsOf, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText, worstText } from "../../page/policy.js";
+import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, limitInForce, limitsOf, motionHasChanged, noGains, periodText, question, scaled, verdict } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -114,25 +114,6 @@ test("energy drifts only if nothing puts any in", () => {
   assert.equal(energyName({ enabled: false, pushed: false }), "drift");
   assert.equal(energyName({ enabled: true, pushed: false }), "work");
   assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
-});
-
-test("the pose with the smallest limit is named, with how surely it is known and the motion that grows there", () => {
-  const answer = {
-    ...VALUES, worst_pose: [0, 0.5], certified: true, bound_is_proven: true, minimum_over_poses_bound: 0.0043,
-    critical: { growth_per_step: 1.214, frequency: 105.3, joint: 1 },
-  };
-  assert.equal(worstText(answer), "The pose with the smallest limit, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
-    + "10 % beyond it joint 2 moves most, at 105 Hz, 1.21 times further at every step.");
-  assert.match(worstText({ ...answer, certified: false }), /\(the least that a search found; proven is 4\.3 ms\)/);
-  assert.match(worstText({ ...answer, bound_is_proven: false }), /4\.32 ms \(bounded by an estimate to 1 %\)/);
-  assert.match(worstText({ ...answer, certified: false, minimum_over_poses_bound: null }), /search found, without a bound/);
-  assert.match(worstText({ ...answer, critical: { ...answer.critical, frequency: 0 } }), /without swinging/);
-});
-
-test("where nothing limits no pose is named, nor where the service says nothing of it", () => {
-  for (const answer of [null, VALUES, { ...VALUES, worst_pose: null, critical: null }, { ...VALUES, minimum_over_poses_held: 0, worst_pose: [0, 0], critical: { joint: 0 } }]) {
-    assert.equal(worstText(answer), "");
-  }
 });
 
 const FREE = {
