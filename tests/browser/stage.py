@@ -119,13 +119,17 @@ class PageTest(unittest.TestCase):
         text = self.page.run(f"(() => {{ const e = document.querySelector('#probe'); e.style.color = 'var(--{name})'; return getComputedStyle(e).color; }})()")
         return tuple(int(one) for one in re.findall(r"\d+", text)[:3])
 
+    def pause(self):
+        """The arm is paused, and the page says so."""
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+
     def settle(self, positions):
         """The controller holds the arm at `positions`, and then it is paused: a picture that does not change."""
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.run(f"""own('runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
         self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
 
     def shake(self):
         """The controller shakes the arm: its timestep is a quarter beyond the limit."""

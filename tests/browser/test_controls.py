@@ -128,12 +128,6 @@ class Controls(PageTest):
         self.page.key("ArrowRight")
         self.wait(lambda: 1.62 < self.values("/arm_sim/set_params")["gravity"] < 1.8, "a little more")
 
-    def test_what_others_change_is_shown_too(self):
-        self.runtime.call("/arm_sim/set_params", gravity=5)
-        self.runtime.call("/pid_controller/enable", data=True)
-        self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '5'")
-        self.page.until("document.querySelector('#controller').getAttribute('aria-checked') === 'true'")
-
     def test_a_refusal_is_shown_beside_its_field_which_goes_back(self):
         for field, wrong, service, shown in (
             ("masses-fields", "-2", "/arm_sim/set_params", "1"), ("timestep-field", "0", "/arm_sim/set_integrator", "1"),

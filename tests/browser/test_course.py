@@ -2,7 +2,7 @@
 
 import time
 
-from stage import IS_FILE, PageTest, needs_server
+from stage import IS_FILE, PageTest
 from test_layout import CLIPPED, PHONE, audit, forget_the_inspectors
 
 STEPS = 10
@@ -29,26 +29,22 @@ class CourseTest(PageTest):
 
 
 class Tasks(CourseTest):
-    @needs_server("the arm of the file belongs to its page")
-    def test_the_course_is_the_first_view_and_leaves_the_arm_alone(self):
-        self.assertTrue(self.page.run("document.querySelector('#course').checkVisibility() && !document.querySelector('#controls').checkVisibility()"))
-        before = self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")
-        page = self.open("#step=4")
-        page.until("document.querySelector('#course-title').textContent === 'A better method?'")
-        self.assertEqual(page.text("#course-start"), "Start")
-        time.sleep(0.5)
-        self.assertEqual(before, (self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")))
+    def test_the_course_comes_first_and_a_link_begins_its_step_in_the_file_and_waits_at_a_server(self):
+        def settings():
+            return self.values("/pid_controller/set_gains"), self.values("/arm_sim/set_integrator"), self.values("/pid_controller/enable")
 
-    def test_a_link_to_a_step_begins_it_in_the_file_and_waits_at_a_server(self):
+        self.assertTrue(self.page.run("document.querySelector('#course').checkVisibility() && !document.querySelector('#controls').checkVisibility()"))
+        before = settings()
         page = self.open("#step=4")
         page.until("document.querySelector('#course-title').textContent === 'A better method?'")
-        begun = "document.querySelector('#course-start').textContent === 'Restart step'"
         if IS_FILE:
-            page.until(begun)
+            page.until("document.querySelector('#course-start').textContent === 'Restart step'")
             self.wait(lambda: self.values("/pid_controller/enable")["data"], "the controller")
         else:
             page.until("document.querySelector('#course-status').textContent.startsWith('Press')")
-            self.assertFalse(page.run(begun))
+            time.sleep(0.5)
+            self.assertEqual(page.text("#course-start"), "Start")
+            self.assertEqual(settings(), before)
 
     def test_holding_ticks_when_the_tip_arrives(self):
         self.page.click("#course-start")

@@ -19,9 +19,6 @@ class BlowUp(PageTest):
         self.page.until(r"/^Diverged at t = [\d.]+ s\. /.test(document.querySelector('#notice').textContent)")
         self.assertGreater(self.image("#arm").count(self.color("bad")), 500)
         self.keep("blow-up")
-        labels = self.page.run("own('scale.js').then(({ Axis }) => { const axis = new Axis(3, 0.2, 300); axis.fit(-1e148, 1);"
-                               " return [axis.log, axis.low, axis.marks.length <= 12]; })")
-        self.assertEqual(labels, [True, -12, True])
         # The plot shows more than one line along an axis and a spike: the line is at several heights.
         picture = self.image("#plot-velocity")
         color = self.color("joint1")
@@ -32,13 +29,6 @@ class BlowUp(PageTest):
         self.page.run("[...document.querySelectorAll('#notice button')].find((one) => one.textContent === 'Restart').click()")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.assertEqual(self.values("/arm_sim/set_integrator")["timestep"], 0.001)
-
-    def test_the_limit_of_an_arm_that_has_diverged_is_that_of_its_pose(self):
-        self.diverge()
-        wanted = milliseconds(self.values("/study/stability", integrator="euler")["timestep_limit_held"])
-        self.page.until(f"document.querySelector('#out-limit').textContent === '{wanted}'")
-        said = f"20 ms is above the limit {wanted}, at the setpoint (0.00, 0.00) rad."
-        self.page.until(f"document.querySelector('#notice').textContent.includes('{said}')")
 
     def test_the_map_stays_where_it_is_when_the_reason_comes(self):
         self.page.click("#controller")
@@ -267,16 +257,3 @@ class Right(PageTest):
             return self.page.text("#legend-drift-name") == "pushed in"
 
         self.wait(pushed, "energy that was pushed in")
-
-    def test_the_pill_is_never_green_while_the_arm_thrashes(self):
-        self.shake()
-        self.assertTrue(self.page.run("document.querySelector('#out-limit').classList.contains('bad')"))
-        for _ in range(10):
-            self.assertNotIn("stable", self.page.run("document.querySelector('#verdict-pill').className"))
-            time.sleep(0.1)
-
-    def test_a_pose_that_bears_less_on_the_way_is_told(self):
-        self.runtime.call("/arm_sim/set_integrator", timestep=0.006)
-        self.page.run("own('runtime.js').then((arm) => arm.sendSetpoint([0.9, -1.3]))")
-        self.runtime.call("/pid_controller/enable", data=True)
-        self.page.until("['stable here only', 'beyond the limit'].includes(document.querySelector('#verdict-pill').textContent)")

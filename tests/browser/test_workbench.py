@@ -59,8 +59,7 @@ class Ways(PageTest):
 
     def test_one_cursor_is_on_all_plots(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 120)")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(0.5) == 0, "the figures are those of the last state")
         now = self.page.text("#legend-velocity")
         x, y = self.page.place("#plot-position")
@@ -116,8 +115,7 @@ class Suggestion(PageTest):
 class Still(PageTest):
     def test_a_paused_page_draws_no_frame(self):
         self.wait(lambda: self.drawn(1) > 10, "while it moves it draws")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(2) == 0, "it comes to rest")
 
     @needs_server("it counts frames of a WebSocket")
@@ -129,8 +127,7 @@ class Still(PageTest):
             return self.page.told - before, time.monotonic() - began
 
         self.wait(lambda: hears()[0] > 30, "while it moves it hears of every state")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
 
         def hears_little():
             told, took = hears()
@@ -154,8 +151,7 @@ class Still(PageTest):
         self.wait(draws_little, "the plots move on, ten times a second")
 
     def test_an_arm_at_rest_that_is_stepped_is_drawn(self):
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(0.5) == 0, "it comes to rest")
         before = self.page.run(self.frames)
         self.page.click("#step")
