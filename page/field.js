@@ -171,7 +171,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
 export function option({ label, unit = "", value = "", placeholder = "", choices = [] }) {
   const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text))) : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {
-    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, el("span", { class: "unit" }, unit))),
+    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
     /** `undefined` where nothing is given. */
     number: () => (input.value === "" ? undefined : Number(input.value)),

@@ -105,7 +105,7 @@ export function between(a, b, time, position, velocity) {
  * records, which nobody has seen: then it goes straight.
  * @param {number} s @param {number} p @param {number} q @param {number} v @param {number} w
  */
-export function cubic(s, p, q, v, w) {
+function cubic(s, p, q, v, w) {
   const change = q - p;
   if (s === 1) return q;
   if (Math.abs(v) + Math.abs(w) > STEEP * Math.abs(change) + TURN) return p + s * change;

@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { csvText } from "../../page/history.js";
 import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
 import { record, take } from "../../page/history.js";
-import { commonSamples, describeRun, distances, divergedAt, energyGained, partsAt, resample } from "../../page/ladder.js";
+import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/ladder.js";
 import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
@@ -41,12 +41,6 @@ test("a run that diverged says when, and claims neither energy nor error", () =>
   assert.equal(energyGained(one, 2), null);
   assert.equal(away[7], null);
   assert.notEqual(away[6], null);
-});
-
-test("runs of different timesteps meet at common instants, and between samples a cubic is met exactly", () => {
-  // 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
-  assert.deepEqual([[5, [0.01, 0.001]], [4, [0.01, 0.005]], [5, [0.01, 0.007]]].map(([seconds, steps]) => commonSamples(seconds, steps)), [501, 401, 601]);
-  assert.deepEqual(resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]), [[0.25 ** 3], [1], null]);
 });
 
 test("the last sample may lie a step before the end", () => {
