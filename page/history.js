@@ -210,9 +210,11 @@ export function seek(time) {
 export function stepBy(way) {
   if (record.length === 0) return;
   shown.playing = false;
-  const now = shown.live ? record.length - 1 : nearest(shown.time);
-  const row = Math.min(record.length - 1, Math.max(0, now + way));
-  seek(record.data[record.at(row) + TIME]);
+  // The row that is shown, or the one after a time between two rows.
+  const after = shown.live ? record.length - 1 : firstAfter(shown.time);
+  const isRow = record.data[record.at(after) + TIME] === shown.time;
+  const row = way > 0 && !isRow ? after : after + way;
+  seek(record.data[record.at(Math.min(record.length - 1, Math.max(0, row))) + TIME]);
 }
 
 /** Plays on from where it is, or from `back` seconds before now. @param {number} speed @param {number} back */
@@ -238,14 +240,6 @@ export function advance(seconds) {
   if (!all) goLive();
   else if (next >= all.to) goLive(); // caught up with the arm
   else seek(next);
-}
-
-/** @param {number} time */
-function nearest(time) {
-  const after = Math.min(firstAfter(time), record.length - 1);
-  if (after === 0) return 0;
-  const at = (/** @type {number} */ row) => record.data[record.at(row) + TIME];
-  return time - at(after - 1) < at(after) - time ? after - 1 : after;
 }
 
 function read(/** @type {number} */ time) {

@@ -101,12 +101,6 @@ export function cheapest(rungs, wanted) {
  * @property {number} wall_time
  */
 
-/** The last entry that is a number, and its place; null if there is none. @param {(number | null)[]} list */
-function lastNumber(list) {
-  for (let k = list.length - 1; k >= 0; k -= 1) if (Number.isFinite(list[k])) return { k, value: /** @type {number} */ (list[k]) };
-  return null;
-}
-
 /** When the run diverged [s]; null if it lasted. @param {Run} run @param {number} seconds */
 export function divergedAt(run, seconds) {
   return endOf(run.times, seconds, run.timestep);
@@ -114,9 +108,7 @@ export function divergedAt(run, seconds) {
 
 /** Energy at the end less that at the start [J]; null where the run did not last. @param {Run} run @param {number} seconds */
 export function energyGained(run, seconds) {
-  if (divergedAt(run, seconds) !== null) return null;
-  const [first, last] = [run.energy[0], lastNumber(run.energy)];
-  return first === null || first === undefined || !last ? null : last.value - first;
+  return divergedAt(run, seconds) === null ? Number(run.energy.at(-1)) - Number(run.energy[0]) : null;
 }
 
 /**

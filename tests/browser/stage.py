@@ -3,6 +3,8 @@
 Invariant: a test passes only if its page's console said nothing: no exception, no error, no violation of the policy.
 """
 
+import atexit
+import functools
 import os
 import pathlib
 import re
@@ -21,14 +23,11 @@ FOREIGN = "elsewhere.example"
 
 NUMBER = "input[type=number]"
 
-_browser = None
-
-
+@functools.cache
 def browser():
-    global _browser
-    if _browser is None:
-        _browser = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
-    return _browser
+    one = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
+    atexit.register(one.__exit__)
+    return one
 
 
 def needs_server(why):
@@ -39,11 +38,6 @@ def needs_server(why):
 def milliseconds(seconds):
     """A time as the page writes it."""
     return f"{float(format(1000 * seconds, '.3g')):g} ms"
-
-
-def close_browser():
-    if _browser is not None:
-        _browser.__exit__()
 
 
 class PageTest(unittest.TestCase):

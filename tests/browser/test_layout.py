@@ -169,13 +169,6 @@ class Phone(Free, Steady, Access, PageTest):
                               ".filter(([, height]) => height < 44)")
         self.assertEqual(small, [])
 
-    def test_the_setpoint_is_placed_by_touch(self):
-        self.runtime.call("/pid_controller/enable", data=True)
-        self.page.run("document.querySelector('input[name=drag][value=setpoint]').click()")
-        self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)))
-        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.end_effector(), (-0.4, 1.3))) < 0.02 ** 2, "end effector at the setpoint")
-        self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
-
 
 class PhoneDark(Access, PageTest):
     view = {**PHONE, "dark": True}

@@ -14,6 +14,13 @@ class BlowUp(PageTest):
         self.page.click("#controller")
         self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
 
+    def click_map(self, timestep, factor):
+        """A click at a timestep between 0.1 ms and 100 ms, and at a multiple of the gains between 1/16 and 16."""
+        left, top, width, height = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        place = left + 46 + (width - 56) * math.log10(timestep / 1e-4) / 3, top + height - 32 - (height - 40) * (0.5 + math.log(factor, 256))
+        self.page.mouse("mousePressed", *place)
+        self.page.mouse("mouseReleased", *place)
+
     def test_the_growth_is_a_picture_with_a_scale_that_can_be_read(self):
         self.diverge()
         self.page.until(r"/^Diverged at t = [\d.]+ s\. /.test(document.querySelector('#notice').textContent)")
@@ -44,11 +51,7 @@ class BlowUp(PageTest):
         self.diverge()
         begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Restart')"
         self.page.until(begin_anew)
-        box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
-        # 0.2 ms at the present gains.
-        x, y = box[0] + 46 + (box[2] - 56) * math.log10(2) / 3, box[1] + 8 + (box[3] - 40) / 2
-        self.page.mouse("mousePressed", x, y)
-        self.page.mouse("mouseReleased", x, y)
+        self.click_map(2e-4, 1)
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
 
@@ -68,12 +71,7 @@ class BlowUp(PageTest):
         self.tab("stability")
         self.page.until("document.querySelector('#map-text').textContent.includes('Higher gains')")
         self.keep("stability")
-        box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
-        # 10 ms is two thirds of the way from 0.1 ms to 100 ms; four times the gains is three quarters of the way up.
-        x = box[0] + 46 + (box[2] - 56) * 2 / 3
-        y = box[1] + box[3] - 32 - (box[3] - 40) * 3 / 4
-        self.page.mouse("mousePressed", x, y)
-        self.page.mouse("mouseReleased", x, y)
+        self.click_map(0.01, 4)
         self.wait(lambda: abs(math.log(self.values("/arm_sim/set_integrator")["timestep"] / 0.01)) < 0.05, "timestep")
         self.wait(lambda: abs(math.log(self.values("/pid_controller/set_gains")["kp"][0] / 4000)) < 0.05, "gains")
 
