@@ -1,4 +1,3 @@
-// @ts-check
 // Pointing at the arm's canvas: a drag sends goals for the end effector, places the setpoint, or lifts the arm itself.
 // Arrow keys do the same for those who use no pointer.
 // Invariant: one request at a time leaves while aiming, at a bounded rate, and the last place is always sent.

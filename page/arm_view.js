@@ -1,4 +1,3 @@
-// @ts-check
 // The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
 // Invariant: nothing is drawn while nothing is seen to change. All that lies behind the arm is drawn ten times a second at most.

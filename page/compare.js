@@ -1,4 +1,3 @@
-// @ts-check
 // All methods at one timestep against a reference: the same arm, from the same state, computed offline by the runtime, drawn over one
 // another and played back together, with error, energy and a joint's angle over time. Other timesteps are in the panel Error.
 // Invariant: the runs that are compared are the runtime's answers; the live arm is not touched. All are shown at the same instant; a

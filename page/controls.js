@@ -1,4 +1,3 @@
-// @ts-check
 // The settings: integrator and timestep, controller and gains, gravity, masses, lengths and setpoint.
 // Invariant: a control changes only to values that the runtime accepted. A refusal is shown beside it.
 

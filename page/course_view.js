@@ -1,4 +1,3 @@
-// @ts-check
 // Shows the course, a step at a time: sets its scene, draws its chart, ticks its task, checks its answer.
 // Invariant: an arm that others watch changes only when somebody clicks: a link that names a step shows it, and waits for Start.
 // The arm of the page in one file belongs to its page: there the step begins at once.

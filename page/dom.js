@@ -1,4 +1,3 @@
-// @ts-check
 // Makes elements from code, and says aloud to screen readers what others see happen: goals reached, refusals, a lost connection.
 // Text is always text, never markup, whatever the runtime sends.
 // Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need. Only events are said aloud:

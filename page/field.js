@@ -1,4 +1,3 @@
-// @ts-check
 // A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
 // Invariant: the field has the value in force, except while somebody is changing it.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // The last five minutes of the arm, one row per joint state: the source of the plots and the CSV file. It can be looked at again
 // while the arm goes on: a time in it, step by step, in slow motion, and back to now. The arm itself always runs in real time.
 // Invariant: rows are in order of simulation time, without repeats; a reset begins anew. Its memory is taken once. Looking back changes

@@ -1,4 +1,3 @@
-// @ts-check
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
 // Invariant: no shortcut acts while somebody types, and all can be switched off.
 

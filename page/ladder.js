@@ -1,4 +1,3 @@
-// @ts-check
 // Figures of offline runs. Error against run time: which runs to ask for, and what their answers say. A comparison: how far each run
 // lies from the reference over time, where it ended, what it gained.
 // Invariant: a run without an error is told apart from one that diverged; neither becomes a number. A run that ended early has figures

@@ -1,4 +1,3 @@
-// @ts-check
 // Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
 // Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and files to keep,
 // the recording as CSV, the plots as PNG.
 // Invariant: a file is handed to the browser and released.

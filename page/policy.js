@@ -1,4 +1,3 @@
-// @ts-check
 // A verdict on the present timestep: the limit of the loop in force, where it holds, and both verdict and reason in words.
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 

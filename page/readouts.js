@@ -1,4 +1,3 @@
-// @ts-check
 // Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
 // Invariant: written a few times a second; only what changed touches the page.
 

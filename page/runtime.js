@@ -1,4 +1,3 @@
-// @ts-check
 // The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 

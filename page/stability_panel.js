@@ -1,4 +1,3 @@
-// @ts-check
 // What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
 // timestep, where the loop with held efforts is stable and where not, the present point in it; a click goes there, and so do the
 // arrow keys. And a small push, in speed, of the loop in force, step by step.

@@ -1,4 +1,3 @@
-// @ts-check
 // All that the page knows about the runtime, in one place; a view watches the part that it shows.
 // Invariant: only what the runtime has said is stored here, never what was merely asked for.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // Charts of the recording: quantities over the last seconds of simulation time, and velocity over position, where the present state
 // is a dot; one colour per joint.
 // Invariant: rows are read where they stand in the history. They draw on whatever context they are given.

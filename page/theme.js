@@ -1,4 +1,3 @@
-// @ts-check
 // Light and dark, and the colours that the canvases take from the style sheet.
 // Invariant: colours are spelled in `style.css` only.
 

@@ -16,6 +16,7 @@ from chromium import Browser
 from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
+ARTEFACTS.mkdir(parents=True, exist_ok=True)
 # Which page is tried: that of a server, or the one in a file.
 IS_FILE = os.environ.get("FORM") == "file"
 # A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
@@ -61,6 +62,7 @@ class PageTest(unittest.TestCase):
             self.runtime.page = page
         self.addCleanup(page.close)
         self.addCleanup(lambda: self.assertEqual(page.complaints, []))
+        self.addCleanup(lambda: page.screenshot(ARTEFACTS / f"{self.id()}.png"))
         self.connected(page)
         return page
 
@@ -91,8 +93,7 @@ class PageTest(unittest.TestCase):
         self.page.until(f"!document.querySelector('#{name}').hidden")
 
     def keep(self, name, **how):
-        """A screenshot, kept as an artefact."""
-        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        """A screenshot on the way; each test keeps one of its end."""
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):

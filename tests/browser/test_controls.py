@@ -109,7 +109,6 @@ class Controls(PageTest):
         self.wait(lambda: self.values("/pid_controller/set_period")["period"] == 0, "undone")
         self.page.click("#controller")
         self.page.until(f"{slider}.getAttribute('aria-valuetext').startsWith('every step, stable up to ')")
-        self.keep("clocks")
         marks = self.page.run("[...document.querySelectorAll('#timestep-field .mark, #period-field .mark')].map((one) => one.getBoundingClientRect().x)")
         self.assertEqual(len(marks), 2)
         self.assertAlmostEqual(*marks, delta=1, msg="the same limit is at the same place of both sliders")
@@ -140,7 +139,6 @@ class Controls(PageTest):
             self.assertEqual(self.page.run(f"document.querySelector('#{field} {NUMBER}').value"), shown)
             self.assertEqual(self.page.run(f"document.querySelector('#{field} {NUMBER}').getAttribute('aria-invalid')"), "true")
             self.assertEqual(self.values(service), before)
-        self.keep("refusals", whole=True)
         self.page.fill(self.field("masses-fields"), "2")
         self.page.until("document.querySelector('#masses-fields .refusal').textContent === ''")
         self.page.fill(self.field("timestep-field"), "1")
@@ -182,7 +180,6 @@ class Controls(PageTest):
         before = self.runtime.next("/ik_trial/status")["target"]
         self.page.click("#trial-skip")
         self.wait(lambda: self.runtime.next("/ik_trial/status")["target"] != before, "another target")
-        self.keep("trial")
         self.page.click("#trial-stop")
         self.page.until("document.querySelector('#trial-clock').textContent.startsWith('ended')")
         self.assertFalse(self.runtime.next("/ik_trial/status")["running"])
@@ -209,7 +206,6 @@ class Controls(PageTest):
         error = self.values("/study/rollout", q0=[0, 0], duration=4.998, timestep=0.007, integrator="rk4", reference=True)["error"]
         self.assertAlmostEqual(float(rows[3][3].removesuffix(" rad").replace("\u2212", "-")) / error, 1, delta=0.1)
         self.assertIn("At 7 ms, against Runge–Kutta 4 at 875 µs", self.page.text("#compare-text"))
-        self.keep("compare")
 
     # Keys
 
@@ -254,7 +250,6 @@ class Controls(PageTest):
         self.page.run("document.activeElement.blur()")
         self.page.key("?", shift=True)
         self.page.until("document.querySelector('#help').open")
-        self.keep("keys")
         self.page.click("#shortcuts-on")
         self.page.click("#help-close")
         self.page.key("c")

@@ -25,7 +25,6 @@ class BlowUp(PageTest):
         self.diverge()
         self.page.until(r"/^Diverged at t = [\d.]+ s\. /.test(document.querySelector('#notice').textContent)")
         self.assertGreater(self.image("#arm").count(self.color("bad")), 500)
-        self.keep("blow-up")
         # The plot shows more than one line along an axis and a spike: the line is at several heights.
         picture = self.image("#plot-velocity")
         color = self.color("joint1")
@@ -70,7 +69,6 @@ class BlowUp(PageTest):
     def test_a_click_in_the_map_goes_there(self):
         self.tab("stability")
         self.page.until("document.querySelector('#map-text').textContent.includes('Higher gains')")
-        self.keep("stability")
         self.click_map(0.01, 4)
         self.wait(lambda: abs(math.log(self.values("/arm_sim/set_integrator")["timestep"] / 0.01)) < 0.05, "timestep")
         self.wait(lambda: abs(math.log(self.values("/pid_controller/set_gains")["kp"][0] / 4000)) < 0.05, "gains")
@@ -84,7 +82,6 @@ class BlowUp(PageTest):
         picture = self.image("#push-bars")
         self.assertGreater(picture.count(self.color("bad")), 200)
         self.assertGreater(picture.count(self.color("accent")), 200)
-        self.keep("push")
 
     def test_error_against_run_time_is_measured_live(self):
         self.tab("error")
@@ -99,7 +96,6 @@ class BlowUp(PageTest):
         for method in range(1, 5):
             self.assertGreater(self.image("#ladder").count(self.color(f"method{method}")), 40)
         self.assertIn("costs least", self.page.text("#ladder-text"))
-        self.keep("error")
 
     def test_an_error_that_was_measured_is_not_shown_for_another_run_or_arm(self):
         cell = "document.querySelector('#ladder-table tbody tr:last-child td:last-child')?.textContent ?? ''"
@@ -187,7 +183,6 @@ class Right(PageTest):
         shown = "document.querySelector('#why-text')"
         text = self.page.until(f"{shown}.checkVisibility() && {shown}.textContent.startsWith({json.dumps(begins)}) && {shown}.textContent")
         self.assertIn("overshoots", text)
-        self.keep("why")
 
     def test_a_mark_of_a_target_goes_once_the_arm_is_sent_elsewhere(self):
         self.page.click("#controller")

@@ -14,7 +14,6 @@ class View:
 
     def test_the_arm_is_drawn_where_the_runtime_says_it_is(self):
         self.settle(self.pose())
-        self.keep(f"{type(self).__name__}-pose")
         ends = self.runtime.joints()
         density = self.view.get("density", 1)
         left, top = self.on_canvas((0, 0))

@@ -53,7 +53,6 @@ class Ways(PageTest):
         self.page.until(f"{live}.then((time) => time > {live_began + 1})", why="the arm goes on for a second")
         _, now, shows = self.page.run(look)
         self.assertLess(shows - shown, 0.4 * (now - began), "slow motion")
-        self.keep("recording")
         self.page.click("#history-live")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
 
@@ -65,7 +64,6 @@ class Ways(PageTest):
         x, y = self.page.place("#plot-position")
         self.page.mouse("mouseMoved", x + 150, y)
         self.page.until(f"document.querySelector('#legend-velocity').textContent !== {json.dumps(now)}")
-        self.keep("cursor")
         self.page.mouse("mouseMoved", 5, 5)
         self.page.until(f"document.querySelector('#legend-velocity').textContent === {json.dumps(now)}")
 
