@@ -8,7 +8,7 @@ import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, METHODS, shortName } from "./format.js";
-import { ENERGY, KINETIC, POTENTIAL, TIME, VELOCITY, record } from "./history.js";
+import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
@@ -114,10 +114,6 @@ export function chooseLinks(links) {
 /** Ten times a second at most, while something changes. */
 export function moveCourse() {
   if (state.view === "course" && stripTime !== newest()) surface.redraw();
-}
-
-function newest() {
-  return record.length > 0 ? record.data[record.last() + TIME] : NaN;
 }
 
 function rest() {

@@ -170,6 +170,11 @@ export const shown = {
   setpointKnown: false,
 };
 
+/** The time of the newest row [s]; NaN where there is none. */
+export function newest() {
+  return record.length > 0 ? record.data[record.last() + TIME] : NaN;
+}
+
 /** The first and the last time of the recording [s]; null where there is none. */
 export function span() {
   if (record.length === 0) return null;

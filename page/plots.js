@@ -5,7 +5,7 @@
 import { STRONG, write } from "./chart.js";
 import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
-import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, POSITION, POTENTIAL, record, SETPOINT, shown as pose, TIME, VELOCITY } from "./history.js";
+import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, newest, POSITION, POTENTIAL, record, SETPOINT, shown as pose, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
 import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
@@ -79,17 +79,13 @@ function toggleScales() {
   redraw();
 }
 
-function newest() {
-  return record.length > 0 ? record.data[record.last() + TIME] : 0;
-}
-
 function shownSpan() {
   return state.diverged && pose.live ? Math.min(span, BLOW_UP_SECONDS) : span;
 }
 
 /** The right edge of the plots: now, or so that what is looked at of the recording is within. */
 function edge() {
-  const end = newest();
+  const end = newest() || 0;
   if (pose.live || pose.time > end - span) return end;
   return pose.time + span / 2;
 }
