@@ -1,4 +1,3 @@
-// @ts-check
 // Actions on all settings at once: the page applies them, undoes the last change, goes back to the defaults, sets a scene;
 // and the reset that belongs to it.
 // Invariant: every change can be undone, and what the runtime refused is said.

@@ -1,4 +1,3 @@
-// @ts-check
 // Pointing at the arm's canvas: a drag sends goals for the end effector, places the setpoint, or lifts the arm itself.
 // Arrow keys do the same for those who use no pointer.
 // Invariant: one request at a time leaves while aiming, at a bounded rate, and the last place is always sent.
@@ -62,8 +61,7 @@ function finish(place) {
 /** The pose with the end effector at a place, within half a turn of where each joint is; a diverged arm has lost count of turns. */
 async function poseAt({ x, y }) {
   const answer = await solve({ x, y });
-  const diverged = state.diagnostics?.state === "diverged";
-  return { answer, pose: answer.values.positions?.map((q, i) => (diverged ? q : nearestTurn(q, state.position[i]))) };
+  return { answer, pose: answer.values.positions?.map((q, i) => (state.diverged ? q : nearestTurn(q, state.position[i]))) };
 }
 
 async function placeSetpoint(place) {

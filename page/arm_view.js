@@ -1,7 +1,6 @@
-// @ts-check
 // The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
-// Invariant: nothing is drawn while nothing is seen to change; the backdrop is drawn once per size, parameters and theme.
+// Invariant: nothing is drawn while nothing is seen to change. All that lies behind the arm is drawn ten times a second at most.
 
 import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
 import { byId } from "./dom.js";
@@ -16,7 +15,6 @@ import { drawTrail, SECONDS as TRAIL_SECONDS } from "./trail.js";
 
 /** A joint that would be seen elsewhere by less has not moved [px]. */
 const SEEN = 0.1;
-const RIPPLE_MS = 700;
 const NO_DASH = [];
 const BOTH_WAYS = [-1, 1];
 const ROOM = 1.14; // of the reach, so that circles and labels have space
@@ -30,41 +28,27 @@ const y = new Float64Array(MOST_LINKS + 1);
 const load = new Float64Array(MOST_LINKS);
 const drawn = { position: new Float64Array(MOST_LINKS), velocity: new Float64Array(MOST_LINKS), effort: new Float64Array(MOST_LINKS) };
 const REST = new Float64Array(MOST_LINKS); // stretched along +x, where the gravity load is largest
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 let surface;
 let context;
-let backdrop; // grid and circles, drawn once per size
-let behind; // the same with the trail
+let behind; // all that lies behind the arm: grid, circles, trail and ghost
 let behindTime = NaN;
 let stale = true;
 let behindStale = true;
 let fullEffort = 1; // N m, all that gravity could ask for
-let reachedAt = -Infinity;
 let scale = 100; // pixels per metre
 let arrows = false; // whether velocities are drawn
 /** Where the pointer aims, while it does: { x, y, phi, mode, refused }; see `aim.js`. */
 let aim = null;
 
 export function startArmView(canvas) {
-  backdrop = document.createElement("canvas");
   behind = document.createElement("canvas");
   surface = new Surface(canvas, () => {}, resized);
   context = surface.context;
   watch("params", resized);
   watch("links", resized);
   watch("setpoint", () => { follow(); redraw(); });
-  watch("playback", redraw);
-  watch(["joint", "enabled"], redraw);
-  let diverged = false;
-  watch("diagnostics", ({ state: now }) => {
-    if ((now === "diverged") !== diverged) redraw();
-    diverged = now === "diverged";
-  });
-  watch("goal", (goal) => {
-    if (goal?.outcome === "reached") reachedAt = performance.now();
-    redraw();
-  });
+  watch(["playback", "joint", "enabled", "diverged", "goal"], redraw);
   byId("arrows").addEventListener("change", (event) => {
     arrows = event.target.checked;
     redraw();
@@ -113,7 +97,6 @@ function resized() {
   }
   behind.width = surface.canvas.width;
   behind.height = surface.canvas.height;
-  drawBackdrop(backdrop, surface, scale, lengths(), state.params?.gravity ?? 0);
   redraw();
 }
 
@@ -138,39 +121,40 @@ function py(metres) {
   return surface.height / 2 - metres * scale;
 }
 
-/** Gives whether something moves on by itself. */
-function drawArm(now) {
-  const ripple = !calm.matches && now - reachedAt < RIPPLE_MS;
-  if (!stale && !ripple && !hasMoved()) return false;
-  stale = ripple; // one frame more after the last of it
+/** No more frame is needed after it. */
+function drawArm() {
+  if (!stale && !hasMoved()) return false;
+  stale = false;
   for (const name of /** @type {const} */ (["position", "velocity", "effort"])) drawn[name].set(shown[name]);
-  const { width, height } = surface;
-  context.globalAlpha = 1;
-  context.setLineDash(NO_DASH);
   const n = state.links;
   const known = n > 0 && state.params?.lengths.length === n;
-  if (known && behindStale) paintBehind(n);
-  context.drawImage(known ? behind : backdrop, 0, 0, width, height);
+  if (behindStale) paintBehind(known ? n : 0);
+  context.globalAlpha = 1;
+  context.setLineDash(NO_DASH);
+  context.drawImage(behind, 0, 0, surface.width, surface.height);
   if (!known) return false;
   context.lineCap = "round";
   context.lineJoin = "round";
   drawTrail(context, n, lengths(), px, py, behindTime, shown.time, 1);
-  drawTarget(n, ripple ? (now - reachedAt) / RIPPLE_MS : 1);
+  drawTarget(n);
   drawLinks(n);
-  return ripple;
+  return false;
 }
 
-/** Paints all that lies behind the arm: the backdrop, the trail up to now and the setpoint's ghost. Between two paintings the trail's
- * latest piece is drawn on each frame. */
+/** Paints all that lies behind an arm of `n` links, 0 where it is not known. Between two paintings the trail's latest piece is drawn
+ * on each frame. */
 function paintBehind(n) {
   behindStale = false;
   const paint = behind.getContext("2d", { alpha: false });
-  paint.resetTransform();
-  paint.globalAlpha = 1;
-  paint.drawImage(backdrop, 0, 0);
   paint.setTransform(context.getTransform());
-  drawTrail(paint, n, lengths(), px, py, shown.time - TRAIL_SECONDS, shown.time);
-  if (shown.setpointKnown) drawGhost(paint, n);
+  paint.globalAlpha = 1;
+  paint.fillStyle = colors.page;
+  paint.fillRect(0, 0, surface.width, surface.height);
+  drawReach(paint);
+  drawGrid(paint);
+  drawGravity(paint, state.params?.gravity ?? 0);
+  if (n > 0) drawTrail(paint, n, lengths(), px, py, shown.time - TRAIL_SECONDS, shown.time);
+  if (n > 0 && shown.setpointKnown) drawGhost(paint, n);
   behindTime = shown.time;
 }
 
@@ -186,7 +170,7 @@ function drawGhost(paint, n) {
   paint.globalAlpha = 1;
 }
 
-function drawTarget(n, ripple) {
+function drawTarget(n) {
   const { goal } = state;
   const shown = aim?.mode === "goal" ? aim : goal?.target;
   if (shown) {
@@ -194,10 +178,6 @@ function drawTarget(n, ripple) {
     const color = aim?.refused ? colors.bad : done && goal?.outcome === "reached" ? colors.good : colors.target;
     if (!aim && goal?.outcome === "active") drawWay(n, shown, color);
     drawCross(shown, goal?.epsilon ?? DEFAULT_EPSILON, color, done ? 0.75 : 1);
-    if (ripple < 1) {
-      context.globalAlpha = 1 - ripple;
-      circle(context, px(shown.x), py(shown.y), 8 + 34 * ripple, "", color, 2);
-    }
   }
   if (aim?.mode === "setpoint" || (aim?.mode === "arm" && aim.refused)) drawCross(aim, 0, aim.refused ? colors.bad : colors.ink, 1);
   context.globalAlpha = 1;
@@ -232,14 +212,13 @@ function drawCross(target, epsilon, color, alpha) {
 
 function drawLinks(n) {
   const l = lengths();
-  const diverged = state.diagnostics?.state === "diverged";
   joints(n, shown.position, l, x, y);
   const room = Math.min(1, Math.min(surface.width, surface.height) / 420); // smaller on a telephone
   for (let i = 0; i < n; i += 1) {
     // Heavier rods of the same length are drawn thicker, within reason.
     const thickness = room * Math.min(26, Math.max(7, 14 * Math.sqrt(state.params.masses[i] / l[i])));
     line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.panel, thickness + 4);
-    line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), diverged ? colors.bad : colors.joints[i], thickness);
+    line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), state.diverged ? colors.bad : colors.joints[i], thickness);
   }
   base(room);
   for (let i = 0; i < n; i += 1) {
@@ -305,37 +284,24 @@ function drawVelocities(n) {
 const CLOCK = 56;
 const LABEL = "11px system-ui, sans-serif";
 
-function drawBackdrop(canvas, surface, scale, lengths, gravity) {
-  canvas.width = surface.canvas.width;
-  canvas.height = surface.canvas.height;
-  const context = canvas.getContext("2d", { alpha: false });
-  context.setTransform(surface.canvas.width / Math.max(1, surface.width), 0, 0, surface.canvas.height / Math.max(1, surface.height), 0, 0);
-  const { width, height } = surface;
-  context.fillStyle = colors.page;
-  context.fillRect(0, 0, width, height);
-  const cx = width / 2;
-  const cy = height / 2;
-  drawReach(context, cx, cy, scale, lengths);
-  drawGrid(context, width, height, scale);
-  drawGravity(context, width, gravity);
-}
-
-function drawReach(context, cx, cy, scale, lengths) {
-  context.fillStyle = colors.panel;
-  context.beginPath();
-  context.arc(cx, cy, reach(lengths) * scale, 0, 2 * Math.PI);
-  const inner = innerReach(lengths) * scale;
-  if (inner > 0) context.arc(cx, cy, inner, 0, 2 * Math.PI, true);
-  context.fill();
-  context.globalAlpha = 0.7;
-  context.setLineDash([2, 5]);
-  for (const radius of [reach(lengths) * scale, inner]) circle(context, cx, cy, radius, "", colors.muted, 1.25);
-  context.setLineDash([]);
-  context.globalAlpha = 1;
+function drawReach(paint) {
+  const inner = innerReach(lengths()) * scale;
+  const outer = reach(lengths()) * scale;
+  paint.fillStyle = colors.panel;
+  paint.beginPath();
+  paint.arc(px(0), py(0), outer, 0, 2 * Math.PI);
+  if (inner > 0) paint.arc(px(0), py(0), inner, 0, 2 * Math.PI, true);
+  paint.fill();
+  paint.globalAlpha = 0.7;
+  paint.setLineDash([2, 5]);
+  for (const radius of [outer, inner]) circle(paint, px(0), py(0), radius, "", colors.muted, 1.25);
+  paint.setLineDash(NO_DASH);
+  paint.globalAlpha = 1;
 }
 
 /** Lines at a round number of metres, at least 45 pixels apart. */
-function drawGrid(context, width, height, scale) {
+function drawGrid(context) {
+  const { width, height } = surface;
   const rough = 45 / scale;
   const power = 10 ** Math.floor(Math.log10(rough));
   const metres = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough);
@@ -372,8 +338,8 @@ function write(context, text, x, y) {
   context.lineWidth = 1;
 }
 
-function drawGravity(context, width, gravity) {
-  const x = width - 26;
+function drawGravity(context, gravity) {
+  const x = surface.width - 26;
   const text = gravity > 0 ? `g ${significant(gravity, 3)} m/s²` : "no gravity";
   writeText(context, text, x - (gravity > 0 ? 12 : -14), 28, "right", colors.muted, "12px system-ui, sans-serif");
   if (!(gravity > 0)) return;

@@ -1,10 +1,10 @@
-// @ts-check
 // One chart: a frame with two scales, their marks and titles; in it lines, areas, dots. The strokes that other pictures use; and
 // charts of what they are given: a map of limits, bars of a deviation, two errors, the arm of a scene.
-// Invariant: it draws on whatever context it is given, a canvas or an SVG file. Axes are fixed where a student compares one setting
+// Invariant: it draws on whatever context it is given, on the screen or of a picture to be saved. Axes are fixed where a student compares one setting
 // with the next.
 
 import { significant } from "./format.js";
+import { joints, reach } from "./mechanics.js";
 import { Pencil } from "./pencil.js";
 import { LogScale, powerOfTen } from "./scale.js";
 import { colors } from "./theme.js";
@@ -267,15 +267,11 @@ export function drawErrors({ context, width, height }, errors) {
 export function drawPicture({ context, width, height }, { start, settings }) {
   const lengths = settings.params?.lengths ?? start.map(() => 1);
   const masses = settings.params?.masses ?? start.map(() => 1);
-  const total = lengths.reduce((sum, one) => sum + one, 0);
-  let [x, y, phi] = [width / 2, height / 2, 0];
-  const scale = (Math.min(width, height) / 2 - 5) / total;
+  const scale = (Math.min(width, height) / 2 - 5) / reach(lengths);
+  const [x, y] = [/** @type {number[]} */ ([]), /** @type {number[]} */ ([])];
+  joints(start.length, start, lengths, x, y);
+  const [px, py] = [(/** @type {number} */ metres) => width / 2 + scale * metres, (/** @type {number} */ metres) => height / 2 - scale * metres];
   context.lineCap = "round";
-  start.forEach((angle, i) => {
-    phi += angle;
-    const [endX, endY] = [x + scale * lengths[i] * Math.cos(phi), y - scale * lengths[i] * Math.sin(phi)];
-    line(context, x, y, endX, endY, colors.joints[i], Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, masses[i])))));
-    [x, y] = [endX, endY];
-  });
+  masses.forEach((mass, i) => line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.joints[i], Math.min(9, Math.max(1.5, 4 + 0.8 * Math.log10(Math.max(1e-9, mass))))));
   circle(context, width / 2, height / 2, 3, colors.muted);
 }

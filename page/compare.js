@@ -1,298 +1,217 @@
-// @ts-check
-// Any number of integrators and timesteps against a reference: the same arm, from the same state, computed offline by the
-// runtime, drawn over one another and played back together, with error, energy and a joint's angle over time.
+// All methods at one timestep against a reference: the same arm, from the same state, computed offline by the runtime, drawn over one
+// another and played back together, with error, energy and a joint's angle over time. Other timesteps are in the panel Error.
 // Invariant: the runs that are compared are the runtime's answers; the live arm is not touched. All are shown at the same instant; a
 // run that ends early is drawn as far as it goes, its last pose as a ghost.
 
 import { Chart, circle, links as drawLinks } from "./chart.js";
-import { announce, byId, el, setText } from "./dom.js";
-import { option, refusal } from "./field.js";
-import { duration, fixed, METHODS, shortName, significant } from "./format.js";
+import { announce, byId, fillTable, setText } from "./dom.js";
+import { busy, option, panel } from "./field.js";
+import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { commonSamples, describeRun, distances, divergedAt, partsAt, resample } from "./ladder.js";
+import { describeRun, distances, divergedAt, partsAt } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { Axis, LogScale, times } from "./scale.js";
 import { MOST_LINKS, state, watch } from "./store.js";
 import { onFrame, Surface, wake } from "./surface.js";
 import { colors } from "./theme.js";
 
-const MOST_RUNS = 6;
-/** The reference is Runge-Kutta 4 at this part of the smallest timestep. */
+/** The reference is Runge-Kutta 4 at this part of the timestep. */
 const REFERENCE_PART = 1 / 8;
 const PARTED = 0.1; // rad: from there on it is another motion
-
+/** Enough samples for a smooth trail, few enough to draw at once. */
+const MOST_SAMPLES = 600;
 const SECONDS = 5; // where no duration is given
+/** Errors smaller than this are rounding [rad]. */
+const SMALLEST = 1e-13;
+const ROOM = { left: 50 };
+const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]]);
 
-let view;
+const x = new Float64Array(MOST_LINKS + 1);
+const y = new Float64Array(MOST_LINKS + 1);
+
+const timestep = option({ label: "timestep", unit: "ms", value: 10 });
+const seconds = option({ label: "duration", unit: "s", value: SECONDS, placeholder: String(SECONDS) });
+const from = option({ label: "start", choices: [["now", "as it is"], ["rest", "stretched out"]] });
+const controller = option({ label: "controller", choices: [["off", "off"], ["on", "on"]] });
 let said;
-let rows = [];
-let seconds;
-let from;
-let controller;
-let go;
-let add;
+let surfaces = /** @type {Surface[]} */ ([]);
+/** The runs that are shown, the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy: number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]} */
+let runs = [];
+let instants = /** @type {number[]} */ ([]); // of the reference's samples [s]
+let lengths = /** @type {number[]} */ ([]);
+let at = 0; // the instant that is shown
+let playing = false;
+let began = 0; // when it would have been at the first instant [ms]
 
 export function startCompare() {
-  seconds = option({ label: "duration", unit: "s", value: SECONDS, placeholder: String(SECONDS) });
-  from = select("start", [["now", "as it is"], ["rest", "stretched out"]]);
-  controller = select("controller", [["off", "off"], ["on", "on"]]);
-  go = el("button", { type: "submit", class: "primary" }, "Compare");
-  add = el("button", { type: "button", class: "small", onclick: () => addRow("rk4", 0.001) }, "Add a run");
-  said = refusal(go);
-  byId("compare-form").append(
-    el("div", { class: "compare-rows" }, el("div", { id: "compare-rows", class: "as-parts" }), add),
-    el("div", { class: "compare-row" }, seconds.element, from.element, controller.element, go), said.element,
-  );
-  addRow("euler", 0.01);
-  addRow("rk4", 0.01);
-  byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
-  view = new CompareView();
+  said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Reckoning…", compare), { type: "submit", class: "primary" }]]);
+  const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
+    ["arm", drawArms],
+    ["chart", (surface) => drawLines(surface, () => instants, ({ away }) => away ?? [], errorScale())],
+    ["energy", (surface) => drawLines(surface, (run) => run.times, ({ energy }) => energy, new Axis(3, 0.1, 5000))],
+    ["angle", (surface) => drawLines(surface, () => instants, ({ poses }) => poses.map((q) => (q ? q[state.joint] : null)), new Axis(3, 0.1, 300))],
+  ]);
+  surfaces = pictures.map(([id, paint]) => {
+    const surface = new Surface(byId(`compare-${id}`), () => { if (instants.length > 0) paint(surface); });
+    return surface;
+  });
   watch("links", () => { byId("compare-result").hidden = true; });
+  watch("joint", redraw);
+  byId("compare-scrub").addEventListener("input", ({ target }) => {
+    stop();
+    at = Number(target.value);
+    redraw();
+  });
+  byId("compare-play").addEventListener("click", () => (playing ? stop() : play()));
+  onFrame(playOn);
 }
-
-function select(label, choices) {
-  const input = el("select", {}, ...choices.map(([value, text]) => el("option", { value }, text)));
-  return { input, element: el("label", { class: "option" }, el("span", {}, label), input) };
-}
-
-function addRow(method, timestep) {
-  if (rows.length >= MOST_RUNS) return;
-  const choice = el("select", { "aria-label": "integrator" }, ...METHODS.map(([value]) => el("option", { value }, shortName(value))));
-  choice.value = method;
-  const step = el("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": "timestep", value: timestep });
-  const remove = el("button", { type: "button", class: "small", "aria-label": "remove this run", onclick: () => drop(row) }, "✕");
-  const element = el("div", { class: "side" }, choice, step, el("span", { class: "unit" }, "s"), remove);
-  const row = { choice, step, element };
-  rows.push(row);
-  byId("compare-rows").append(element);
-  number();
-}
-
-function drop(row) {
-  if (rows.length === 1) return;
-  rows = rows.filter((one) => one !== row);
-  row.element.remove();
-  number();
-}
-
-function number() {
-  rows.forEach(({ element }, i) => { element.className = `side run${i + 1}`; });
-  add.disabled = rows.length >= MOST_RUNS;
-}
-
-function request(method, timestep, samples) {
-  const n = state.links;
-  const still = from.input.value === "rest";
-  const zero = new Array(n).fill(0);
-  return {
-    q0: still ? zero : Array.from(state.position.subarray(0, n)),
-    qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
-    duration: lasting(),
-    timestep,
-    integrator: method,
-    params: state.params,
-    samples,
-    ...(controller.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
-  };
-}
-
-/** How long the runs last [s]. */
-const lasting = () => seconds.number() ?? SECONDS;
 
 async function compare() {
   if (state.links === 0 || !state.params) {
     said.show("There is no arm to compare with: not connected.");
     return;
   }
-  go.disabled = true;
-  setText(go, "Reckoning…");
-  const wanted = rows.map(({ choice, step }) => [choice.value, step.value === "" ? state.integrator?.timestep : Number(step.value)]);
-  const finest = Math.min(...wanted.map(([, timestep]) => timestep)) * REFERENCE_PART;
-  wanted.push(["rk4", finest]);
-  const samples = commonSamples(lasting(), wanted.map(([, timestep]) => timestep));
-  const requests = wanted.map(([method, timestep]) => request(method, timestep, samples));
-  const answers = await Promise.all(requests.map((args) => rollout(args)));
-  go.disabled = false;
-  setText(go, "Compare");
-  const failed = answers.findIndex((answer) => !answer.result);
-  if (failed >= 0) {
-    const answer = answers[failed];
-    const name = failed < rows.length ? `run ${failed + 1}` : "the reference";
-    said.show(`${name}: ${answer.status}`);
-    return;
-  }
-  said.show("");
-  const runs = answers.map(({ values }, i) => ({ ...values, method: requests[i].integrator, timestep: requests[i].timestep }));
-  const reference = runs.pop();
-  const away = runs.map((run) => distances(run, reference));
+  const n = state.links;
+  const zero = new Array(n).fill(0);
+  const still = from.input.value === "rest";
+  const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
+  const asked = seconds.number() ?? SECONDS;
+  // A whole number of steps from sample to sample, so that all runs are sampled at the same instants.
+  const every = Math.max(1, Math.ceil(asked / step / MOST_SAMPLES));
+  const intervals = Math.max(1, Math.round(asked / step / every));
+  const lasts = intervals * every * step;
+  const common = {
+    q0: still ? zero : Array.from(state.position.subarray(0, n)), qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
+    duration: lasts, params: state.params, samples: intervals + 1,
+    ...(controller.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
+  };
+  const wanted = [...METHODS.map(([method]) => ({ integrator: method, timestep: step })), { integrator: "rk4", timestep: step * REFERENCE_PART }];
+  const answers = await Promise.all(wanted.map((one) => rollout({ ...common, ...one })));
+  const refused = answers.find((answer) => !answer.result);
+  said.show(refused?.status ?? "");
+  if (refused) return;
+  const found = answers.map(({ values }, i) => ({ ...values, method: wanted[i].integrator, timestep: wanted[i].timestep }));
+  const reference = found.pop();
+  const away = found.map((run) => distances(run, reference));
+  lengths = state.params.lengths;
+  instants = reference.times;
+  runs = [...found, reference].map((run, i) => ({ ...tracked(run, n), away: away[i] ?? null, color: i < found.length ? `method${i + 1}` : "muted" }));
   byId("compare-result").hidden = false;
-  view.show(runs, away, reference, state.params.lengths, state.links, lasting());
-  showTable(runs, away, reference);
+  byId("compare-scrub").max = String(instants.length - 1);
+  at = 0;
+  play();
+  showTable(found, away, reference, lasts);
 }
 
-function showTable(runs, away, reference) {
-  const lasted = lasting();
-  const columns = [["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]];
-  const lines = runs.map((run, i) => describeRun(run, away[i], lasted));
-  byId("compare-table").replaceChildren(
-    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "run"), ...columns.map(([, name]) => el("th", { scope: "col" }, name)))),
-    el("tbody", {}, ...lines.map((line, i) => el("tr", {}, el("th", { scope: "row", class: `run${i + 1}` }, line.name), ...columns.map(([key]) => el("td", {}, line[key]))))),
-  );
-  const words = runs.map((run, i) => {
+/** A run with its poses, null where they are not finite, and the trail of its end effector [m]. */
+function tracked({ times: own, positions, energy }, n) {
+  const poses = positions.map((q) => (q?.every(Number.isFinite) ? q : null));
+  const trail = poses.map((q) => {
+    if (!q) return null;
+    joints(n, q, lengths, x, y);
+    return [x[n], y[n]];
+  });
+  return { times: own, energy, poses, trail, last: poses.findLastIndex((q) => q !== null) };
+}
+
+function showTable(found, away, reference, lasted) {
+  const lines = found.map((run, i) => describeRun(run, away[i], lasted));
+  fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
+  const words = found.map((run, i) => {
     const ended = divergedAt(run, lasted);
     const parts = partsAt(reference.times, away[i], PARTED);
     if (ended !== null) return `${lines[i].name} diverged at t = ${fixed(ended, 2)} s`;
     return parts === null ? `${lines[i].name} stays within ${PARTED} rad` : `${lines[i].name} is ${PARTED} rad off after ${fixed(parts, 2)} s`;
   });
-  const text = `Against Runge–Kutta 4 at ${duration(reference.timestep)}: ${words.join("; ")}.`;
+  const text = `At ${duration(found[0].timestep)}, against Runge–Kutta 4 at ${duration(reference.timestep)}: ${words.join("; ")}.`;
   setText(byId("compare-text"), text);
   announce(text);
 }
 
-const x = new Float64Array(MOST_LINKS + 1);
-const y = new Float64Array(MOST_LINKS + 1);
-/** Errors smaller than this are rounding [rad]. */
-const SMALLEST = 1e-13;
-const ROOM = { left: 50 };
+// Playing them back
 
-class CompareView {
-  constructor() {
-    this.runs = [];
-    this.times = [];
-    this.lengths = [];
-    this.links = 0;
-    this.seconds = 0;
-    this.at = 0;
-    this.playing = false;
-    this.began = 0;
-    this.scrub = byId("compare-scrub");
-    this.play = byId("compare-play");
-    const angle = (run) => run.poses.map((q) => (q ? q[state.joint] : null));
-    const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
-      ["arm", (surface) => this.drawArms(surface)],
-      ["chart", (surface) => this.drawLines(surface, () => this.times, (run) => run.away ?? [], this.errors())],
-      ["energy", (surface) => this.drawLines(surface, (run) => run.energy.times, (run) => run.energy.values, new Axis(3, 0.1, 5000))],
-      ["angle", (surface) => this.drawLines(surface, () => this.times, angle, new Axis(3, 0.1, 300))],
-    ]);
-    this.surfaces = pictures.map(([id, paint]) => {
-      const surface = new Surface(byId(`compare-${id}`), () => { if (this.times.length > 0) paint(surface); });
-      return surface;
-    });
-    watch("joint", () => this.redraw());
-    this.scrub.addEventListener("input", () => {
-      this.stop();
-      this.at = Number(this.scrub.value);
-      this.redraw();
-    });
-    this.play.addEventListener("click", () => (this.playing ? this.stop() : this.start()));
-    onFrame((now) => this.playOn(now));
+function redraw() {
+  for (const surface of surfaces) surface.redraw();
+  if (instants.length === 0) return;
+  setText(byId("compare-joint"), String(state.joint + 1));
+  const words = runs.flatMap(({ away }) => (away ? [away[at] == null ? "ended" : `${significant(away[at], 3)} rad`] : []));
+  byId("compare-scrub").setAttribute("aria-valuetext", `${significant(instants[at], 3)} s, errors ${words.join(", ")}`);
+}
+
+function play() {
+  if (instants.length < 2) return;
+  if (at >= instants.length - 1) at = 0;
+  playing = true;
+  began = performance.now() - 1000 * instants[at];
+  setText(byId("compare-play"), "Pause");
+  wake();
+}
+
+function stop() {
+  playing = false;
+  setText(byId("compare-play"), "Play");
+}
+
+/** Gives whether it plays on. */
+function playOn(now) {
+  if (!playing || state.tab !== "compare") return false;
+  while (at < instants.length - 1 && instants[at] < (now - began) / 1000) at += 1;
+  byId("compare-scrub").value = String(at);
+  if (at >= instants.length - 1) stop();
+  redraw();
+  return playing;
+}
+
+// The pictures
+
+function drawArms({ context, width, height }) {
+  const scale = Math.min(width, height) / (2.2 * reach(lengths));
+  const px = (metres) => width / 2 + metres * scale;
+  const py = (metres) => height / 2 - metres * scale;
+  context.lineCap = "round";
+  context.lineJoin = "round";
+  circle(context, px(0), py(0), reach(lengths) * scale, "", colors.line);
+  context.globalAlpha = 0.4;
+  context.lineWidth = 1.25;
+  for (const { trail, color } of runs) {
+    context.strokeStyle = colors[color];
+    context.beginPath();
+    for (const place of trail.slice(0, at + 1)) if (place) context.lineTo(px(place[0]), py(place[1]));
+    context.stroke();
   }
+  runs.forEach(({ poses, last, color }, k) => {
+    const ended = at > last;
+    const q = poses[ended ? last : at];
+    if (!q) return;
+    joints(lengths.length, q, lengths, x, y);
+    context.globalAlpha = ended ? 0.25 : 0.85;
+    drawLinks(context, lengths.length, x, y, px, py, colors[color], 3 + 2 * (runs.length - k)); // where they agree, all are seen
+  });
+  context.globalAlpha = 1;
+}
 
-  redraw() {
-    for (const surface of this.surfaces) surface.redraw();
-    if (this.times.length === 0) return;
-    setText(byId("compare-joint"), String(state.joint + 1));
-    const words = this.runs.filter(({ isReference }) => !isReference).map(({ away }) => (away[this.at] === null ? "ended" : `${significant(away[this.at], 3)} rad`));
-    this.scrub.setAttribute("aria-valuetext", `${significant(this.times[this.at], 3)} s, errors ${words.join(", ")}`);
+/** From the smallest error that is no rounding to the largest. */
+function errorScale() {
+  const values = runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
+  const high = 10 ** Math.ceil(Math.log10(Math.max(1e-9, ...values)));
+  const scale = new LogScale(Math.max(SMALLEST, Math.min(high / 100, 10 ** Math.floor(Math.log10(Math.min(1, ...values))))), high, []);
+  scale.marks = scale.powers(6, (value) => significant(value, 1));
+  return { ...scale, place: (value) => scale.place(Math.max(value, scale.low)) };
+}
+
+/** @param {Surface} surface @param {(run: any) => number[]} timesOf @param {(run: any) => (number | null)[]} valuesOf @param {any} scale */
+function drawLines({ context, width, height }, timesOf, valuesOf, scale) {
+  if (scale instanceof Axis) {
+    const values = runs.flatMap(valuesOf).filter((one) => one !== null && !Number.isNaN(one));
+    scale.fit(Math.min(...values), Math.max(...values));
   }
-
-  /** Takes the runs, how far each is from the reference at the reference's instants, and the reference. */
-  show(runs, away, reference, lengths, links, seconds) {
-    Object.assign(this, { lengths, links, seconds, times: reference.times });
-    this.runs = [...runs, reference].map((run, i) => {
-      const poses = resample(run, this.times);
-      const trail = poses.map((q) => {
-        if (!q) return null;
-        joints(links, q, lengths, x, y);
-        return [x[links], y[links]];
-      });
-      const isReference = i === runs.length;
-      return { energy: { times: run.times, values: run.energy }, away: away[i], poses, trail, isReference, last: poses.findLastIndex((q) => q !== null), color: isReference ? "muted" : `run${i + 1}` };
-    });
-    this.scrub.max = String(this.times.length - 1);
-    this.at = 0;
-    this.start();
-  }
-
-  start() {
-    if (this.times.length < 2) return;
-    if (this.at >= this.times.length - 1) this.at = 0;
-    this.playing = true;
-    this.began = performance.now() - 1000 * this.times[this.at];
-    setText(this.play, "Pause");
-    wake();
-  }
-
-  stop() {
-    this.playing = false;
-    setText(this.play, "Play");
-  }
-
-  /** Gives whether it plays on. */
-  playOn(now) {
-    if (!this.playing || state.tab !== "compare") return false;
-    const time = (now - this.began) / 1000;
-    while (this.at < this.times.length - 1 && this.times[this.at] < time) this.at += 1;
-    this.scrub.value = String(this.at);
-    if (this.at >= this.times.length - 1) this.stop();
-    this.redraw();
-    return this.playing;
-  }
-
-  drawArms({ context, width, height }) {
-    const scale = Math.min(width, height) / (2.2 * reach(this.lengths));
-    const px = (metres) => width / 2 + metres * scale;
-    const py = (metres) => height / 2 - metres * scale;
-    context.lineCap = "round";
-    context.lineJoin = "round";
-    circle(context, px(0), py(0), reach(this.lengths) * scale, "", colors.line);
-    context.globalAlpha = 0.4;
-    context.lineWidth = 1.25;
-    for (const { trail, color } of this.runs) {
-      context.strokeStyle = colors[color];
-      context.beginPath();
-      for (let i = 0, down = false; i <= this.at; i += 1) {
-        const place = trail[i];
-        if (place && down) context.lineTo(px(place[0]), py(place[1]));
-        else if (place) context.moveTo(px(place[0]), py(place[1]));
-        down = place !== null;
-      }
-      context.stroke();
+  const chart = new Chart(context, width, height, times(0, instants.at(-1) ?? SECONDS), scale, ROOM);
+  chart.frame();
+  chart.inside(() => {
+    for (const run of runs) {
+      const values = valuesOf(run);
+      chart.line(values.length, (i) => timesOf(run)[i], (i) => values[i], colors[run.color], { width: 1.5 });
     }
-    this.runs.forEach(({ poses, last, color }, k) => {
-      const ended = this.at > last;
-      const q = poses[ended ? last : this.at];
-      if (!q) return;
-      joints(this.links, q, this.lengths, x, y);
-      context.globalAlpha = ended ? 0.25 : 0.85;
-      drawLinks(context, this.links, x, y, px, py, colors[color], 3 + 2 * (this.runs.length - k)); // where they agree, all are seen
-    });
-    context.globalAlpha = 1;
-  }
-
-  /** From the smallest error that is no rounding to the largest. */
-  errors() {
-    const values = this.runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
-    const high = 10 ** Math.ceil(Math.log10(Math.max(1e-9, ...values)));
-    const scale = new LogScale(Math.max(SMALLEST, Math.min(high / 100, 10 ** Math.floor(Math.log10(Math.min(1, ...values))))), high, []);
-    scale.marks = scale.powers(6, (value) => significant(value, 1));
-    return { ...scale, place: (value) => scale.place(Math.max(value, scale.low)) };
-  }
-
-  /** @param {Surface} surface @param {(run: any) => number[]} timesOf @param {(run: any) => (number | null)[]} valuesOf @param {any} scale */
-  drawLines({ context, width, height }, timesOf, valuesOf, scale) {
-    if (scale instanceof Axis) {
-      const values = this.runs.flatMap(valuesOf).filter((one) => one !== null && !Number.isNaN(one));
-      scale.fit(Math.min(...values), Math.max(...values));
-    }
-    const chart = new Chart(context, width, height, times(0, this.seconds), scale, ROOM);
-    chart.frame();
-    chart.inside(() => {
-      for (const run of this.runs) {
-        const values = valuesOf(run);
-        chart.line(values.length, (i) => timesOf(run)[i], (i) => values[i], colors[run.color], { width: 1.5 });
-      }
-      chart.upright(this.times[this.at], colors.accent);
-    });
-  }
+    chart.upright(instants[at], colors.accent);
+  });
 }

@@ -1,9 +1,8 @@
-// @ts-check
 // The settings: integrator and timestep, controller and gains, gravity, masses, lengths and setpoint.
 // Invariant: a control changes only to values that the runtime accepted. A refusal is shown beside it.
 
 import { byId, el, setText, warn } from "./dom.js";
-import { numberField, refusal } from "./field.js";
+import { busy, numberField, refusal } from "./field.js";
 import { METHODS, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
@@ -14,7 +13,6 @@ const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.
 /** The same for both clocks, so that places on their sliders compare [ms]. */
 const CLOCK = { unit: "ms", low: 0.01, high: 200, log: true };
 
-const SUGGEST = "Suggest gains for this arm";
 const ECHO_MS = 300;
 
 let placed = []; // the setpoint that was sent last
@@ -29,7 +27,7 @@ export function startControls() {
   startClocks();
   startGravity();
   startController();
-  suggestButton = el("button", { type: "button", class: "small", onclick: takeSuggestion }, SUGGEST);
+  suggestButton = el("button", { type: "button", class: "small", onclick: takeSuggestion }, "Suggest gains for this arm");
   suggestSaid = refusal(suggestButton);
   byId("suggest").append(suggestButton, suggestSaid.element);
   watch("links", makeJointFields);
@@ -96,15 +94,12 @@ export function switchController(on) {
 }
 
 /** Asks for gains for the present arm, and sets them: a change like any other, which can be undone. */
-export async function takeSuggestion() {
-  if (suggestButton.disabled) return;
-  suggestButton.disabled = true;
-  setText(suggestButton, "Searching…");
-  const { result, values } = await suggestSaid.report(suggestGains());
-  suggestButton.disabled = false;
-  setText(suggestButton, SUGGEST);
-  const { kp, ki, kd } = values.gains ?? values;
-  if (result) suggestSaid.report(setGains({ kp, ki, kd }));
+export function takeSuggestion() {
+  return busy(suggestButton, "Searching…", async () => {
+    const { result, values } = await suggestSaid.report(suggestGains());
+    const { kp, ki, kd } = values.gains ?? values;
+    if (result) suggestSaid.report(setGains({ kp, ki, kd }));
+  });
 }
 
 /** Moves the setpoint of the chosen joint by `angle` [rad]; from where the arm is, if none is known. */

@@ -1,4 +1,3 @@
-// @ts-check
 // The course: ten steps, each a scene, a chart, a task that ticks itself, and a question with its answer.
 // Invariant: a step is data. Its text has at most 40 words. Its view sets the scene on a click only.
 

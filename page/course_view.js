@@ -1,4 +1,3 @@
-// @ts-check
 // Shows the course, a step at a time: sets its scene, draws its chart, ticks its task, checks its answer.
 // Invariant: an arm that others watch changes only when somebody clicks: a link that names a step shows it, and waits for Start.
 // The arm of the page in one file belongs to its page: there the step begins at once.
@@ -6,10 +5,10 @@
 import { remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
 import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
-import { announce, byId, el, setAddress, setText } from "./dom.js";
-import { numberField } from "./field.js";
-import { METHODS, shortName } from "./format.js";
-import { ENERGY, KINETIC, POTENTIAL, TIME, VELOCITY, record } from "./history.js";
+import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
+import { busy, numberField } from "./field.js";
+import { duration, METHODS, shortName } from "./format.js";
+import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
@@ -42,20 +41,20 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
 
 /**
  * @typedef {object} ChartOfStep
- * @property {string} caption
+ * @property {() => string} caption
  * @property {() => void} [draw] on the surface; nothing where the step has no chart
  * @property {(common: any) => Promise<void>} [ask] for what it shows, with what every question to the study says
  */
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
-  velocity: { caption: "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
-  energy: { caption: "Energy [J]: kinetic, potential, total in black", draw: strip([{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }]) },
-  bars: { caption: "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
-  errors: { caption: "Two errors of one move", draw: () => drawErrors(surface, now.errors), ask: askErrors },
-  map: { caption: "Which period is stable", draw: paintMap, ask: askMap },
-  ladder: { caption: "Error over run time", draw: () => drawLadder(surface, now.runs) },
-  pictures: { caption: "Thirty-nine scenes" },
-  form: { caption: "My arm" },
+  velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
+  energy: { caption: () => "Energy [J]: kinetic, potential, total in black", draw: strip([{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }]) },
+  bars: { caption: () => "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
+  errors: { caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`, draw: () => drawErrors(surface, now.errors), ask: askErrors },
+  map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
+  ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
+  pictures: { caption: () => "Thirty-nine scenes" },
+  form: { caption: () => "My arm" },
 };
 
 let at = 0; // the step that is shown
@@ -115,10 +114,6 @@ export function chooseLinks(links) {
 /** Ten times a second at most, while something changes. */
 export function moveCourse() {
   if (state.view === "course" && stripTime !== newest()) surface.redraw();
-}
-
-function newest() {
-  return record.length > 0 ? record.data[record.last() + TIME] : NaN;
 }
 
 function rest() {
@@ -184,22 +179,20 @@ function damping() {
 
 function show() {
   const one = STEPS[at];
-  const { caption, draw } = CHARTS[one.chart];
   setText(byId("course-number"), `Step ${at + 1} of ${STEPS.length}`);
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
-  setText(byId("course-caption"), caption);
   setText(byId("course-status"), now.began || state.links === 0 ? "" : "Press “Start”: it sets the arm for everybody who watches.");
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   byId("course-start").disabled = state.links === 0;
   byId("course-back").disabled = at === 0;
   byId("course-next").disabled = at === STEPS.length - 1;
   [...byId("course-steps").children].forEach((button, i) => { if (i === at) button.setAttribute("aria-current", "step"); else button.removeAttribute("aria-current"); });
-  byId("course-chart").hidden = !draw;
-  byId("course-chart").setAttribute("aria-label", caption);
+  byId("course-chart").hidden = !CHARTS[one.chart].draw;
   byId("course-extra").replaceChildren();
   if (state.links > 0) fillExtra(one);
   makeDial(one);
+  showBig();
   showTask();
   surface.redraw();
 }
@@ -216,7 +209,7 @@ function fillExtra(one) {
       type: "button", class: "small", onclick: () => setParams({ masses: [...state.params.masses.slice(0, -1), mass] }),
     }, `last link ${mass} kg`))));
   }
-  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: measure }, "Measure"));
+  if (one.chart === "ladder") place.append(el("button", { type: "button", class: "primary", id: "course-measure", onclick: ({ target }) => busy(target, "Measuring…", measure) }, "Measure"));
   if (one.chart === "pictures") place.append(gallery(state.links));
   if (one.chart === "form") showForm(place, () => { now.seen.sheet = true; look(); });
 }
@@ -228,18 +221,23 @@ const galleries = {};
 function gallery(links) {
   galleries[links] ??= el("div", { class: "pictures" }, ...SCENES.map((scene) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
-    const fits = scene.links === links;
-    const isOther = !fits && scene.links > 0;
+    const { text, act } = offer(scene, links);
     const picture = new Surface(canvas, () => drawPicture(picture, scene));
-    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: !fits && !(isOther && isAlone), onclick: () => (fits ? runScene(scene) : chooseLinks(scene.links)) },
-      canvas, el("span", {}, scene.name), el("small", {}, isOther ? otherArm(scene.links) : scene.expected));
+    return el("button", { type: "button", class: "picture", id: `scene-${scene.id}`, disabled: act === null, onclick: act }, canvas, el("span", {}, scene.name), el("small", {}, text));
   }));
   return galleries[links];
 }
 
-/** Says how to get an arm with this number of links: by a click in the file, by an option at a server. */
-function otherArm(links) {
-  return isAlone ? `Click for an arm of ${links} links.` : `Needs ${links} links: start pendularm with --links ${links}.`;
+/**
+ * The sentence under a scene's picture, and the action of a click on it; null where a click does nothing.
+ * A scene of another arm needs that arm: the file loads it, a server has to be started with it.
+ * @param {import("./scenes.js").Scene} scene @param {number} links of the present arm
+ */
+function offer(scene, links) {
+  if (scene.links === links) return { text: scene.expected, act: () => runScene(scene) };
+  if (scene.links === 0) return { text: scene.expected, act: null };
+  return isAlone ? { text: `Click for an arm of ${scene.links} links.`, act: () => chooseLinks(scene.links) }
+    : { text: `Needs ${scene.links} links: start pendularm with --links ${scene.links}.`, act: null };
 }
 
 async function runScene(scene) {
@@ -291,12 +289,6 @@ function partOfPeriod(ms) {
   return Number((whole / Math.max(1, Math.round(whole / (ms / 1e3)))).toPrecision(9));
 }
 
-/** The errors' chart, with the method and the control period that they are of. */
-function errorsCaption() {
-  const { caption } = CHARTS.errors;
-  return state.integrator ? `${caption}: ${shortName(state.integrator.method)}, control period ${Number((1e3 * period()).toPrecision(3))} ms` : caption;
-}
-
 function showBig() {
   const one = STEPS[at];
   const { label, value, limit } = clock(one);
@@ -306,7 +298,9 @@ function showBig() {
   byId("course-big").hidden = hidden;
   setText(byId("course-figure"), hidden ? "" : ofLimit(value(), unknown ? NaN : limit()));
   setText(byId("course-what"), label);
-  if (one.chart === "errors") setText(byId("course-caption"), errorsCaption());
+  const caption = CHARTS[one.chart].caption();
+  setText(byId("course-caption"), caption);
+  setAttribute(byId("course-chart"), "aria-label", caption);
   byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
   if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm flew apart. Press “Restart step”.");
 }
@@ -422,12 +416,9 @@ async function askMap({ params, gains }) {
 
 async function measure() {
   const mine = now;
-  const button = byId("course-measure");
   const key = settingsKey();
   Object.assign(now, { runs: [], runsKey: key });
-  button.disabled = true;
   const refused = await climb(1, () => mine === now && key === settingsKey(), (rung) => { mine.runs.push(rung); surface.redraw(); });
-  button.disabled = false;
   setText(byId("course-status"), refused);
   mine.seen.measured = mine.runs.length === rungs().length;
   look();

@@ -1,4 +1,3 @@
-// @ts-check
 // Makes elements from code, and says aloud to screen readers what others see happen: goals reached, refusals, a lost connection.
 // Text is always text, never markup, whatever the runtime sends.
 // Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need. Only events are said aloud:
@@ -9,12 +8,22 @@
 export function el(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value === true) element.setAttribute(name, "");
-    else if (value !== false && value != null) element.setAttribute(name, value);
+    else element.setAttribute(name, value);
   }
   element.append(...children);
   return element;
+}
+
+/** Fills a table: a row of heads, then rows that begin with a head of their own; a head is its text, or its text and its class. */
+export function fillTable(table, heads, rows) {
+  const head = (scope, one) => el("th", { scope, class: [one].flat()[1] }, [one].flat()[0]);
+  table.replaceChildren(
+    el("thead", {}, el("tr", {}, ...heads.map((one) => head("col", one)))),
+    el("tbody", {}, ...rows.map(([first, ...cells]) => el("tr", {}, head("row", first), ...cells.map((text) => el("td", {}, text))))),
+  );
 }
 
 /** @param {string} id @returns {any} the element, of whatever kind the document has it */

@@ -1,4 +1,3 @@
-// @ts-check
 // A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
 // Invariant: the field has the value in force, except while somebody is changing it.
 
@@ -36,8 +35,20 @@ export function refusal(...describes) {
   return { element: text, show, report };
 }
 
+/** Says `text` on the button while `work` goes on, and takes no click meanwhile. @param {HTMLButtonElement} button @param {string} text @param {() => Promise<any>} work */
+export async function busy(button, text, work) {
+  if (button.disabled) return;
+  const before = button.textContent;
+  button.disabled = true;
+  setText(button, text);
+  await work();
+  button.disabled = false;
+  setText(button, before);
+}
+
 /**
- * A form: options, buttons, and where a refusal is shown; gives the latter. A button of the type submit is pressed by Enter too.
+ * A form: options, buttons, and where a refusal is shown; gives the latter, and the buttons. A button of the type submit is pressed by
+ * Enter too.
  * @param {HTMLElement} place @param {{input: HTMLElement, element: HTMLElement}[]} options @param {[string, () => void, object?][]} buttons @param {...HTMLElement} last
  */
 export function panel(place, options, buttons, ...last) {
@@ -45,7 +56,7 @@ export function panel(place, options, buttons, ...last) {
   const said = refusal(...options.map(({ input }) => input), ...made);
   place.append(el("form", { novalidate: true, onsubmit: (event) => event.preventDefault() },
     el("div", { class: "options" }, ...options.map(({ element }) => element)), el("div", { class: "buttons" }, ...made), said.element, ...last));
-  return said;
+  return { ...said, buttons: made };
 }
 
 /**
@@ -152,13 +163,14 @@ export function numberField({ label, short = label, unit, low, high, log = false
 }
 
 /**
- * A number that only a later request needs: nothing is sent when it changes. Empty: left out.
- * @param {{label: string, unit?: string, value?: string | number, placeholder?: string}} options
+ * A number that only a later request needs: nothing is sent when it changes. Empty: left out. With `choices`, values and their texts,
+ * one of them is chosen instead.
+ * @param {{label: string, unit?: string, value?: string | number, placeholder?: string, choices?: [string, string][]}} options
  */
-export function option({ label, unit = "", value = "", placeholder = "" }) {
-  const input = el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
+export function option({ label, unit = "", value = "", placeholder = "", choices = [] }) {
+  const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text))) : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {
-    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, el("span", { class: "unit" }, unit))),
+    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
     /** `undefined` where nothing is given. */
     number: () => (input.value === "" ? undefined : Number(input.value)),

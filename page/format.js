@@ -1,4 +1,3 @@
-// @ts-check
 // Numbers as people read them: few digits, a true minus, powers of ten where a number is huge or tiny.
 // Invariant: a value that is not finite is shown as a dash, never as text of the language.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // The last five minutes of the arm, one row per joint state: the source of the plots and the CSV file. It can be looked at again
 // while the arm goes on: a time in it, step by step, in slow motion, and back to now. The arm itself always runs in real time.
 // Invariant: rows are in order of simulation time, without repeats; a reset begins anew. Its memory is taken once. Looking back changes
@@ -105,7 +104,7 @@ export function between(a, b, time, position, velocity) {
  * records, which nobody has seen: then it goes straight.
  * @param {number} s @param {number} p @param {number} q @param {number} v @param {number} w
  */
-export function cubic(s, p, q, v, w) {
+function cubic(s, p, q, v, w) {
   const change = q - p;
   if (s === 1) return q;
   if (Math.abs(v) + Math.abs(w) > STEEP * Math.abs(change) + TURN) return p + s * change;
@@ -171,6 +170,11 @@ export const shown = {
   setpointKnown: false,
 };
 
+/** The time of the newest row [s]; NaN where there is none. */
+export function newest() {
+  return record.length > 0 ? record.data[record.last() + TIME] : NaN;
+}
+
 /** The first and the last time of the recording [s]; null where there is none. */
 export function span() {
   if (record.length === 0) return null;
@@ -210,9 +214,11 @@ export function seek(time) {
 export function stepBy(way) {
   if (record.length === 0) return;
   shown.playing = false;
-  const now = shown.live ? record.length - 1 : nearest(shown.time);
-  const row = Math.min(record.length - 1, Math.max(0, now + way));
-  seek(record.data[record.at(row) + TIME]);
+  // The row that is shown, or the one after a time between two rows.
+  const after = shown.live ? record.length - 1 : firstAfter(shown.time);
+  const isRow = record.data[record.at(after) + TIME] === shown.time;
+  const row = way > 0 && !isRow ? after : after + way;
+  seek(record.data[record.at(Math.min(record.length - 1, Math.max(0, row))) + TIME]);
 }
 
 /** Plays on from where it is, or from `back` seconds before now. @param {number} speed @param {number} back */
@@ -238,14 +244,6 @@ export function advance(seconds) {
   if (!all) goLive();
   else if (next >= all.to) goLive(); // caught up with the arm
   else seek(next);
-}
-
-/** @param {number} time */
-function nearest(time) {
-  const after = Math.min(firstAfter(time), record.length - 1);
-  if (after === 0) return 0;
-  const at = (/** @type {number} */ row) => record.data[record.at(row) + TIME];
-  return time - at(after - 1) < at(after) - time ? after - 1 : after;
 }
 
 function read(/** @type {number} */ time) {

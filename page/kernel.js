@@ -1,4 +1,3 @@
-// @ts-check
 // The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. Where workers are forbidden, it runs
 // in the page's own thread.
 // Invariant: its callers cannot tell it from a WebSocket to the runtime.

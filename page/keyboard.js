@@ -1,4 +1,3 @@
-// @ts-check
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
 // Invariant: no shortcut acts while somebody types, and all can be switched off.
 
@@ -7,7 +6,7 @@ import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
 import { announce, byId, el } from "./dom.js";
 import { METHODS } from "./format.js";
 import { stepBy } from "./history.js";
-import { togglePlots, zoomPlots } from "./plots.js";
+import { zoomPlots } from "./plots.js";
 import { cancelGoal, setIntegrator } from "./runtime.js";
 import { state } from "./store.js";
 import { push } from "./tasks_panel.js";
@@ -39,7 +38,6 @@ const shortcuts = [
   ["r", "reset", resetArm],
   ["z", "undo the last change", takeBack],
   ["g", "cancel the goal", cancelGoal],
-  ["p", "pause the plots", togglePlots],
   ["+", "plots: less time (also Ctrl and the wheel)", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],

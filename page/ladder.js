@@ -1,11 +1,9 @@
-// @ts-check
 // Figures of offline runs. Error against run time: which runs to ask for, and what their answers say. A comparison: how far each run
-// lies from the reference over time, where it ended, what it gained; and rollouts on one clock.
+// lies from the reference over time, where it ended, what it gained.
 // Invariant: a run without an error is told apart from one that diverged; neither becomes a number. A run that ended early has figures
 // up to its end, and says when.
 
 import { duration, fixed, METHODS, shortName, significant } from "./format.js";
-import { cubic } from "./history.js";
 
 /** Timesteps, from long to short, each half of the one before [s]. */
 export const TIMESTEPS = Array.from({ length: 8 }, (_, k) => 0.032 / 2 ** k);
@@ -102,12 +100,6 @@ export function cheapest(rungs, wanted) {
  * @property {number} wall_time
  */
 
-/** The last entry that is a number, and its place; null if there is none. @param {(number | null)[]} list */
-function lastNumber(list) {
-  for (let k = list.length - 1; k >= 0; k -= 1) if (Number.isFinite(list[k])) return { k, value: /** @type {number} */ (list[k]) };
-  return null;
-}
-
 /** When the run diverged [s]; null if it lasted. @param {Run} run @param {number} seconds */
 export function divergedAt(run, seconds) {
   return endOf(run.times, seconds, run.timestep);
@@ -115,20 +107,17 @@ export function divergedAt(run, seconds) {
 
 /** Energy at the end less that at the start [J]; null where the run did not last. @param {Run} run @param {number} seconds */
 export function energyGained(run, seconds) {
-  if (divergedAt(run, seconds) !== null) return null;
-  const [first, last] = [run.energy[0], lastNumber(run.energy)];
-  return first === null || first === undefined || !last ? null : last.value - first;
+  return divergedAt(run, seconds) === null ? Number(run.energy.at(-1)) - Number(run.energy[0]) : null;
 }
 
 /**
- * The largest difference of a joint from the reference, at each of the reference's instants [rad]; null where one has ended.
+ * The largest difference of a joint from the reference, at each of the instants that both are sampled at [rad]; null where one has ended.
  * @param {Run} run @param {Run} reference @returns {(number | null)[]}
  */
 export function distances(run, reference) {
-  const own = resample(run, reference.times);
   return reference.times.map((_, k) => {
-    const [a, b] = [own[k], reference.positions[k]];
-    if (!a || !b?.every(Number.isFinite)) return null;
+    const [a, b] = [run.positions[k], reference.positions[k]];
+    if (!a?.every(Number.isFinite) || !b?.every(Number.isFinite)) return null;
     return Math.max(...a.map((q, i) => Math.abs(q - b[i])));
   });
 }
@@ -139,7 +128,7 @@ export function describeRun(run, away, seconds) {
   const gained = energyGained(run, seconds);
   const known = /** @type {number[]} */ (away.filter((one) => one !== null));
   return {
-    name: `${shortName(run.method)}, ${duration(run.timestep)}`,
+    name: shortName(run.method),
     outcome: ended === null ? "lasts" : `diverged at t = ${fixed(ended, 2)} s`,
     energy: gained === null ? "–" : `${significant(gained, 3)} J`,
     error: ended !== null || known.length === 0 ? "–" : `${significant(Math.max(...known), 3)} rad`,
@@ -152,34 +141,4 @@ export function describeRun(run, away, seconds) {
 export function partsAt(/** @type {number[]} */ times, /** @type {(number | null)[]} */ away, wanted = 0.1) {
   const k = away.findIndex((one) => one !== null && one > wanted);
   return k < 0 ? null : times[k];
-}
-
-/** Enough for a smooth trail, few enough to draw at once. */
-const MOST = 601;
-const LEAST = 61;
-const SAME = 1e-6; // of a timestep
-
-/** How many samples, so that their distance is a whole number of both timesteps; `MOST` where no number will do. */
-export function commonSamples(duration, timesteps) {
-  const whole = (ratio) => Math.round(ratio) >= 1 && Math.abs(ratio - Math.round(ratio)) < SAME * Math.max(1, ratio);
-  for (let count = MOST; count >= LEAST; count -= 1) {
-    if (timesteps.every((timestep) => whole(duration / (count - 1) / timestep))) return count;
-  }
-  return MOST;
-}
-
-/** Joint positions of `run` at each of `times`; `null` past its end and where it is not finite. */
-export function resample({ times, positions, velocities }, wanted) {
-  const usable = (k) => positions[k]?.every(Number.isFinite) && velocities[k]?.every(Number.isFinite);
-  let k = 0;
-  return wanted.map((time) => {
-    const near = 1e-9 * Math.max(1, time);
-    while (k + 1 < times.length && times[k + 1] <= time + near) k += 1;
-    if (!usable(k)) return null;
-    if (Math.abs(times[k] - time) <= near) return positions[k];
-    if (k + 1 >= times.length || !usable(k + 1)) return null;
-    const h = times[k + 1] - times[k];
-    const s = (time - times[k]) / h;
-    return positions[k].map((q, i) => cubic(s, q, positions[k + 1][i], h * velocities[k][i], h * velocities[k + 1][i]));
-  });
 }

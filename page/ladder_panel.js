@@ -1,10 +1,9 @@
-// @ts-check
 // Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
 // Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
 
 import { Chart, DASHED, line, STRONG, TEXT } from "./chart.js";
-import { announce, byId, el, setText } from "./dom.js";
-import { option, refusal } from "./field.js";
+import { announce, byId, fillTable, setText } from "./dom.js";
+import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
 import { cheapest, errorText, MOVE_TO, read, rungs, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
@@ -22,8 +21,7 @@ const INVITATION = "Runs this arm on one fixed move, with every method at eight 
 
 let surface;
 let said;
-let go;
-let seconds;
+const seconds = option({ label: "duration", unit: "s", value: SECONDS });
 /** @type {Rung[]} */
 let found = [];
 let asked = ""; // the settings that `found` is about
@@ -31,11 +29,7 @@ let running = 0; // counts the measurements that were begun; only the newest goe
 
 export function startLadder() {
   surface = new Surface(byId("ladder"), () => drawLadder(surface, found));
-  seconds = option({ label: "duration", unit: "s", value: SECONDS });
-  go = el("button", { type: "submit", class: "primary" }, "Measure");
-  said = refusal(go);
-  byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, go), said.element);
-  byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
+  said = panel(byId("ladder-form"), [seconds], [["Measure", () => busy(said.buttons[0], "Measuring…", measure), { type: "submit", class: "primary" }]]);
   setText(byId("ladder-text"), INVITATION);
   // The measurement is of another loop.
   watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
@@ -52,7 +46,6 @@ function forget(text) {
   running += 1;
   found = [];
   asked = "";
-  setText(go, "Measure");
   setText(byId("ladder-text"), text);
   byId("ladder-table").replaceChildren();
   surface.redraw();
@@ -67,13 +60,11 @@ async function measure() {
   forget("");
   const mine = running;
   asked = settingsKey();
-  setText(go, "Measuring…");
   const length = seconds.number() ?? SECONDS;
   const about = stamp(state, length);
   const refused = await climb(length, () => mine === running, (rung) => { found.push(rung); surface.redraw(); });
   if (mine !== running) return;
   said.show(refused);
-  setText(go, "Measure");
   describe(about);
 }
 
@@ -106,11 +97,8 @@ function describe(about) {
   setText(byId("ladder-text"), text);
   if (found.length === 0) return;
   announce(text);
-  byId("ladder-table").replaceChildren(
-    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "timestep"), ...METHODS.map(([, name], i) => el("th", { scope: "col", class: `method${i + 1}` }, name)))),
-    el("tbody", {}, ...TIMESTEPS.map((timestep) => el("tr", {}, el("th", { scope: "row" }, duration(timestep)),
-      ...METHODS.map(([method]) => el("td", {}, cellOf(method, timestep)))))),
-  );
+  fillTable(byId("ladder-table"), ["timestep", ...METHODS.map(([, name], i) => [name, `method${i + 1}`])],
+    TIMESTEPS.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
 }
 
 /** @param {Rung[]} best of each method the cheapest run that is good enough */
@@ -128,7 +116,6 @@ function cellOf(method, timestep) {
   const one = found.find((rung) => rung.method === method && rung.timestep === timestep);
   return one ? errorText(one) : "–";
 }
-
 
 const ROOM = { left: 62, right: 14, top: 30, bottom: 36, font: TEXT };
 const CROSS = 4;

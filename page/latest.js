@@ -1,4 +1,3 @@
-// @ts-check
 // Sends the newest of many values: at most one call under way, and no more often than `intervalMs`.
 // Invariant: the last value offered is always sent in the end; values between may be skipped.
 

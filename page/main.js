@@ -1,4 +1,3 @@
-// @ts-check
 // Starts the page: every part takes its place, then the runtime is called; frames are drawn when something has changed.
 // Invariant: while nothing changes nothing is drawn, and no timer runs.
 

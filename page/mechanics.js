@@ -1,4 +1,3 @@
-// @ts-check
 // The arm's geometry, gravity load and energy from its state, for drawing only: the runtime computes the motion.
 // Angles in rad, each relative to the link before; link i has length l[i], mass m[i], its centre in the middle.
 // Invariant: nothing is allocated; results go into arrays that the caller owns.

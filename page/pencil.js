@@ -1,4 +1,3 @@
-// @ts-check
 // Draws a line through many points as through a few of them. Points that a straight line would miss by less than can be seen
 // are left out. A line of ten seconds has 600 points, and on a screen a tenth of them does.
 // Invariant: no point is further from what is drawn than `MISS`, upwards or downwards; points come from left to right.

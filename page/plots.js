@@ -1,18 +1,16 @@
-// @ts-check
 // The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and files to keep,
-// the recording as CSV, the plots as PNG or SVG.
-// Invariant: pausing the plots stops only the drawing; recording goes on. A file is handed to the browser and released.
+// the recording as CSV, the plots as PNG.
+// Invariant: a file is handed to the browser and released.
 
 import { STRONG, write } from "./chart.js";
-import { announce, byId, el, setText } from "./dom.js";
+import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
-import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, POSITION, POTENTIAL, record, SETPOINT, shown as pose, TIME, VELOCITY } from "./history.js";
+import { csvText, cursor, EFFORT, ENERGY, firstAfter, hover, KINETIC, LOAD, newest, POSITION, POTENTIAL, record, SETPOINT, shown as pose, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
 import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
 import { PhasePlot, StripChart } from "./strip_chart.js";
 import { Surface } from "./surface.js";
-import { SvgContext } from "./svg_context.js";
 import { colors } from "./theme.js";
 
 /** No more than this is shown of an arm that has diverged: the blow-up is the end of it [s]. */
@@ -25,7 +23,6 @@ const shown = [true, true, true];
 /** @type {{id: string, chart: any, name: string, surface: Surface}[]} */
 let plots = [];
 let span = 10; // s
-let frozenAt = NaN; // simulation time at which the plots were paused
 let drawnVersion = -1;
 let legends = [];
 
@@ -54,30 +51,17 @@ export function startPlots() {
   watch("cursor", () => { redraw(); showValues(); });
   watch("playback", () => { if (pose.playing) return; redraw(); showValues(); });
   watch("links", makeLegends);
-  let diverged = false;
-  watch("diagnostics", (report) => {
-    if ((report.state === "diverged") !== diverged) redraw();
-    diverged = report.state === "diverged";
-  });
+  watch("diverged", redraw);
   byId("plot-span").addEventListener("change", (event) => {
     span = Number(event.target.value);
     redraw();
   });
-  byId("plot-pause").addEventListener("click", togglePlots);
   byId("plot-fix").addEventListener("click", toggleScales);
 }
 
 /** What a plot shows now. @param {string} id */
 function view(id) {
   return { now: edge(), span: shownSpan(), links: state.links, shown, level: id === "energy" ? reference() : NaN };
-}
-
-export function togglePlots() {
-  const paused = Number.isNaN(frozenAt);
-  frozenAt = paused ? newest() : NaN;
-  press("plot-pause", paused, paused ? "Resume" : "Pause");
-  announce(paused ? "Plots paused." : "Plots running.");
-  redraw();
 }
 
 /** Shows less time for 1, more for -1. */
@@ -90,26 +74,18 @@ export function zoomPlots(way) {
 function toggleScales() {
   const kept = byId("plot-fix").getAttribute("aria-pressed") !== "true";
   for (const { chart } of plots) for (const axis of [chart.axis, chart.across]) if (axis) axis.fixed = kept;
-  press("plot-fix", kept, kept ? "Fixed" : "Fix");
+  byId("plot-fix").setAttribute("aria-pressed", String(kept));
+  setText(byId("plot-fix"), kept ? "Fixed" : "Fix");
   redraw();
 }
 
-function press(id, pressed, text) {
-  byId(id).setAttribute("aria-pressed", String(pressed));
-  setText(byId(id), text);
-}
-
-function newest() {
-  return record.length > 0 ? record.data[record.last() + TIME] : 0;
-}
-
 function shownSpan() {
-  return state.diagnostics?.state === "diverged" && pose.live ? Math.min(span, BLOW_UP_SECONDS) : span;
+  return state.diverged && pose.live ? Math.min(span, BLOW_UP_SECONDS) : span;
 }
 
-/** The right edge of the plots: now, where they were paused, or so that what is looked at of the recording is within. */
+/** The right edge of the plots: now, or so that what is looked at of the recording is within. */
 function edge() {
-  const end = Number.isNaN(frozenAt) ? newest() : frozenAt;
+  const end = newest() || 0;
   if (pose.live || pose.time > end - span) return end;
   return pose.time + span / 2;
 }
@@ -120,7 +96,7 @@ export function redraw() {
 
 /** Draws the lines as they are now, if anything has moved since. */
 export function movePlots() {
-  const moves = pose.playing || (pose.live && drawnVersion !== state.version && Number.isNaN(frozenAt));
+  const moves = pose.playing || (pose.live && drawnVersion !== state.version);
   drawnVersion = state.version;
   if (moves) redraw();
 }
@@ -166,60 +142,36 @@ function reference() {
   return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;
 }
 
-/** Draws every plot, one below the other, on a context of `width`; gives the height. For pictures that are saved. */
-function drawAll(context, width) {
-  let top = 0;
-  for (const { id, chart, name, surface } of plots) {
-    const height = surface.height || HEIGHT;
-    context.save();
-    context.translate(0, top);
-    write(context, name, 8, 9, "left", colors.ink, STRONG);
-    context.translate(0, TITLE);
-    chart.draw(context, width, height, view(id));
-    context.restore();
-    top += TITLE + height + GAP;
-  }
-  redraw();
-  return top;
-}
-
-/** How high `drawAll` draws. */
-function heightOfAll() {
-  return plots.reduce((sum, { surface }) => sum + TITLE + (surface.height || HEIGHT) + GAP, 0);
-}
-
 const WIDTH = 640; // CSS pixels
 const DENSITY = 2; // of a PNG
 const KEPT_MS = 10000;
 
 export function startSave() {
   const choice = byId("plot-save");
-  choice.addEventListener("change", () => {
+  choice.addEventListener("change", async () => {
     const kind = choice.value;
     choice.value = "";
-    save(kind);
+    if (kind === "csv") hand(new Blob([csvText(state.links, presentSettings(state))], { type: "text/csv" }), "pendularm.csv");
+    if (kind === "png") hand(await png(), "pendularm.png");
   });
 }
 
-async function save(kind) {
-  const contents = { csv: () => new Blob([csvText(state.links, presentSettings(state))], { type: "text/csv" }), svg, png }[kind];
-  if (contents) hand(await contents(), `pendularm.${kind}`);
-}
-
-/** The plots as an SVG file. */
-export function svg() {
-  const context = new SvgContext(WIDTH, heightOfAll(), colors.panel);
-  drawAll(context, WIDTH);
-  return new Blob([context.toString()], { type: "image/svg+xml" });
-}
-
+/** All plots as one picture, one below the other. */
 function png() {
-  const canvas = el("canvas", { width: WIDTH * DENSITY, height: heightOfAll() * DENSITY });
+  const heights = plots.map(({ surface }) => surface.height || HEIGHT);
+  const total = heights.reduce((sum, height) => sum + TITLE + height + GAP, 0);
+  const canvas = el("canvas", { width: WIDTH * DENSITY, height: total * DENSITY });
   const context = canvas.getContext("2d");
   context.scale(DENSITY, DENSITY);
   context.fillStyle = colors.panel;
-  context.fillRect(0, 0, WIDTH, heightOfAll());
-  drawAll(context, WIDTH);
+  context.fillRect(0, 0, WIDTH, total);
+  plots.forEach(({ id, chart, name }, i) => {
+    write(context, name, 8, 9, "left", colors.ink, STRONG);
+    context.translate(0, TITLE);
+    chart.draw(context, WIDTH, heights[i], view(id));
+    context.translate(0, heights[i] + GAP);
+  });
+  redraw();
   return new Promise((done) => canvas.toBlob(done, "image/png"));
 }
 

@@ -1,4 +1,3 @@
-// @ts-check
 // A verdict on the present timestep: the limit of the loop in force, where it holds, and both verdict and reason in words.
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 
@@ -135,18 +134,6 @@ export function periodText(/** @type {any} */ state) {
   const steps = stepsPerUpdate(state);
   const often = steps > 1 ? [`${steps} steps`, duration(steps * integrator.timestep)] : [];
   return [...often, ...(period.delay ? ["delayed"] : [])].join(", ");
-}
-
-/** The pose with the smallest limit, how surely that is known, and the motion that grows first there; empty where nothing limits. */
-export function worstText(/** @type {any} */ answer) {
-  const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound, bound_is_proven: proven } = answer ?? {};
-  if (!(least > 0) || !pose || !critical) return "";
-  const kind = proven ? "proven" : "bounded by an estimate";
-  const sure = certified ? `${kind} to 1 %`
-    : `the least that a search found${bound > 0 ? `; ${kind} is ${duration(bound)}` : ", without a bound"}`;
-  const way = critical.frequency > 0 ? `at ${significant(critical.frequency, 3)} Hz` : "without swinging";
-  return `The pose with the smallest limit, ${duration(least)} (${sure}), is (${pose.map((/** @type {number} */ q) => fixed(q, 2)).join(", ")}) rad: 10 % beyond it joint ${critical.joint + 1} `
-    + `moves most, ${way}, ${significant(critical.growth_per_step, 3)} times further at every step.`;
 }
 
 /** @returns {Verdict} */

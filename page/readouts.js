@@ -1,4 +1,3 @@
-// @ts-check
 // Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
 // Invariant: written a few times a second; only what changed touches the page.
 
@@ -6,7 +5,7 @@ import { byId, setAttribute, setText } from "./dom.js";
 import { fixed, significant } from "./format.js";
 import { endEffector } from "./arm_view.js";
 import { shown } from "./history.js";
-import { answerInForce, doublingTime, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { answerInForce, doublingTime, limitInForce, limitText, verdict } from "./policy.js";
 import { isAlone } from "./kernel.js";
 import { LOOP, state, watch } from "./store.js";
 
@@ -55,8 +54,8 @@ function showLimit() {
   byId("out-limit").classList.toggle("bad", bad);
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
-  setText(byId("worst-text"), worstText(answer));
   setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? answer.bound_is_proven ? "proven" : "bounded" : "found");
+  byId("out-every").title = answer?.worst_pose ? `at (${answer.worst_pose.map((q) => fixed(q, 2)).join(", ")}) rad` : "";
   byId("out-every").classList.toggle("warn", said.kind === "here");
 }
 

@@ -1,4 +1,3 @@
-// @ts-check
 // A rosbridge client over a WebSocket, or what has its interface: calls as promises, subscriptions that outlive a lost connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
@@ -177,6 +176,7 @@ function diagnostics(msg) {
   const before = state.diagnostics?.state;
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
+  keep("diverged", report.state === "diverged");
   if (motionHasChanged(state) && question(state)) askNow(question(state));
   if (before === report.state) return;
   poll(); // another client may have done what led here

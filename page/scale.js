@@ -1,4 +1,3 @@
-// @ts-check
 // Scales of the charts: where a value is between the low end and the high one, and which marks to write.
 // Invariant: labels are made only when the range changes, not at every frame.
 

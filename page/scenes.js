@@ -1,4 +1,3 @@
-// @ts-check
 // The 39 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its behaviour.
 // The report reads the rows from this file, for its pictures and their links; so they are JSON.
 // Invariant: the rows are those of `src/report/experiments/scenarios/`, in their order.

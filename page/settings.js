@@ -1,4 +1,3 @@
-// @ts-check
 // All settings of the arm as one object: taken, compared, spelled in a link, read from one. And the way back: the settings in
 // force before the latest changes.
 // Invariant: nothing here speaks to the runtime; the caller that applies settings gets its refusals.

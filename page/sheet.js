@@ -1,4 +1,3 @@
-// @ts-check
 // A student's own arm: a form, and one sheet to print with its limits, the reason, what a better method buys, and a link.
 // Invariant: the sheet asks the study about the form's arm; the live arm stays as it is.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
 // timestep, where the loop with held efforts is stable and where not, the present point in it; a click goes there, and so do the
 // arrow keys. And a small push, in speed, of the loop in force, step by step.
@@ -111,7 +110,7 @@ async function moveTo(timestep, factor) {
   if (Math.abs(Math.log(factor / factorOf(state.gains, anchor))) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
   if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
   await Promise.all(changes);
-  if (state.diagnostics?.state === "diverged") beginAnew();
+  if (state.diverged) beginAnew();
 }
 
 function byArrows(event) {

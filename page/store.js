@@ -1,4 +1,3 @@
-// @ts-check
 // All that the page knows about the runtime, in one place; a view watches the part that it shows.
 // Invariant: only what the runtime has said is stored here, never what was merely asked for.
 
@@ -23,6 +22,7 @@ export const state = {
   paused: null,
   enabled: null, // is PID on
   diagnostics: null, // { level, message, state, ...numbers }
+  diverged: false,
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]

@@ -1,4 +1,3 @@
-// @ts-check
 // Charts of the recording: quantities over the last seconds of simulation time, and velocity over position, where the present state
 // is a dot; one colour per joint.
 // Invariant: rows are read where they stand in the history. They draw on whatever context they are given.
@@ -10,6 +9,20 @@ import { MOST_LINKS } from "./store.js";
 import { colors } from "./theme.js";
 
 /** @typedef {{column: number, dashed?: boolean, color?: string}} Series of each joint, or one in a colour of its own */
+
+/** The smallest and the largest number in columns of the rows from `first` to before `last`. @param {number[]} columns @returns {[number, number]} */
+function extent(columns, first, last) {
+  let [min, max] = [Infinity, -Infinity];
+  for (let i = first; i < last; i += 1) {
+    const row = record.at(i);
+    for (const column of columns) {
+      const value = record.data[row + column];
+      if (value < min) min = value;
+      if (value > max) max = value;
+    }
+  }
+  return [min, max];
+}
 
 export class StripChart {
   /** @param {Series[]} series @param {number} least smallest span of the vertical axis @param {number} sane beyond it the scale is logarithmic */
@@ -32,7 +45,9 @@ export class StripChart {
     const last = Math.min(record.length, firstAfter(now) + 1);
     const lines = this.series.flatMap((one) => (one.color ? [{ ...one, color: colors[one.color] }]
       : colors.joints.slice(0, links).map((color, joint) => ({ ...one, color, column: one.column + joint })).filter((_, joint) => shown[joint])));
-    const leftAt = this.fit(lines, first, last, level);
+    const [min, max] = extent(lines.map(({ column }) => column), first, last);
+    this.axis.fit(level < min ? level : min, level > max ? level : max);
+    const leftAt = this.leftAt(lines, first, last);
     const chart = new Chart(context, width, height, times(this.from, now), this.axis);
     this.chart = chart;
     chart.frame();
@@ -50,21 +65,14 @@ export class StripChart {
     chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);
   }
 
-  /** Fits the axis; gives when a value first left the scale, NaN if none did. */
-  fit(lines, first, last, level) {
-    const { data } = record;
-    let [min, max, leftAt] = Number.isFinite(level) ? [level, level, NaN] : [Infinity, -Infinity, NaN];
-    for (const { column } of lines) {
-      for (let i = first; i < last; i += 1) {
-        const row = record.at(i);
-        const value = data[row + column];
-        if (value < min) min = value;
-        if (value > max) max = value;
-        if (Math.abs(value) >= LOG_END && !(leftAt <= data[row + TIME])) leftAt = data[row + TIME];
-      }
+  /** When a value first left the logarithmic scale [s]; NaN if none did. */
+  leftAt(lines, first, last) {
+    if (!this.axis.log) return NaN;
+    for (let i = first; i < last; i += 1) {
+      const row = record.at(i);
+      if (lines.some(({ column }) => Math.abs(record.data[row + column]) >= LOG_END)) return record.data[row + TIME];
     }
-    this.axis.fit(min, max);
-    return leftAt;
+    return NaN;
   }
 
   /** The instant at `x` CSS pixels from the left; NaN beside the plot. @param {number} x */
@@ -100,25 +108,13 @@ export class PhasePlot {
     const first = firstAfter(now - span);
     const last = Math.min(record.length, firstAfter(now) + 1);
     const joints = Array.from({ length: links }, (_, joint) => joint).filter((joint) => shown[joint]);
-    this.fit(this.across, POSITION, joints, first, last);
-    this.fit(this.axis, VELOCITY, joints, first, last);
+    this.across.fit(...extent(joints.map((joint) => POSITION + joint), first, last));
+    this.axis.fit(...extent(joints.map((joint) => VELOCITY + joint), first, last));
     const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 30 });
     this.chart = chart;
     chart.frame({ across: "position [rad]" });
     const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
     chart.inside(() => { for (const joint of joints) this.drawPath(context, joint, first, last, at); });
-  }
-
-  fit(axis, column, joints, first, last) {
-    let [min, max] = [Infinity, -Infinity];
-    for (let i = first; i < last; i += 1) {
-      for (const joint of joints) {
-        const value = record.data[record.at(i) + column + joint];
-        if (value < min) min = value;
-        if (value > max) max = value;
-      }
-    }
-    axis.fit(min, max);
   }
 
   drawPath(context, joint, first, last, at) {

@@ -1,4 +1,3 @@
-// @ts-check
 // When to draw: a frame is asked for only if something has changed, and painters say whether they need one more. And a canvas as
 // sharp as the screen: sized in device pixels, drawn in CSS pixels, painted in the next frame after something of it has changed.
 // Invariant: with nothing to show, no frame is asked for; a page that is paused or hidden draws nothing. A canvas's size is read when

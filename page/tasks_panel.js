@@ -1,4 +1,3 @@
-// @ts-check
 // The panel of goals, the timed trial and pushes. Dragging in the view uses the goal's options.
 // Invariant: a goal is shown as active only while the runtime says so; the clock and the count of a trial are the runtime's, whoever
 // started it.

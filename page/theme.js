@@ -1,16 +1,15 @@
-// @ts-check
 // Light and dark, and the colours that the canvases take from the style sheet.
 // Invariant: colours are spelled in `style.css` only.
 
 import { byId } from "./dom.js";
 
 const KEY = "pendularm-theme";
-const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "run1", "run2", "run3", "run4", "run5", "run6", "method1", "method2", "method3", "method4"];
+const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "method1", "method2", "method3", "method4"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = [];
 
-/** Colours by name, always of the present theme; `joints` in joint order, `runs` in that of a comparison. */
-export const colors = { joints: [], runs: [], methods: [] };
+/** Colours by name, always of the present theme; `joints` and `methods` in their order. */
+export const colors = { joints: [], methods: [] };
 
 export function onTheme(react) {
   listeners.push(react);
@@ -24,7 +23,6 @@ function read() {
     colors[name] = getComputedStyle(probe).color;
   }
   colors.joints = [colors.joint1, colors.joint2, colors.joint3];
-  colors.runs = [colors.run1, colors.run2, colors.run3, colors.run4, colors.run5, colors.run6];
   colors.methods = [colors.method1, colors.method2, colors.method3, colors.method4];
   for (const react of listeners) react();
 }

@@ -1,4 +1,3 @@
-// @ts-check
 // The way of the end effector through the last seconds, fading towards the past.
 // Invariant: between two states it goes where the replay shows the arm: no polygon while the arm can be followed, and never out of reach.
 

@@ -1,4 +1,3 @@
-// @ts-check
 // Under the arm: pause, single step and reset; the recording's controls: scrub, step, replay in slow motion, back to live, and the
 // stopwatch; and what is said there: the verdict on the timestep, warnings, divergence.
 // Invariant: a notice offers what can be done about it, and goes when its cause is gone. The recording's controls move what is shown,

@@ -1,4 +1,3 @@
-// @ts-check
 // The two views of the page, Course and Workbench, the panels beside the arm as tabs, the full screen, the number of links; and
 // the settings in the page's address, behind the #, to be sent to others.
 // Invariant: a view only shows and hides; the arm and all settings are the same in both. Opening an address changes nothing; its

@@ -49,12 +49,6 @@ def modules(name, done):
     return f'{before}pendularm["{name}"] = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();\n'
 
 
-def styles(name):
-    """A style sheet, with those that it imports in their places."""
-    text = (PAGE / name).read_text()
-    return re.sub(r'@import "([^"]+)";', lambda found: styles(found[1]), text)
-
-
 def replaced(text, old, new):
     if old not in text:
         raise SystemExit(f"page.py: index.html has no {old}")
@@ -67,7 +61,7 @@ def main(module, output):
     text = (PAGE / "index.html").read_text()
     text = replaced(text, '<meta charset="utf-8">', f'<meta charset="utf-8">\n  <meta http-equiv="Content-Security-Policy" content="{POLICY}">')
     text = replaced(text, '"icon.svg"', f'"{icon}"')
-    text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{styles('style.css')}</style>")
+    text = replaced(text, '<link rel="stylesheet" href="style.css">', f"<style>\n{(PAGE / 'style.css').read_text()}</style>")
     text = replaced(text, '  <script type="module" src="main.js"></script>\n', "")
     carried = {"page-script": script.encode(), "kernel-module": pathlib.Path(module).read_bytes()}
     scripts = "".join(f'<script type="text/plain" id="{name}">{packed(data)}</script>\n' for name, data in carried.items())

@@ -143,6 +143,7 @@ class Page:
 
     def __init__(self, browser, url, width, height, density, dark, touch):
         self.browser = browser
+        self.width = width  # of the window [CSS pixels]; the page's own `innerWidth` grows on a phone with what is too wide
         self.complaints = []  # errors of the console, exceptions, violations of the policy
         self.expect_network_errors = False
         self.told = 0  # messages that came over its WebSocket

@@ -3,6 +3,8 @@
 Invariant: a test passes only if its page's console said nothing: no exception, no error, no violation of the policy.
 """
 
+import atexit
+import functools
 import os
 import pathlib
 import re
@@ -14,6 +16,7 @@ from chromium import Browser
 from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
+ARTEFACTS.mkdir(parents=True, exist_ok=True)
 # Which page is tried: that of a server, or the one in a file.
 IS_FILE = os.environ.get("FORM") == "file"
 # A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
@@ -21,14 +24,11 @@ FOREIGN = "elsewhere.example"
 
 NUMBER = "input[type=number]"
 
-_browser = None
-
-
+@functools.cache
 def browser():
-    global _browser
-    if _browser is None:
-        _browser = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
-    return _browser
+    one = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
+    atexit.register(one.__exit__)
+    return one
 
 
 def needs_server(why):
@@ -39,11 +39,6 @@ def needs_server(why):
 def milliseconds(seconds):
     """A time as the page writes it."""
     return f"{float(format(1000 * seconds, '.3g')):g} ms"
-
-
-def close_browser():
-    if _browser is not None:
-        _browser.__exit__()
 
 
 class PageTest(unittest.TestCase):
@@ -67,6 +62,7 @@ class PageTest(unittest.TestCase):
             self.runtime.page = page
         self.addCleanup(page.close)
         self.addCleanup(lambda: self.assertEqual(page.complaints, []))
+        self.addCleanup(lambda: page.screenshot(ARTEFACTS / f"{self.id()}.png"))
         self.connected(page)
         return page
 
@@ -97,8 +93,7 @@ class PageTest(unittest.TestCase):
         self.page.until(f"!document.querySelector('#{name}').hidden")
 
     def keep(self, name, **how):
-        """A screenshot, kept as an artefact."""
-        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        """A screenshot on the way; each test keeps one of its end."""
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):
@@ -119,13 +114,17 @@ class PageTest(unittest.TestCase):
         text = self.page.run(f"(() => {{ const e = document.querySelector('#probe'); e.style.color = 'var(--{name})'; return getComputedStyle(e).color; }})()")
         return tuple(int(one) for one in re.findall(r"\d+", text)[:3])
 
+    def pause(self):
+        """The arm is paused, and the page says so."""
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+
     def settle(self, positions):
         """The controller holds the arm at `positions`, and then it is paused: a picture that does not change."""
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.run(f"""own('runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
         self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
 
     def shake(self):
         """The controller shakes the arm: its timestep is a quarter beyond the limit."""

@@ -50,6 +50,12 @@ class AloneTest(PageTest):
         self.assertTrue(self.runtime.call("/study/gains")["result"])
         self.assertEqual(page.complaints, [])
 
+    def test_the_time_of_a_short_run_is_finer_than_the_clock_of_the_browser(self):
+        """A run of microseconds, by a clock that goes in steps of 0.1 ms."""
+        ask = {"duration": 1, "timestep": 0.032, "integrator": "euler", "samples": 2, "setpoint": [0, 0]}
+        times = [self.values("/study/rollout", **ask)["wall_time"] for _ in range(5)]
+        self.assertTrue(all(1e-7 < one < 1e-4 for one in times), times)
+
     def test_an_address_and_a_list_choose_the_number_of_links(self):
         page = browser().page(f"{FILE.as_uri()}#step=2&links=3")
         self.addCleanup(page.close)

@@ -53,20 +53,17 @@ class Ways(PageTest):
         self.page.until(f"{live}.then((time) => time > {live_began + 1})", why="the arm goes on for a second")
         _, now, shows = self.page.run(look)
         self.assertLess(shows - shown, 0.4 * (now - began), "slow motion")
-        self.keep("recording")
         self.page.click("#history-live")
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
 
     def test_one_cursor_is_on_all_plots(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 120)")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(0.5) == 0, "the figures are those of the last state")
         now = self.page.text("#legend-velocity")
         x, y = self.page.place("#plot-position")
         self.page.mouse("mouseMoved", x + 150, y)
         self.page.until(f"document.querySelector('#legend-velocity').textContent !== {json.dumps(now)}")
-        self.keep("cursor")
         self.page.mouse("mouseMoved", 5, 5)
         self.page.until(f"document.querySelector('#legend-velocity').textContent === {json.dumps(now)}")
 
@@ -116,8 +113,7 @@ class Suggestion(PageTest):
 class Still(PageTest):
     def test_a_paused_page_draws_no_frame(self):
         self.wait(lambda: self.drawn(1) > 10, "while it moves it draws")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(2) == 0, "it comes to rest")
 
     @needs_server("it counts frames of a WebSocket")
@@ -129,8 +125,7 @@ class Still(PageTest):
             return self.page.told - before, time.monotonic() - began
 
         self.wait(lambda: hears()[0] > 30, "while it moves it hears of every state")
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
 
         def hears_little():
             told, took = hears()
@@ -154,8 +149,7 @@ class Still(PageTest):
         self.wait(draws_little, "the plots move on, ten times a second")
 
     def test_an_arm_at_rest_that_is_stepped_is_drawn(self):
-        self.runtime.call("/arm_sim/pause", data=True)
-        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.pause()
         self.wait(lambda: self.drawn(0.5) == 0, "it comes to rest")
         before = self.page.run(self.frames)
         self.page.click("#step")

@@ -6,12 +6,11 @@ import { test } from "node:test";
 import { csvText } from "../../page/history.js";
 import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
 import { record, take } from "../../page/history.js";
-import { commonSamples, describeRun, distances, divergedAt, energyGained, partsAt, resample } from "../../page/ladder.js";
+import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/ladder.js";
 import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";
 import { state } from "../../page/store.js";
-import { SvgContext } from "../../page/svg_context.js";
 
 /** A run of one joint at 0.1 s through `seconds`, at `slope` rad/s. */
 function run(seconds, slope, energy = 1) {
@@ -44,12 +43,6 @@ test("a run that diverged says when, and claims neither energy nor error", () =>
   assert.notEqual(away[6], null);
 });
 
-test("runs of different timesteps meet at common instants, and between samples a cubic is met exactly", () => {
-  // 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
-  assert.deepEqual([[5, [0.01, 0.001]], [4, [0.01, 0.005]], [5, [0.01, 0.007]]].map(([seconds, steps]) => commonSamples(seconds, steps)), [501, 401, 601]);
-  assert.deepEqual(resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]), [[0.25 ** 3], [1], null]);
-});
-
 test("the last sample may lie a step before the end", () => {
   assert.equal(endOf([0, 0.9], 1, 0.1), null);
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
@@ -79,11 +72,6 @@ test("place and value of a logarithmic scale are each other's inverse", () => {
   assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
 });
 
-function arm(method, timestep, enabled = false) {
-  const { params, gains } = DEFAULTS[2];
-  return { links: 2, params, gains, enabled, setpoint: Float64Array.of(0, 0, 0), integrator: { method, timestep } };
-}
-
 test("a place out of reach gives way to the nearest one within", () => {
   const near = (place, lengths, expected) => {
     const found = nearestInReach(place, lengths);
@@ -112,23 +100,6 @@ test("a file holds its settings, and what is not finite is empty", () => {
   const row = lines[lines.indexOf(header) + 1].split(",");
   assert.equal(header.split(",").length, row.length);
   assert.deepEqual(row.slice(0, 5), ["0.5", "", "0.25", "", ""]);
-});
-
-test("an SVG is well formed: every group that is opened is closed, texts are escaped", () => {
-  const context = new SvgContext(100, 50, "#fff");
-  context.save();
-  context.translate(1, 2);
-  context.beginPath();
-  context.rect(0, 0, 10, 10);
-  context.clip();
-  context.moveTo(0, 0);
-  context.lineTo(5, 5);
-  context.stroke();
-  context.fillText("a < b & c", 1, 1);
-  context.restore();
-  const text = context.toString();
-  assert.equal(text.match(/<g /g).length, text.match(/<\/g>/g).length);
-  assert.ok(text.includes("a &lt; b &amp; c"));
 });
 
 test("an error is told apart from one that the reference can't resolve, and from one that nobody can follow", () => {

@@ -1,9 +1,9 @@
-// The verdict on the timestep: about the loop in force only, and never milder than it is.
+// The verdict on the timestep: about the loop in force only, and never milder than it is; and the reason for a limit.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, limitInForce, limitsOf, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText, worstText } from "../../page/policy.js";
+import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, limitInForce, limitsOf, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -116,25 +116,6 @@ test("energy drifts only if nothing puts any in", () => {
   assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
 });
 
-test("the pose with the smallest limit is named, with how surely it is known and the motion that grows there", () => {
-  const answer = {
-    ...VALUES, worst_pose: [0, 0.5], certified: true, bound_is_proven: true, minimum_over_poses_bound: 0.0043,
-    critical: { growth_per_step: 1.214, frequency: 105.3, joint: 1 },
-  };
-  assert.equal(worstText(answer), "The pose with the smallest limit, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
-    + "10 % beyond it joint 2 moves most, at 105 Hz, 1.21 times further at every step.");
-  assert.match(worstText({ ...answer, certified: false }), /\(the least that a search found; proven is 4\.3 ms\)/);
-  assert.match(worstText({ ...answer, bound_is_proven: false }), /4\.32 ms \(bounded by an estimate to 1 %\)/);
-  assert.match(worstText({ ...answer, certified: false, minimum_over_poses_bound: null }), /search found, without a bound/);
-  assert.match(worstText({ ...answer, critical: { ...answer.critical, frequency: 0 } }), /without swinging/);
-});
-
-test("where nothing limits no pose is named, nor where the service says nothing of it", () => {
-  for (const answer of [null, VALUES, { ...VALUES, worst_pose: null, critical: null }, { ...VALUES, minimum_over_poses_held: 0, worst_pose: [0, 0], critical: { joint: 0 } }]) {
-    assert.equal(worstText(answer), "");
-  }
-});
-
 const FREE = {
   timestep_limit_held: 0.278, timestep_limit: 0.278, timestep_limit_continuous: 0.278, minimum_over_poses_held: 0.278, equilibrium: [-Math.PI / 2, 0],
   equilibrium_kind: "hanging", critical: { growth_per_step: 2.4, frequency: 1.14, joint: 1 }, timestep_limit_motion: 0.0488, motion_speed: 16.4, advised_timestep: 0.039,
@@ -169,6 +150,44 @@ test("with a control period of its own the timestep has its own limit", () => {
   const twoClocks = { ...VALUES, timestep_limit: 0.002, control_period_limit: 0.0136 };
   assert.equal(limitInForce(sampled(0.004, { stability: twoClocks })).limit, 0.002);
   assert.equal(limitInForce(sampled(0.02, { stability: { ...twoClocks, timestep_limit: 0 } })).limit, VALUES.timestep_limit_held);
+});
+
+// The reason
+
+// As /study/stability answers for the usual gains, stretched out.
+const SERVED = {
+  timestep_limit_held: 0.004316, timestep_limit_continuous: 0.00615, minimum_over_poses_held: 0.004316, equilibrium_kind: "setpoint",
+  critical: { growth_per_step: 1.2051, frequency: 105.325, joint: 1 },
+};
+const ALIKE = { euler: 0.004419, midpoint: 0.004316, verlet: 0.004316, rk4: 0.004316 };
+
+test("a deviation that flips at every step is named with its joint and its growth", () => {
+  const text = whyText(arm(), SERVED, ALIKE);
+  assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is kept longer overshoots: .* flips at every step and grows by 21 %/);
+  assert.match(text, /A better method does not help/);
+});
+
+test("a swing is named by its frequency, and methods with a longer limit by their names", () => {
+  const swing = { ...SERVED, critical: { growth_per_step: 1.01, frequency: 3.66, joint: 0 } };
+  const text = whyText(arm(), swing, { ...ALIKE, euler: 0.001 });
+  assert.match(text, /a swing of joint 1 at 3\.66 Hz/);
+  assert.match(text, /Midpoint, Verlet, Runge–Kutta 4: stable up to 4\.32 ms/);
+});
+
+test("the free arm is damped by nothing, and Euler adds to every swing", () => {
+  const euler = arm({ enabled: false, integrator: { method: "euler", timestep: 0.001 } });
+  assert.match(whyText(euler, SERVED, { ...ALIKE, euler: 0 }), /Every step of Euler adds a little to each swing/);
+});
+
+test("where the gains themselves are at fault no method is blamed", () => {
+  const none = { euler: 0, midpoint: 0, verlet: 0, rk4: 0 };
+  assert.match(whyText(arm(), { ...SERVED, timestep_limit_continuous: 0 }, none), /any method and any timestep/);
+  assert.match(whyText(arm(), SERVED, none), /nothing damps the arm here/);
+});
+
+test("nothing is said of a loop that is not known", () => {
+  assert.equal(whyText(arm(), null, ALIKE), "");
+  assert.equal(whyText(arm(), SERVED, {}), "");
 });
 
 // Gains

@@ -43,6 +43,8 @@ test("an axis is linear while values are sane, logarithmic once they explode", (
   assert.ok(axis.place(1) > axis.place(0));
   // The scale ends; values beyond stay at its edge.
   assert.equal(axis.place(1e148), axis.place(1e12));
+  axis.fit(-1e148, 1);
+  assert.ok(axis.low === -12 && axis.marks.length <= 12);
 });
 
 test("a fixed scale stays", () => {

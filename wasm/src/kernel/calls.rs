@@ -13,14 +13,14 @@ use pendularm::services::arm::{
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
-    GainsWork, PlanRun, PlanWork, PredictStability, RolloutWork, RunOffline, StabilityWork,
-    SuggestGains, Work,
+    GainsWork, PlanRun, PlanWork, PredictStability, RunOffline, StabilityWork, SuggestGains, Work,
 };
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
 use pendularm::services::{Address, Answered, Callable, NoService};
 
 use super::Kernel;
 use super::computing::{Short, Streaming};
+use super::repeated::Repeated;
 
 impl<const N: usize> Kernel<N> {
     /// Takes a call.
@@ -85,7 +85,7 @@ impl<const N: usize> Kernel<N> {
             Service::Plan => self.compute_short::<PlanRun<N>, _>(own, &args, to, PlanWork::new),
             Service::Rollout => match RunOffline::<N>::read(own, &args) {
                 Ok(ask) => {
-                    let work = RolloutWork::new(ask, self.arm.present());
+                    let work = Repeated::new(ask, self.arm.present());
                     let run = Streaming::<RunOffline<N>>::new(work, to);
                     self.computations.push_back(Box::new(run));
                 }

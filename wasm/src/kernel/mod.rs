@@ -6,6 +6,7 @@
 mod calls;
 mod computing;
 mod goals;
+mod repeated;
 mod surroundings;
 mod trials;
 
