@@ -1,6 +1,4 @@
-//! The findings that the README prints, run again with the searches and experiments behind them.
-
-use std::fs;
+//! The findings of the README and of docs/study.md, run again with the searches and experiments behind them.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
@@ -14,13 +12,12 @@ use pendularm::study::stability::limits;
 
 use crate::planner::{falling, plan};
 
-fn readme() -> String {
-    fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap()
-}
+const README: &str = include_str!("../../README.md");
+const STUDY: &str = include_str!("../../docs/study.md");
 
-/// The number after `before` is `seen` rounded to so many digits.
-fn agrees(before: &str, seen: f64, digits: i32) {
-    let said = printed(&readme(), before);
+/// The number after `before` in a paper is `seen` rounded to so many digits.
+fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
+    let said = printed(paper, before);
     let last = 10_f64.powi(seen.abs().log10().floor() as i32 + 1 - digits);
     assert!(
         (said - seen).abs() <= 0.501 * last,
@@ -43,7 +40,7 @@ fn fewest(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
 }
 
 #[test]
-fn the_timestep_and_the_evaluations_of_the_first_finding_are_runs() {
+fn the_timestep_and_the_evaluations_are_runs() {
     let all = scenes();
     let swing = all.iter().find(|scene| scene.name == "swing-2").unwrap();
     let duration = swing.duration;
@@ -54,11 +51,16 @@ fn the_timestep_and_the_evaluations_of_the_first_finding_are_runs() {
     };
     let rk4 = evaluations(Method::Rk4);
     let steps = rk4 / f64::from(Method::Rk4.evaluations());
-    agrees("RK4 takes steps of ", duration / steps, 3);
-    agrees("**, and ", rk4 / duration, 3);
-    agrees("Verlet needs ", evaluations(Method::Verlet) / rk4, 3);
+    agrees(README, "RK4 takes steps of ", duration / steps, 3);
+    agrees(README, "**, and ", rk4 / duration, 3);
+    agrees(
+        README,
+        "Verlet needs ",
+        evaluations(Method::Verlet) / rk4,
+        3,
+    );
     // Euler is not within the error in as many steps as a search tries, and takes an evaluation in each.
-    let over = printed(&readme(), "as many and Euler over ");
+    let over = printed(README, "as many and Euler over ");
     let tried = 1 << 17;
     assert!(swing.run_within(Method::Euler, tried, 1e-4).error > 1e-4);
     assert!((over * rk4 / tried as f64 - 1.0).abs() < 5e-3, "{over}");
@@ -66,29 +68,44 @@ fn the_timestep_and_the_evaluations_of_the_first_finding_are_runs() {
 
 /// 2 s in 2048 steps: the power of two next to the default timestep.
 #[test]
-fn the_parts_of_the_error_of_the_second_finding_are_runs() {
+fn the_parts_of_the_error_are_runs() {
     let parts = Budget::new(true, 2.0).parts(&[Method::Rk4], 2048)[0];
-    agrees("at a control period of ", parts.timestep, 3);
-    agrees("holding the effort costs ", parts.hold, 2);
-    agrees("RK4's truncation ", parts.truncation, 2);
-    agrees("and rounding ", parts.rounding, 2);
+    agrees(STUDY, "at a control period of ", parts.timestep, 3);
+    agrees(STUDY, "holding the effort costs ", parts.hold, 2);
+    agrees(STUDY, "RK4's truncation ", parts.truncation, 2);
+    agrees(STUDY, "and rounding ", parts.rounding, 2);
 }
 
 #[test]
-fn the_limits_of_the_third_finding_are_those_of_the_study() {
+fn the_printed_limits_are_those_of_the_loop() {
     let of = |method| {
         let setpoint = Setpoint::at([0.4, 0.8]);
         let control = ControlLoop::new(Arm::<2>::default(), Gains::default(), setpoint);
         limits(&control.with_method(method))
     };
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
-    agrees("the 2-link arm goes unstable at ", rk4.held.unwrap(), 3);
-    agrees("with RK4 and at ", verlet.held.unwrap(), 3);
-    agrees("RK4 would be stable up to ", rk4.continuous.unwrap(), 3);
-    agrees("limit of all poses is ", rk4.minimum_held.unwrap(), 3);
+    agrees(
+        STUDY,
+        "the 2-link arm goes unstable at ",
+        rk4.held.unwrap(),
+        3,
+    );
+    agrees(STUDY, "with RK4 and at ", verlet.held.unwrap(), 3);
+    agrees(
+        STUDY,
+        "RK4 would be stable up to ",
+        rk4.continuous.unwrap(),
+        3,
+    );
+    agrees(
+        STUDY,
+        "limit of all poses is ",
+        rk4.minimum_held.unwrap(),
+        3,
+    );
 }
 
-/// The number that follows `before` in the README, in the unit that follows it.
+/// The number that follows `before` in a paper, in the unit that follows it.
 fn printed(text: &str, before: &str) -> f64 {
     let after = text
         .split_once(before)
@@ -119,7 +136,6 @@ fn printed(text: &str, before: &str) -> f64 {
 /// The plans of docs/study.md are run again.
 #[test]
 fn the_plans_of_the_study_are_runs() {
-    let study = include_str!("../../docs/study.md");
     let servo = Task {
         control: ControlLoop::new(
             Arm::<2>::default(),
@@ -142,7 +158,7 @@ fn the_plans_of_the_study_are_runs() {
         let best = planned.best().unwrap();
         assert_eq!(best.method, method, "{planned:?}");
         assert!(
-            (printed(study, before) / best.timestep - 1.0).abs() < 5e-3,
+            (printed(STUDY, before) / best.timestep - 1.0).abs() < 5e-3,
             "{planned:?}"
         );
     }
