@@ -19,7 +19,7 @@ fn the_papers_list_every_topic_with_its_type_and_owner() {
         assert_eq!(codes(&row[0]), [topic.name()]);
         assert_eq!(codes(&row[1]), [topic.type_name()], "{}", topic.name());
         let (name, is_ours) = (topic.name(), topic.direction() == Direction::Published);
-        assert_eq!(row[2].starts_with("anybody"), !is_ours, "{name}");
+        assert_eq!(row[2].starts_with("any client"), !is_ours, "{name}");
         assert!(
             !is_ours || codes(&row[2]) == [topic.owner().name()],
             "{name}"
