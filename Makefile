@@ -150,8 +150,8 @@ bench-peers: ## Measure beside Pinocchio and the C it generates, MuJoCo, scipy, 
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/peers/run.sh
 	@case " $(ARGS) " in *" --quick "*) ;; *) KEEP="$(KEEP)" bash benches/equal_error/run.sh ;; esac
 
-attack: ## Attack the program in a hundred ways and measure what a healthy client has of it; ARGS="--only=pings", --list or --quick
-	@echo "make attack: some ten minutes; installs redis-server and mosquitto as bench-load does, and attacks them too"
+attack: ## Attack the program in some eighty ways and measure what a healthy client has of it; ARGS="--only=pings", --list or --quick
+	@echo "make attack: some seven minutes"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
 
 soak: ## Play attacks at random for MINUTES (1) and check that nothing is left over; SEED=n repeats one

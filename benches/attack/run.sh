@@ -1,16 +1,12 @@
 #!/usr/bin/env bash
 # `make attack`: the service of a healthy client of the release program during hostile ones, one attack after the other.
 #
-# Everything runs on free ports of loopback, bounded in time and connections; what is started is stopped by its id. Some ten minutes.
+# Everything runs on free ports of loopback, bounded in time and connections; what is started is stopped by its id. Some seven minutes.
 # ARGS="--only=pings,step" picks attacks, ARGS=--list lists them. ARGS=--quick takes two minutes, is lenient about times
 # and plays what is late up to twice more. KEEP=1 keeps the table in benches/results/<date>-<processor>/attack/. Exit status 1 if a bar is missed.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
-
-# Both ends of 1,100 connections, and those that return while the last ones end.
-needed_files=4096
-[ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
 
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)

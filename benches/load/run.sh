@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
 #
-# All three run on free ports of loopback; each is stopped by its process id. redis-server and mosquitto come from Debian's packages: as root they
+# All three run on free ports of loopback; each is stopped by its process id, pendularm by the client that starts it. redis-server and mosquitto come from Debian's packages: as root they
 # are installed if missing. Takes some minutes. ARGS=--quick plays each scene for a moment and judges nothing; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
 set -euo pipefail
@@ -63,15 +63,6 @@ chmod 644 "$scratch/mosquitto.conf"
 mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
 mosquitto=$!
 pids+=("$mosquitto")
-"$program" --bind 127.0.0.1:0 --clients 1100 --log warn >"$scratch/listening" 2>"$scratch/pendularm.log" &
-pendularm=$!
-pids+=("$pendularm")
-for _ in $(seq 600); do
-    [ ! -s "$scratch/listening" ] || break
-    sleep 0.1
-done
-address=$(sed 's/^listening on //' "$scratch/listening")
-[ -n "$address" ] || { cat "$scratch/pendularm.log" >&2; fail "pendularm does not listen"; }
 await "$redis_port" redis
 await "$mosquitto_port" mosquitto
 
@@ -82,6 +73,6 @@ mkdir -p "$folder"
     echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
 } | tee "$folder/environment.txt"
 # shellcheck disable=SC2086 # arguments, several
-"$built/load" "pendularm=$address=$pendularm" "redis=127.0.0.1:$redis_port=$redis" \
+"$built/load" "$program" "redis=127.0.0.1:$redis_port=$redis" \
     "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" ${ARGS:-} | tee "$folder/summary.txt"
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/load"

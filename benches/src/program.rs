@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use pendularm_client::ending;
 
-/// Lines of the log that are kept; the rest are counted.
+/// Lines of the log that are kept, beside those of panics.
 const MAX_LINES: usize = 50;
 
 /// The program, running.
@@ -25,10 +25,8 @@ pub struct Program {
 /// Its lines on standard error.
 #[derive(Debug, Default, Clone)]
 pub struct Log {
-    /// The first lines.
+    /// The first lines, and those of panics.
     pub lines: Vec<String>,
-    /// All lines.
-    pub count: u64,
     /// Lines that speak of a panic.
     pub panics: u64,
 }
@@ -123,7 +121,6 @@ impl Drop for Program {
 
 impl Log {
     fn note(&mut self, line: String) {
-        self.count += 1;
         self.panics += u64::from(line.contains("panic"));
         if self.lines.len() < MAX_LINES || line.contains("panic") {
             self.lines.push(line);

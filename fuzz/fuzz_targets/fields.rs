@@ -31,13 +31,12 @@ fn examine(input: &[u8]) {
     let Some(json) = Json::read(args.payload().get()) else {
         panic!("accepted, and no JSON: {}", args.payload().get());
     };
-    let Some(model) = Model::new(service, &json) else {
+    let Some(mut model) = Model::new(service, &json) else {
         let refusal = Fields::read(&args, service).expect_err("the other reading refuses it");
         assert_eq!(refusal.field, "args");
         return;
     };
     let mut fields = Fields::read(&args, service).expect("the other reading takes it");
-    let mut model = model;
     for field in service.fields() {
         let how = How::new(field, seed);
         compare(&mut fields, &mut model, field, how);

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use pendularm::protocol::wire::json::accept_literals;
+
 use crate::json::Json;
 
 /// Everything that clients have said.
@@ -78,7 +80,8 @@ impl Book {
 }
 
 fn check(sent: &Json, heard: Option<&Json>, what: &str, which: &dyn std::fmt::Debug) {
-    let is_same = heard.is_some_and(|heard| same(sent, heard));
+    let same_number = |sent: &Json, heard: &Json| sent.number() == heard.number();
+    let is_same = heard.is_some_and(|heard| sent.becomes(heard, same_number));
     assert!(is_same, "{what} {which:?}: {sent:?} became {heard:?}");
 }
 
@@ -91,51 +94,8 @@ fn slashed(topic: &str) -> String {
     }
 }
 
-/// A value as Python writes it: numbers that are none are `null` by the time that anybody hears them.
+/// A value as Python writes it; the frame target compares how names of numbers are taken.
 fn value(text: &str) -> Json {
-    let mut strict = String::with_capacity(text.len());
-    let mut rest = text;
-    let mut in_string = false;
-    while let Some(character) = rest.chars().next() {
-        if !in_string {
-            let literals = ["NaN", "-Infinity", "Infinity"];
-            if let Some(literal) = literals.iter().find(|literal| rest.starts_with(**literal)) {
-                strict.push_str("null");
-                rest = &rest[literal.len()..];
-                continue;
-            }
-        }
-        let length = if character == '\\' {
-            2
-        } else {
-            character.len_utf8()
-        };
-        in_string ^= character == '"';
-        strict.push_str(&rest[..length]);
-        rest = &rest[length..];
-    }
+    let strict = accept_literals(text.to_owned());
     Json::read(&strict).unwrap_or_else(|| panic!("a session sends JSON: {strict}"))
-}
-
-/// Whether what was heard is what was sent, however its numbers are written.
-fn same(sent: &Json, heard: &Json) -> bool {
-    match (sent, heard) {
-        (Json::Number(_), Json::Null) => !sent.number().is_some_and(f64::is_finite),
-        (Json::Number(_), Json::Number(_)) => sent.number() == heard.number(),
-        (Json::Array(sent), Json::Array(heard)) => {
-            sent.len() == heard.len()
-                && sent
-                    .iter()
-                    .zip(heard)
-                    .all(|(sent, heard)| same(sent, heard))
-        }
-        (Json::Object(sent), Json::Object(heard)) => {
-            let member = |((key, sent), (same_key, heard)): (&(_, Json), &(_, Json))| {
-                let key: &Option<String> = key;
-                key == same_key && same(sent, heard)
-            };
-            sent.len() == heard.len() && sent.iter().zip(heard).all(member)
-        }
-        (sent, heard) => sent == heard,
-    }
 }

@@ -1,7 +1,10 @@
-//! A second reading of JSON (RFC 8259), one character after the other, strict: every reader takes the texts that
-//! it takes.
-//!
-//! Numbers keep their text. A string that holds half a surrogate pair is a string without a text.
+//! JSON as serde_json reads it, with all that its own values leave out: numbers keep their text, and an object keeps
+//! every member in its place. A string that holds half a surrogate pair is a string without a text.
+
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
+use serde_json::value::RawValue;
 
 /// A value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,10 +27,24 @@ impl Json {
     /// Reads a text that is one value.
     #[must_use]
     pub fn read(text: &str) -> Option<Self> {
-        let mut reading = Reading(text);
-        let value = reading.value()?;
-        reading.skip_space();
-        reading.0.is_empty().then_some(value)
+        let raw: &RawValue = serde_json::from_str(text).ok()?;
+        Self::of(raw)
+    }
+
+    fn of(raw: &RawValue) -> Option<Self> {
+        let text = raw.get();
+        Some(match text.as_bytes().first()? {
+            b'n' => Self::Null,
+            b't' => Self::Boolean(true),
+            b'f' => Self::Boolean(false),
+            b'"' => Self::Text(serde_json::from_str(text).ok()),
+            b'[' => {
+                let entries: Vec<&RawValue> = serde_json::from_str(text).ok()?;
+                Self::Array(entries.into_iter().map(Self::of).collect::<Option<_>>()?)
+            }
+            b'{' => Self::Object(serde_json::from_str::<Members>(text).ok()?.0),
+            _ => Self::Number(text.to_owned()),
+        })
     }
 
     /// The member of that name, the last one where there are several.
@@ -69,138 +86,52 @@ impl Json {
             _ => false,
         }
     }
+
+    /// Whether this is what is heard of it where it is passed on: a number that overflows is `null`, and another has the
+    /// same value for `same_number`.
+    #[must_use]
+    pub fn becomes(&self, heard: &Self, same_number: fn(&Self, &Self) -> bool) -> bool {
+        match (self, heard) {
+            (Self::Number(_), Self::Null) => self.overflows(),
+            (Self::Number(_), Self::Number(_)) => same_number(self, heard),
+            (Self::Array(sent), Self::Array(heard)) => {
+                let mut pairs = sent.iter().zip(heard);
+                sent.len() == heard.len()
+                    && pairs.all(|(sent, heard)| sent.becomes(heard, same_number))
+            }
+            (Self::Object(sent), Self::Object(heard)) => {
+                let mut pairs = sent.iter().zip(heard);
+                sent.len() == heard.len()
+                    && pairs.all(|((key, sent), (same_key, heard))| {
+                        key == same_key && sent.becomes(heard, same_number)
+                    })
+            }
+            _ => self == heard,
+        }
+    }
 }
 
-struct Reading<'a>(&'a str);
+/// The members of an object, all of them, in their order.
+struct Members(Vec<(Option<String>, Json)>);
 
-impl Reading<'_> {
-    fn skip_space(&mut self) {
-        self.0 = self.0.trim_start_matches([' ', '\t', '\r', '\n']);
+impl<'de> Deserialize<'de> for Members {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Members(Vec::new()))
+    }
+}
+
+impl<'de> Visitor<'de> for Members {
+    type Value = Self;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("an object")
     }
 
-    fn takes(&mut self, word: &str) -> bool {
-        let rest = self.0.strip_prefix(word);
-        self.0 = rest.unwrap_or(self.0);
-        rest.is_some()
-    }
-
-    fn value(&mut self) -> Option<Json> {
-        self.skip_space();
-        match self.0.chars().next()? {
-            'n' => self.takes("null").then_some(Json::Null),
-            't' => self.takes("true").then_some(Json::Boolean(true)),
-            'f' => self.takes("false").then_some(Json::Boolean(false)),
-            '"' => self.string().map(Json::Text),
-            '[' => self.array(),
-            '{' => self.object(),
-            _ => self.number(),
+    fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<Self, A::Error> {
+        while let Some((key, value)) = map.next_entry::<&RawValue, &RawValue>()? {
+            let value = Json::of(value).ok_or_else(|| A::Error::custom("no JSON"))?;
+            self.0.push((serde_json::from_str(key.get()).ok(), value));
         }
-    }
-
-    fn array(&mut self) -> Option<Json> {
-        self.takes("[");
-        let mut entries = Vec::new();
-        self.skip_space();
-        if self.takes("]") {
-            return Some(Json::Array(entries));
-        }
-        loop {
-            entries.push(self.value()?);
-            self.skip_space();
-            if self.takes("]") {
-                return Some(Json::Array(entries));
-            }
-            if !self.takes(",") {
-                return None;
-            }
-        }
-    }
-
-    fn object(&mut self) -> Option<Json> {
-        self.takes("{");
-        let mut members = Vec::new();
-        self.skip_space();
-        if self.takes("}") {
-            return Some(Json::Object(members));
-        }
-        loop {
-            self.skip_space();
-            let key = self.string()?;
-            self.skip_space();
-            if !self.takes(":") {
-                return None;
-            }
-            members.push((key, self.value()?));
-            self.skip_space();
-            if self.takes("}") {
-                return Some(Json::Object(members));
-            }
-            if !self.takes(",") {
-                return None;
-            }
-        }
-    }
-
-    fn string(&mut self) -> Option<Option<String>> {
-        if !self.takes("\"") {
-            return None;
-        }
-        let mut units = Vec::new();
-        loop {
-            let character = self.0.chars().next()?;
-            self.0 = &self.0[character.len_utf8()..];
-            match character {
-                '"' => return Some(String::from_utf16(&units).ok()),
-                '\\' => units.push(self.escape()?),
-                '\0'..=' ' if character != ' ' => return None,
-                _ => units.extend_from_slice(character.encode_utf16(&mut [0; 2])),
-            }
-        }
-    }
-
-    fn escape(&mut self) -> Option<u16> {
-        let character = self.0.chars().next()?;
-        self.0 = &self.0[character.len_utf8()..];
-        let plain = match character {
-            '"' | '\\' | '/' => character,
-            'b' => '\u{8}',
-            'f' => '\u{c}',
-            'n' => '\n',
-            'r' => '\r',
-            't' => '\t',
-            'u' => {
-                let digits = self.0.get(..4)?;
-                self.0 = &self.0[4..];
-                let are_digits = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-                return are_digits.then(|| u16::from_str_radix(digits, 16).ok())?;
-            }
-            _ => return None,
-        };
-        u16::try_from(u32::from(plain)).ok()
-    }
-
-    fn number(&mut self) -> Option<Json> {
-        let text = self.0;
-        self.takes("-");
-        if !self.takes("0") {
-            self.digits()?;
-        }
-        if self.takes(".") {
-            self.digits()?;
-        }
-        if self.takes("e") || self.takes("E") {
-            let _ = self.takes("+") || self.takes("-");
-            self.digits()?;
-        }
-        let length = text.len() - self.0.len();
-        Some(Json::Number(text[..length].to_owned()))
-    }
-
-    /// At least one digit.
-    fn digits(&mut self) -> Option<()> {
-        let rest = self.0.trim_start_matches(|one: char| one.is_ascii_digit());
-        let some = rest.len() < self.0.len();
-        self.0 = rest;
-        some.then_some(())
+        Ok(self)
     }
 }

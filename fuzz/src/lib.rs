@@ -2,7 +2,8 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`json`], [`cbor`] | second readings, slow and strict |
+//! | [`json`] | JSON as serde_json reads it, with every member and every number as it is written |
+//! | [`cbor`] | a second reading, slow and strict |
 //! | [`limits`] | what an execution may cost in time and memory |
 //! | [`book`] | what clients have said, to compare what others hear with |
 //! | [`session`] | scripts for clients, and what must hold of what they hear |

@@ -2,56 +2,32 @@
 
 use std::time::Duration;
 
-use super::script::{Client, filler, light};
-use super::{Attack, TOKEN};
+use super::Attack;
+use super::script::{Client, KIB, each, filler};
 
 /// The end of a head.
 const END: &[u8] = b"Connection: close\r\n\r\n";
+/// The folder of the report, below the folder in which the program is started.
+pub const REPORT: &str = "report";
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "silent-before-token",
-        "1,100 clients connect and say nothing, and the holder of the token comes",
-        silent,
-    )
-    .locked(),
-    Attack::new(
-        "almost-silent",
-        "1,100 clients say a space now and then instead of the token",
-        || {
-            Client::tcp()
-                .repeats_bytes(b" \n")
-                .drips(1, Duration::from_secs(1))
-                .returns()
-                .times(1_100)
-        },
+        "200 clients connect and say nothing, return, and the holder of the token comes",
+        || Client::tcp().returns().times(200),
     )
     .locked(),
     Attack::new(
         "guesses",
         "100 clients guess at the token, are told so, and return",
-        guesses,
-    )
-    .locked(),
-    Attack::new(
-        "guesses-web",
-        "50 clients guess in addresses and cookies, and return",
         || {
-            let address = Client::http("GET /?token=a-token-that-somebody-guesses")
-                .says_bytes(END)
-                .returns();
-            let cookie = Client::http("GET /")
-                .says_bytes(b"Cookie: token=guess; pendularm=guess\r\n")
-                .says_bytes(END)
-                .returns();
-            [address.times(25), cookie.times(25)].concat()
+            each(0..100, |k| {
+                let token = format!("a-token-that-somebody-guesses-{k:08}");
+                Client::tcp()
+                    .says(&format!(r#"{{"op":"auth","token":"{token}"}}"#))
+                    .returns()
+            })
         },
-    )
-    .locked(),
-    Attack::new(
-        "holders",
-        "100 clients show the token and flood with calls",
-        holders,
     )
     .locked(),
     Attack::new(
@@ -66,30 +42,21 @@ pub const ATTACKS: &[Attack] = &[
         },
     ),
     Attack::new(
-        "long-heads",
-        "20 clients send heads of 16 KiB and more, of 100 lines, and return",
-        || {
-            let long = format!("X-Long: {}\r\n", filler(16 * 1024));
-            let many = "X-Many: 1\r\n".repeat(100);
-            let client = |head: &str| {
-                Client::http("GET /")
-                    .says_bytes(head.as_bytes())
-                    .says_bytes(END)
-                    .returns()
-                    .times(10)
-            };
-            [client(&long), client(&many)].concat()
-        },
+        "refused-requests",
+        "25 clients send requests that are refused, short and long ones, and return",
+        refused_requests,
     ),
     Attack::new(
         "pages",
         "50 clients ask for the page, read nothing, and return",
-        pages,
-    ),
-    Attack::new(
-        "foreign",
-        "20 clients come with foreign hosts and origins, and return",
-        foreign,
+        || {
+            Client::http("GET /")
+                .says_bytes(END)
+                .deaf()
+                .leaves_after(50)
+                .returns()
+                .times(50)
+        },
     ),
     Attack::new(
         "report-readers",
@@ -103,73 +70,29 @@ pub const ATTACKS: &[Attack] = &[
         },
     )
     .with(&["--report", REPORT]),
-    Attack::new(
-        "paths",
-        "20 clients ask for files outside of the report, and return",
-        paths,
-    )
-    .with(&["--report", REPORT]),
 ];
 
-/// The folder of the report, below the folder in which the program is started.
-pub const REPORT: &str = "report";
-
-fn silent() -> Vec<Client> {
-    Client::tcp().returns().times(1_100)
-}
-
-fn guesses() -> Vec<Client> {
-    let guess =
-        |k: usize| format!(r#"{{"op":"auth","token":"a-token-that-somebody-guesses-{k:08}"}}"#);
-    super::script::each(0..100, |k| Client::tcp().says(&guess(k)).returns())
-}
-
-fn holders() -> Vec<Client> {
-    let auth = format!(r#"{{"op":"auth","token":"{TOKEN}"}}"#);
-    Client::tcp()
-        .says(&auth)
-        .floods(&light("/arm_sim/pause"))
-        .times(100)
-}
-
-fn pages() -> Vec<Client> {
-    Client::http("GET /")
-        .says_bytes(END)
-        .deaf()
-        .leaves_after(50)
-        .returns()
-        .times(50)
-}
-
-fn foreign() -> Vec<Client> {
-    let host = b"Host: evil.example\r\n";
-    let origin = b"Origin: https://evil.example\r\nUpgrade: websocket\r\n\
-        Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
-        Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
-    let client = |head: &[u8]| {
-        Client::http("GET /")
-            .says_bytes(head)
-            .says_bytes(END)
-            .returns()
-            .times(10)
+/// A foreign host, a foreign origin, a wrong version of WebSocket, a head that is too long, and one of too many lines.
+fn refused_requests() -> Vec<Client> {
+    let web = |origin: &str, version: u8| {
+        format!(
+            "Origin: {origin}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+             Sec-WebSocket-Version: {version}\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        )
     };
-    [client(host), client(origin)].concat()
-}
-
-fn paths() -> Vec<Client> {
-    let paths = [
-        "../../etc/passwd",
-        "%2e%2e/%2e%2e/etc/passwd",
-        "..%2f..%2fetc%2fpasswd",
-        "%00",
-        "\\..\\..\\",
-        "a/./../..//b",
+    let heads = [
+        "Host: evil.example\r\n".to_owned(),
+        web("https://evil.example", 13),
+        web("null", 8),
+        format!("X-Long: {}\r\n", filler(16 * KIB)),
+        "X-Many: 1\r\n".repeat(100),
     ];
-    let client = |path: &&str| {
-        Client::http(&format!("GET /report/{path}"))
+    let client = |head: &String| {
+        Client::http("GET /")
+            .says_bytes(head.as_bytes())
             .says_bytes(END)
             .returns()
-            .times(4)
+            .times(5)
     };
-    paths.iter().flat_map(client).collect()
+    heads.iter().flat_map(client).collect()
 }

@@ -1,51 +1,58 @@
 //! Aimed at the pool: computations that are long, many, unread, or left behind.
 
 use super::Attack;
-use super::script::{Client, call};
+use super::script::{Client, LONG, call};
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "deaf-computing",
         "40 clients ask for a million steps each (60 MB) and read nothing",
-        deaf,
-    ),
-    Attack::new(
-        "references",
-        "20 clients ask for rollouts with a reference, 10 s at 1e-5 s",
-        references,
+        || {
+            Client::tcp()
+                .says_each(0..8, |_| steps("sin(t)", 1_000_000))
+                .deaf()
+                .times(40)
+        },
     ),
     Attack::new(
         "rollouts",
         "20 clients ask for rollouts of 10,000,000 steps and 100,000 samples",
-        rollouts,
+        || {
+            let ask = rollout(r#","samples":100000,"integrator":"rk4""#);
+            Client::tcp().repeats(&ask).times(20)
+        },
     ),
     Attack::new(
         "stability",
         "20 clients ask for limits of stability, of other gains each time",
-        stability,
+        || {
+            let ask = |k: usize| {
+                let gains = format!(r#"{{"gains":{{"kp":[{k},{k}]}}}}"#);
+                call("/study/stability", "1", &gains)
+            };
+            Client::tcp().repeats_each(1..200, ask).times(20)
+        },
     ),
     Attack::new(
         "overflowing-plans",
         "100 clients ask for plans of loops whose numbers overflow",
         || {
-            let further = r#""gains":{"kp":[1e300,1e300],"kd":[1e300,1e300]},"setpoint":[1,1]"#;
-            let ask = call(
-                "/study/plan",
-                "1",
-                &format!(r#"{{"error":1e-6,"duration":10,{further}}}"#),
-            );
-            Client::tcp().repeats(&ask).times(100)
+            let gains = r#""gains":{"kp":[1e300,1e300],"kd":[1e300,1e300]},"setpoint":[1,1]"#;
+            let args = format!(r#"{{"error":1e-6,"duration":10,{gains}}}"#);
+            Client::tcp()
+                .repeats(&call("/study/plan", "1", &args))
+                .times(100)
         },
     ),
     Attack::new(
         "expressions",
         "20 clients ask for functions of 4 MiB: parentheses, powers, sums",
-        expressions,
-    ),
-    Attack::new(
-        "heavy-steps",
-        "20 clients ask for the most work that a computation may be",
-        heavy,
+        || {
+            let functions =
+                ["(", "-", "2^", "t+", "sin("].map(|part| part.repeat(LONG / part.len()) + "1");
+            let client = |function: &String| Client::tcp().repeats(&steps(function, 10)).times(4);
+            functions.iter().flat_map(client).collect()
+        },
     ),
     Attack::new(
         "left-behind",
@@ -61,80 +68,23 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "busy",
         "200 clients ask for a computation without end",
-        busy,
+        || {
+            Client::tcp()
+                .says_each(0..2, |_| rollout(r#","reference":true"#))
+                .times(200)
+        },
     )
     .fills(),
 ];
 
-const STEP: &str = "/arm_sim/integration_step";
-
 fn steps(function: &str, steps: usize) -> String {
     let rest = format!(r#""x0":0.3333333333333333,"dt":1e-3,"steps":{steps},"integrator":"rk4""#);
-    call(STEP, "1", &format!(r#"{{"function":"{function}",{rest}}}"#))
+    let args = format!(r#"{{"function":"{function}",{rest}}}"#);
+    call("/arm_sim/integration_step", "1", &args)
 }
 
-fn deaf() -> Vec<Client> {
-    Client::tcp()
-        .says_each(0..8, |_| steps("sin(t)", 1_000_000))
-        .deaf()
-        .times(40)
-}
-
+/// Ten seconds of motion in steps of a microsecond.
 fn rollout(further: &str) -> String {
-    call(
-        "/study/rollout",
-        "1",
-        &format!(r#"{{"q0":[0.4,-0.3],"duration":10{further}}}"#),
-    )
-}
-
-fn references() -> Vec<Client> {
-    Client::tcp()
-        .repeats(&rollout(r#","timestep":1e-5,"reference":true"#))
-        .times(20)
-}
-
-fn rollouts() -> Vec<Client> {
-    Client::tcp()
-        .repeats(&rollout(
-            r#","timestep":1e-6,"samples":100000,"integrator":"rk4""#,
-        ))
-        .times(20)
-}
-
-fn stability() -> Vec<Client> {
-    let ask = |k: usize| {
-        call(
-            "/study/stability",
-            "1",
-            &format!(r#"{{"gains":{{"kp":[{k},{k}]}}}}"#),
-        )
-    };
-    Client::tcp().repeats_each(1..200, ask).times(20)
-}
-
-fn expressions() -> Vec<Client> {
-    const MOST: usize = 4 * 1024 * 1024 - 1024;
-    let functions = [
-        "(".repeat(MOST),
-        "-".repeat(MOST),
-        "2^".repeat(MOST / 2),
-        "t+".repeat(MOST / 2) + "1",
-        "sin(".repeat(MOST / 4),
-    ];
-    let client = |function: &String| Client::tcp().repeats(&steps(function, 10)).times(4);
-    functions.iter().flat_map(client).collect()
-}
-
-fn heavy() -> Vec<Client> {
-    let function = "sin(t)+".repeat(120) + "1";
-    Client::tcp()
-        .says_each(0..16, |_| steps(&function, 1_000_000))
-        .times(20)
-}
-
-fn busy() -> Vec<Client> {
-    Client::tcp()
-        .says_each(0..2, |_| rollout(r#","timestep":1e-6,"reference":true"#))
-        .times(200)
+    let args = format!(r#"{{"q0":[0.4,-0.3],"duration":10,"timestep":1e-6{further}}}"#);
+    call("/study/rollout", "1", &args)
 }

@@ -1,29 +1,25 @@
 //! Aimed at the gateway's thread by numbers: hundreds of clients who all want a little at one instant.
 
 use super::Attack;
-use super::script::{Client, call, each, on_service, publish, subscribe};
+use super::script::{Client, MOST, call, each, on_service, publish, subscribe};
 
 /// Subscribers, or callers: with those who attack them, nearly all places.
 const CROWD: usize = 180;
-/// Clients that ask for what others have registered.
-const ASKERS: usize = 180;
-/// Calls of a client that may wait.
-const WAITING: usize = 256;
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "storm-beside-waiting",
-        "180 clients have 256 calls wait each; 50 connect, say nothing and go, over and over",
+        "180 clients have 180 calls wait each; 50 connect, say nothing and go, over and over",
         storm,
     ),
     Attack::new(
         "late-together",
-        "180 clients have 256 calls wait each, whose time is over at one instant",
+        "180 clients have 180 calls wait each, whose time is over at one instant",
         || waiting(Client::tcp(), |n| 2.5 - n as f64 / 1000.0),
     ),
     Attack::new(
         "left-together",
-        "a provider goes that 180 clients have 256 calls wait for, and another returns",
+        "a provider goes that 180 clients have 180 calls wait for, and another returns",
         || waiting(Client::tcp().leaves_after(1500).returns(), |_| 86_400.0),
     ),
     Attack::new(
@@ -50,7 +46,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "census",
-        "36 clients register 12,288 names, 180 ask rosapi for a service's type at one instant, every second",
+        "66 clients register 11,880 names, 150 ask rosapi for a service's type at one instant, every second",
         census,
     ),
 ];
@@ -62,7 +58,7 @@ fn waiting(provider: Client, patience: impl Fn(usize) -> f64) -> Vec<Client> {
         let timeout = patience(n);
         let call = format!(r#"{{"op":"call_service","service":"/crowd","timeout":{timeout}}}"#);
         let caller = Client::tcp().after(100 + n as u64);
-        caller.says_each(0..WAITING, |_| call.clone())
+        caller.says_each(0..MOST, |_| call.clone())
     });
     [vec![provider], callers].concat()
 }
@@ -83,31 +79,25 @@ fn publishers(further: &str) -> Vec<Client> {
     [subscriber.times(CROWD), publisher.times(40)].concat()
 }
 
-/// As many topics, services and actions as are listed.
+/// Clients with as many topics, services or actions as one may register.
 fn census() -> Vec<Client> {
-    let quiet = || Client::tcp().says(r#"{"op":"set_level","level":"none"}"#);
-    let typed = |op: &str, field: &str, name: String| {
-        format!(r#"{{"op":"{op}","{field}":"{name}","type":"a/b"}}"#)
-    };
-    let topics = each(0..4, |k| {
-        quiet().says_each(0..1_024, |n| {
-            typed("advertise", "topic", format!("/topic/{k}/{n}"))
-        })
-    });
-    let services = each(0..16, |k| {
-        quiet().says_each(0..256, |n| {
-            typed("advertise_service", "service", format!("/service/{k}/{n}"))
-        })
-    });
-    let actions = each(0..16, |k| {
-        quiet().says_each(0..256, |n| {
-            typed("advertise_action", "action", format!("/action/{k}/{n}"))
-        })
+    let kinds = [
+        ("advertise", "topic"),
+        ("advertise_service", "service"),
+        ("advertise_action", "action"),
+    ];
+    let mut clients = each(0..66, |k| {
+        let (op, field) = kinds[k % 3];
+        let name = |n| format!(r#"{{"op":"{op}","{field}":"/{field}/{k}/{n}","type":"a/b"}}"#);
+        Client::tcp()
+            .says(r#"{"op":"set_level","level":"none"}"#)
+            .says_each(0..MOST, name)
     });
     let question = call("/rosapi/service_type", "1", r#"{"service":"/service/1/1"}"#);
     let asker = Client::tcp()
         .after(1_000)
         .repeats(&question)
         .drips(question.len() + 1, std::time::Duration::from_secs(1));
-    [topics, services, actions, asker.times(ASKERS)].concat()
+    clients.extend(asker.times(150));
+    clients
 }

@@ -4,33 +4,23 @@
 use std::time::Duration;
 
 use super::Attack;
-use super::script::{Client, each, filler, publish, subscribe};
-
-const MIB: usize = 1024 * 1024;
+use super::script::{Client, MIB, each, filler, publish, subscribe};
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
-        "fragment-sizes",
-        "100 subscribers want 100 fragment sizes of messages of 3 MB",
+        "fragment-sizes-200",
+        "200 subscribers, each with a fragment size of its own, of messages of 3 MB",
         || {
-            sizes(
-                100,
-                Client::tcp,
-                |k| format!(r#","fragment_size":{}"#, 10_000 + k),
-                &text(3 * MIB),
-            )
+            let further = |k| format!(r#","fragment_size":{}"#, 1_000 + k);
+            sizes(200, Client::tcp, further, &text(3 * MIB))
         },
     ),
     Attack::new(
-        "fragment-sizes-200",
-        "200 subscribers, each with a size of its own",
+        "tiny-fragments",
+        "20 subscribers want a megabyte in fragments of one byte",
         || {
-            sizes(
-                200,
-                Client::tcp,
-                |k| format!(r#","fragment_size":{}"#, 1_000 + k),
-                &text(3 * MIB),
-            )
+            let further = |_| r#","fragment_size":1"#.to_owned();
+            sizes(20, Client::tcp, further, &text(MIB))
         },
     ),
     Attack::new(
@@ -38,33 +28,31 @@ pub const ATTACKS: &[Attack] = &[
         "20 subscribers want cbor, each with a fragment size of its own, of 3 MB",
         || {
             let further = |k| format!(r#","compression":"cbor","fragment_size":{}"#, 1_000 + k);
-            sizes(20, Client::web, further, &many("[1.5,2,\"a\"],"))
-        },
-    ),
-    Attack::new(
-        "deep-cbor",
-        "10 subscribers want cbor of messages of 3 MB nested 100 deep",
-        || cbor_of(&deep()),
-    ),
-    Attack::new(
-        "two-deep-cbor",
-        "20 subscribers do so under two spellings of two topics: each is read for itself",
-        || {
-            let further = r#","compression":"cbor""#;
-            let topics = ["/attack/one", "/attack/two"];
-            let mut clients = each(0..20, |k| {
-                let topic = topics[k % 2];
-                let spelling = if k % 4 < 2 { topic } else { &topic[1..] };
-                Client::web().says(&subscribe(spelling, further))
-            });
-            clients.extend(topics.map(|topic| publisher(topic, &deep())));
-            clients
+            sizes(20, Client::web, further, &many("data", "[1.5,2,\"a\"],"))
         },
     ),
     Attack::new(
         "flat-cbor",
         "10 subscribers want cbor of a million and a half numbers of one digit",
-        || cbor_of(&many("1,")),
+        || {
+            let further = |_| r#","compression":"cbor""#.to_owned();
+            sizes(10, Client::web, further, &many("data", "1,"))
+        },
+    ),
+    Attack::new(
+        "deep-cbor",
+        "20 subscribers want cbor of 3 MB nested 100 deep, under two spellings of two topics",
+        || {
+            let deep = format!("{}{},", r#"{"a":["#.repeat(50), "]}".repeat(50));
+            let topics = ["/attack/one", "/attack/two"];
+            let mut clients = each(0..20, |k| {
+                let topic = topics[k % 2];
+                let spelling = if k % 4 < 2 { topic } else { &topic[1..] };
+                Client::web().says(&subscribe(spelling, r#","compression":"cbor""#))
+            });
+            clients.extend(topics.map(|topic| publisher(topic, &many("data", &deep))));
+            clients
+        },
     ),
     Attack::new(
         "cbor-topics",
@@ -80,46 +68,12 @@ pub const ATTACKS: &[Attack] = &[
         },
     ),
     Attack::new(
-        "brackets-cbor",
-        "10 subscribers want cbor of a million and a half brackets, 100 deep",
-        || cbor_of(&many(&format!("{}{},", "[".repeat(100), "]".repeat(100)))),
-    ),
-    Attack::new(
-        "nameless-cbor",
-        "10 subscribers want cbor of 600,000 members without a name",
-        || {
-            let members = r#""":1,"#.repeat(3 * MIB / 5);
-            cbor_of(&format!("{{{members}\"\":1}}"))
-        },
-    ),
-    Attack::new(
         "raw-empties",
         "10 subscribers want cbor-raw of a million empty transforms: 80 bytes each in CDR",
         || {
             let further = r#","compression":"cbor-raw","type":"tf2_msgs/msg/TFMessage""#;
-            let msg = many("{},").replace("data", "transforms");
+            let msg = many("transforms", "{},");
             sizes(10, Client::web, |_| further.to_owned(), &msg)
-        },
-    ),
-    Attack::new(
-        "fragments-64",
-        "10 subscribers want 3 MB of quotes in fragments of 64 bytes",
-        || {
-            let msg = format!(r#"{{"data":"{}"}}"#, "\\\"".repeat(3 * MIB / 2));
-            let further = |k| format!(r#","fragment_size":{}"#, 64 + k);
-            sizes(10, Client::tcp, further, &msg)
-        },
-    ),
-    Attack::new(
-        "tiny-fragments",
-        "20 subscribers want a megabyte in fragments of one byte",
-        || {
-            sizes(
-                20,
-                Client::tcp,
-                |_| r#","fragment_size":1"#.to_owned(),
-                &text(MIB),
-            )
         },
     ),
 ];
@@ -152,16 +106,8 @@ fn text(bytes: usize) -> String {
     format!(r#"{{"data":"{}"}}"#, filler(bytes))
 }
 
-/// 3 MB of one thing behind the other.
-fn many(unit: &str) -> String {
-    format!(r#"{{"data":[{}1]}}"#, unit.repeat(3 * MIB / unit.len()))
-}
-
-fn cbor_of(msg: &str) -> Vec<Client> {
-    let further = |_| r#","compression":"cbor""#.to_owned();
-    sizes(10, Client::web, further, msg)
-}
-
-fn deep() -> String {
-    many(&format!("{}{},", r#"{"a":["#.repeat(50), "]}".repeat(50)))
+/// 3 MB of one entry, which ends with a comma, behind the other.
+fn many(field: &str, entry: &str) -> String {
+    let entries = entry.repeat(3 * MIB / entry.len());
+    format!(r#"{{"{field}":[{}]}}"#, entries.trim_end_matches(','))
 }

@@ -2,20 +2,20 @@
 //! that are begun and not ended.
 
 use super::Attack;
-use super::script::{Client, call, each, filler, light, publish, subscribe};
-
-const MIB: usize = 1024 * 1024;
-const LONG: usize = 4 * MIB - 1024;
+use super::script::{Client, LONG, MIB, call, each, filler, light, publish, subscribe};
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
-        "deaf-statuses",
-        "1 client sends lines of two bytes and reads no complaint",
-        deaf_statuses,
+        "deaf-statuses-10",
+        "10 clients send lines of two bytes and read no complaint",
+        || {
+            Client::tcp()
+                .says(&light("/arm_sim/pause"))
+                .floods("x")
+                .deaf()
+                .times(10)
+        },
     ),
-    Attack::new("deaf-statuses-10", "10 clients do so", || {
-        vec![deaf_statuses(); 10].concat()
-    }),
     Attack::new(
         "deaf-calls",
         "20 clients make calls of unknown services and read nothing",
@@ -24,25 +24,6 @@ pub const ATTACKS: &[Attack] = &[
                 .floods(&call("/x", "1", "{}"))
                 .deaf()
                 .times(20)
-        },
-    ),
-    Attack::new(
-        "deaf-tiny",
-        "200 clients read no message of a flood of 40 bytes each",
-        || {
-            let flood = Client::tcp()
-                .advertises("/attack/tiny")
-                .floods(&publish("/attack/tiny", r#"{"data":1}"#))
-                .after(300)
-                .times(1);
-            [
-                Client::tcp()
-                    .says(&subscribe("/attack/tiny", ""))
-                    .deaf()
-                    .times(200),
-                flood,
-            ]
-            .concat()
         },
     ),
     Attack::new(
@@ -100,31 +81,14 @@ pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "sips",
         "50 clients ask for much and read 100 bytes ten times a second",
-        sips,
-    ),
-    Attack::new(
-        "throttled-series",
-        "200 subscribers are throttled beside a flood of short messages",
         || {
-            let further = |k| {
-                format!(
-                    r#","throttle_rate":{},"queue_length":{}"#,
-                    1 + k % 50,
-                    1 + k % 100
-                )
-            };
-            let flood = Client::tcp()
-                .advertises("/attack/series")
-                .floods(&publish("/attack/series", r#"{"data":1}"#))
-                .after(400)
-                .times(1);
-            [
-                each(0..200, |k| {
-                    Client::tcp().says(&subscribe("/attack/series", &further(k)))
-                }),
-                flood,
-            ]
-            .concat()
+            let steps = r#"{"function":"t","x0":0,"dt":1,"steps":20000,"integrator":"euler"}"#;
+            Client::tcp()
+                .says(&subscribe("/joint_states", ""))
+                .repeats(&light("/rosapi/topics_and_raw_types"))
+                .repeats(&call("/arm_sim/integration_step", "1", steps))
+                .sips(100)
+                .times(50)
         },
     ),
     Attack::new(
@@ -133,28 +97,12 @@ pub const ATTACKS: &[Attack] = &[
         || {
             each(0..50, |k| {
                 let topic = format!("/attack/hoard/{k}");
+                let held_back = r#","throttle_rate":31536000000,"queue_length":100000"#;
                 Client::tcp()
-                    .says(&subscribe(&topic, HELD_BACK))
+                    .says(&subscribe(&topic, held_back))
                     .advertises(&topic)
                     .floods(&publish(&topic, r#"{"data":"held back"}"#))
             })
-        },
-    ),
-    Attack::new(
-        "throttle-topics",
-        "16 clients have 100,000 messages held back of one topic after the other",
-        || {
-            const EACH: usize = 100_000;
-            let topics = 0..12;
-            let name = |n: usize| format!("/{n:x}");
-            let subscriber =
-                Client::tcp().says_each(topics.clone(), |n| subscribe(&name(n), HELD_BACK));
-            let publisher = topics
-                .clone()
-                .fold(Client::tcp(), |client, n| client.advertises(&name(n)));
-            let messages = topics.start * EACH..topics.end * EACH;
-            let publisher = publisher.says_each(messages, |n| publish(&name(n / EACH), "{}"));
-            [subscriber.times(16), vec![publisher.after(400)]].concat()
         },
     ),
     Attack::new(
@@ -207,14 +155,6 @@ pub const ATTACKS: &[Attack] = &[
     ),
 ];
 
-fn deaf_statuses() -> Vec<Client> {
-    Client::tcp()
-        .says(&light("/arm_sim/pause"))
-        .floods("x")
-        .deaf()
-        .times(1)
-}
-
 fn deaf_topics() -> Vec<Client> {
     deaf_publishers(MIB, Client::repeats)
 }
@@ -243,19 +183,6 @@ fn deaf_lists() -> Vec<Client> {
         .deaf()
         .times(100)
 }
-
-fn sips() -> Vec<Client> {
-    let steps = r#"{"function":"t","x0":0,"dt":1,"steps":20000,"integrator":"euler"}"#;
-    let client = Client::tcp().says(&subscribe("/joint_states", ""));
-    client
-        .repeats(&light("/rosapi/topics_and_raw_types"))
-        .repeats(&call("/arm_sim/integration_step", "1", steps))
-        .sips(100)
-        .times(50)
-}
-
-/// As much is held back as a queue may have, for a year.
-const HELD_BACK: &str = r#","throttle_rate":31536000000,"queue_length":100000"#;
 
 fn unfinished_frames() -> Vec<Client> {
     let begun = format!(

@@ -34,8 +34,6 @@ pub struct Attack {
     pub cast: fn() -> Vec<Client>,
     /// The arguments that the program is started with.
     pub options: &'static [&'static str],
-    /// Open files that the program may have.
-    pub files: Option<u64>,
     /// Asks for the token, and starts the program with it.
     pub locked: bool,
     /// All places are taken, as the limits allow: newcomers may be turned away.
@@ -52,7 +50,6 @@ impl Attack {
             what,
             cast,
             options: &[],
-            files: None,
             locked: false,
             fills: false,
             moves: false,
@@ -62,15 +59,6 @@ impl Attack {
     /// On a program that was started with options.
     pub const fn with(self, options: &'static [&'static str]) -> Self {
         Self { options, ..self }
-    }
-
-    /// On a program that may have few files open.
-    pub const fn with_files(self, files: u64) -> Self {
-        Self {
-            files: Some(files),
-            fills: true,
-            ..self
-        }
     }
 
     /// On a program that asks for the token.
@@ -96,6 +84,11 @@ impl Attack {
             ..self
         }
     }
+}
+
+/// Whether a name is picked by `words`: it contains one of them, or there are none.
+pub fn picks(words: &str, name: &str) -> bool {
+    words.is_empty() || words.split(',').any(|word| name.contains(word))
 }
 
 /// All attacks, by what they are aimed at.

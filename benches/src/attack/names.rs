@@ -1,30 +1,28 @@
 //! Aimed at the registry: names, providers, calls that wait, lists of what there is.
 
 use super::Attack;
-use super::script::{Client, call, each, filler, light, on_service, on_topic, publish, subscribe};
-
-const MIB: usize = 1024 * 1024;
+use super::script::{
+    Client, LONG, MIB, MOST, call, each, filler, light, on_service, on_topic, publish, subscribe,
+};
 
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "registrations",
-        "8 clients register as many names of 1,000 bytes as they may",
-        registrations,
-    ),
-    Attack::new("registrations-200", "200 clients do so", || {
-        each(0..200, |k| {
-            Client::tcp().says_each(0..300, |n| {
-                subscribe(&format!("/{k}/{n}/{}", filler(1_000)), "")
+        "200 clients subscribe under as many names of 1,000 bytes as they may",
+        || {
+            let name = |k, n| format!("/{k}/{n}/{}", filler(1_000));
+            each(0..200, |k| {
+                Client::tcp().says_each(0..MOST, |n| subscribe(&name(k, n), ""))
             })
-        })
-    }),
+        },
+    ),
     Attack::new(
         "leaving-together",
         "200 clients with all the subscriptions that they may have leave at one instant",
         || {
             Client::tcp()
                 .says(r#"{"op":"set_level","level":"none"}"#)
-                .says_each(0..350, |n| subscribe(&format!("/{n}"), ""))
+                .says_each(0..MOST, |n| subscribe(&format!("/{n}"), ""))
                 .leaves_after(5_000)
                 .times(200)
         },
@@ -33,33 +31,15 @@ pub const ATTACKS: &[Attack] = &[
         "day-long-calls",
         "21 clients provide a service, call it with 4 MiB for a day and read nothing",
         || {
-            let args = format!(r#"{{"data":"{}"}}"#, filler(4 * MIB - 1024));
+            let rest = format!(r#""timeout":86400,"args":{{"data":"{}"}}"#, filler(LONG));
             each(0..21, |k| {
                 let service = format!("/attack/day/{k}");
+                let call = format!(r#"{{"op":"call_service","service":"{service}",{rest}}}"#);
                 Client::tcp()
                     .says(&on_service("advertise_service", &service))
-                    .repeats(&day_long(&service, &args))
+                    .repeats(&call)
                     .deaf()
             })
-        },
-    ),
-    Attack::new(
-        "waiting-calls",
-        "100 clients have 256 calls wait for a provider that never answers",
-        || {
-            let args = format!(r#"{{"data":"{}"}}"#, filler(4096));
-            let call = day_long("/attack/never", &args);
-            let caller = Client::tcp()
-                .says_each(0..256, |_| call.clone())
-                .after(200)
-                .times(100);
-            [
-                Client::tcp()
-                    .says(&on_service("advertise_service", "/attack/never"))
-                    .times(1),
-                caller,
-            ]
-            .concat()
         },
     ),
     Attack::new(
@@ -108,28 +88,16 @@ pub const ATTACKS: &[Attack] = &[
         mirrors,
     ),
     Attack::new(
-        "wrong-answers",
-        "10 clients answer calls that nobody made, with ids of 64 KiB",
-        || {
-            let id = format!("\"{}\"", filler(64 * 1024));
-            let frame = answer("/attack/nobody", &id, "{}");
-            let short = answer("/attack/nobody", "1", "{}").repeat(500);
-            Client::tcp()
-                .says(&light("/arm_sim/pause"))
-                .repeats_bytes(&frame)
-                .repeats_bytes(&short)
-                .times(10)
-        },
-    ),
-    Attack::new(
         "takeovers",
         "20 clients take a service from one another, 10 call it",
-        takeovers,
-    ),
-    Attack::new(
-        "lists",
-        "4 clients advertise 1,024 topics each, 4 ask for all topics and types",
-        lists,
+        || {
+            let provide = on_service("advertise_service", "/attack/taken");
+            [
+                Client::tcp().floods(&provide).times(20),
+                Client::tcp().floods(&light("/attack/taken")).times(10),
+            ]
+            .concat()
+        },
     ),
     Attack::new(
         "details",
@@ -143,99 +111,29 @@ pub const ATTACKS: &[Attack] = &[
     )
     .moves(),
     Attack::new(
-        "spellings",
-        "10 clients call and subscribe under many spellings of names",
-        spellings,
-    ),
-    Attack::new(
-        "subscription-storm",
-        "20 clients subscribe and unsubscribe, over and over",
+        "churn",
+        "20 clients register and withdraw topics, services and subscriptions; 200 subscribe to the topic",
         || {
-            let storm = |k: usize| {
-                let topic = ["/joint_states", "/clock", "/attack/storm", "/tf"][k / 2 % 4];
-                if k.is_multiple_of(2) {
-                    subscribe(topic, "")
-                } else {
-                    on_topic("unsubscribe", topic)
-                }
-            };
-            Client::tcp().repeats_each(0..200, storm).times(20)
-        },
-    ),
-    Attack::new(
-        "latched",
-        "20 clients subscribe to the description again and again, 64 subscriptions each",
-        latched,
-    ),
-    Attack::new(
-        "topic-churn",
-        "20 clients advertise and unadvertise a topic that 200 subscribe to",
-        || {
-            let churn = |k: usize| match k % 3 {
+            let churn = |k: usize| match k % 8 {
                 0 => on_topic("advertise", "/attack/churn"),
                 1 => publish("/attack/churn", "{}"),
-                _ => on_topic("unadvertise", "/attack/churn"),
+                2 => on_topic("unadvertise", "/attack/churn"),
+                3 => on_service("advertise_service", "/attack/churn"),
+                4 => on_service("unadvertise_service", "/attack/churn"),
+                5 => subscribe("/joint_states", ""),
+                // The description is latched: each subscription gets it.
+                6 => subscribe("/robot_description", ""),
+                _ => on_topic(
+                    "unsubscribe",
+                    ["/joint_states", "/robot_description"][k / 8 % 2],
+                ),
             };
-            [
-                Client::tcp()
-                    .says(&subscribe("/attack/churn", ""))
-                    .times(200),
-                Client::tcp().repeats_each(0..300, churn).times(20),
-            ]
-            .concat()
-        },
-    ),
-    Attack::new(
-        "service-churn",
-        "20 clients provide and withdraw services, over and over",
-        || {
-            each(0..20, |k| {
-                let churn = |n: usize| {
-                    on_service(
-                        ["advertise_service", "unadvertise_service"][n % 2],
-                        &format!("/attack/{k}/{}", n / 2),
-                    )
-                };
-                Client::tcp().repeats_each(0..500, churn)
-            })
-        },
-    ),
-    Attack::new(
-        "subscription-ids",
-        "10 clients subscribe 1,000 times to one topic that 2 clients flood",
-        || {
-            let one = |k: usize| {
-                subscribe(
-                    "/attack/ids",
-                    &format!(r#","id":"{k}","throttle_rate":{k},"queue_length":{k}"#),
-                )
-            };
-            let flood = Client::tcp()
-                .advertises("/attack/ids")
-                .floods(&publish("/attack/ids", r#"{"data":1}"#))
-                .after(300)
-                .times(2);
-            [Client::tcp().says_each(1..1_000, one).times(10), flood].concat()
+            let subscriber = Client::tcp().says(&subscribe("/attack/churn", ""));
+            let churner = Client::tcp().repeats_each(0..160, churn);
+            [subscriber.times(200), churner.times(20)].concat()
         },
     ),
 ];
-
-fn registrations_of(k: usize) -> Client {
-    let name = |n: usize| format!("/{k}/{n}/{}", filler(1_000));
-    Client::tcp()
-        .says_each(0..350, |n| subscribe(&name(n), ""))
-        .says_each(0..1_024, |n| on_topic("advertise", &name(n)))
-        .says_each(0..256, |n| on_service("advertise_service", &name(n)))
-}
-
-fn registrations() -> Vec<Client> {
-    each(0..8, registrations_of)
-}
-
-/// Fewer names each: all of them together are much more than there is room for.
-fn day_long(service: &str, args: &str) -> String {
-    format!(r#"{{"op":"call_service","service":"{service}","id":1,"timeout":86400,"args":{args}}}"#)
-}
 
 /// The id of a forwarded call, as it stands.
 fn id_of(line: &str) -> Option<&str> {
@@ -271,34 +169,6 @@ fn mirrors() -> Vec<Client> {
             .says(&light(&service))
             .replies(reply)
     })
-}
-
-fn takeovers() -> Vec<Client> {
-    let provide = on_service("advertise_service", "/attack/taken");
-    [
-        Client::tcp().floods(&provide).times(20),
-        Client::tcp().floods(&light("/attack/taken")).times(10),
-    ]
-    .concat()
-}
-
-fn lists() -> Vec<Client> {
-    let advertise = each(0..4, |k| {
-        let frame = move |n| {
-            format!(
-                r#"{{"op":"advertise","topic":"/attack/list/{k}/{n}","type":"std_msgs/msg/Header"}}"#
-            )
-        };
-        Client::tcp().says_each(0..1_024, frame)
-    });
-    [
-        advertise,
-        Client::tcp()
-            .floods(&light("/rosapi/topics_and_raw_types"))
-            .after(300)
-            .times(4),
-    ]
-    .concat()
 }
 
 fn details() -> Vec<Client> {
@@ -341,28 +211,4 @@ fn parameters() -> Vec<Client> {
     Client::tcp()
         .repeats_each(0..ask.len(), |k| ask[k].clone())
         .times(10)
-}
-
-fn spellings() -> Vec<Client> {
-    let spelling = |k: usize| match k % 5 {
-        0 => light("arm_sim/pause"),
-        1 => light("//arm_sim//pause/"),
-        2 => light(r"\u002farm_sim\u002fp\u0061use"),
-        3 => subscribe(&format!("joint_states{}", "/".repeat(k)), ""),
-        _ => light(&format!("/{}", filler(1_023))),
-    };
-    Client::tcp().repeats_each(0..500, spelling).times(10)
-}
-
-fn latched() -> Vec<Client> {
-    let again = |k: usize| {
-        let topic = ["/robot_description", "/tf_static"][k % 2];
-        let id = k % 64;
-        format!(
-            "{}\n{}",
-            format_args!(r#"{{"op":"unsubscribe","topic":"{topic}","id":"{id}"}}"#),
-            subscribe(topic, &format!(r#","id":"{id}""#))
-        )
-    };
-    Client::tcp().repeats_each(0..256, again).times(20)
 }

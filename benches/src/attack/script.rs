@@ -9,6 +9,14 @@ use std::time::Duration;
 
 use pendularm_client::websocket::{LAST, append, opcode};
 
+pub const KIB: usize = 1024;
+pub const MIB: usize = 1024 * KIB;
+/// A frame of almost the length that is taken.
+pub const LONG: usize = 4 * MIB - KIB;
+/// Registrations, or waiting calls, with names of up to 13 bytes that one client may have; a few less than there is
+/// room for.
+pub const MOST: usize = 180;
+
 /// The first bytes of a client.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Door {
@@ -141,7 +149,7 @@ impl Client {
     /// A short message is said many times in one write, as whoever floods does.
     pub fn floods(self, frame: &str) -> Self {
         let bytes = self.framed(frame);
-        let times = (64 * 1024 / bytes.len()).max(1);
+        let times = (64 * KIB / bytes.len()).max(1);
         self.repeats_bytes(&bytes.repeat(times))
     }
 
@@ -249,23 +257,8 @@ pub fn on_service(op: &str, service: &str) -> String {
     format!(r#"{{"op":"{op}","service":"{service}"}}"#)
 }
 
-/// An array of so many bytes of numbers that are slow to convert: twenty digits astride a halfway point.
-pub fn slow_numbers(bytes: usize) -> String {
-    array(bytes, "10000000000000001268e281")
-}
-
-/// An array of so many bytes of short numbers.
-pub fn numbers(bytes: usize) -> String {
-    array(bytes, "1.5")
-}
-
-fn array(bytes: usize, entry: &str) -> String {
-    let entries = bytes / (entry.len() + 1);
-    format!(
-        "[{}{entry}]",
-        format!("{entry},").repeat(entries.saturating_sub(1))
-    )
-}
+/// Two numbers that are slow to convert: twenty digits astride a halfway point.
+pub const SLOW: &str = "10000000000000001268e281,10000000000000001268e281";
 
 /// A string of so many bytes, quotes left out.
 pub fn filler(bytes: usize) -> String {

@@ -4,32 +4,19 @@
 //!
 //! Default settings, no client during the measurement. Linux only: the figures are read from `/proc`.
 
-use std::io::{BufRead, BufReader, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use pendularm_benches::program::Program;
-use pendularm_benches::program::{processor, resident};
+use pendularm_benches::program::{Program, processor, resident};
+use pendularm_client::blocking::Client;
 
 /// Simulation time as `/clock` has it now \[s\], and when it came.
 fn simulation_time(address: SocketAddr) -> (f64, Instant) {
-    let mut stream = TcpStream::connect(address).expect("accepts");
-    stream
-        .write_all(b"{\"op\":\"subscribe\",\"topic\":\"/clock\"}\n")
-        .expect("sent");
-    let mut lines = BufReader::new(stream).lines();
-    let line = lines
-        .find_map(|line| line.ok().filter(|line| line.contains("\"clock\":{")))
-        .expect("a clock message");
-    let number = |key: &str| {
-        let rest = &line[line.find(key).expect("key") + key.len()..];
-        let end = rest.find(|c: char| !c.is_ascii_digit()).expect("end");
-        rest[..end].parse::<f64>().expect("number")
-    };
-    (
-        number("\"sec\":") + 1e-9 * number("\"nanosec\":"),
-        Instant::now(),
-    )
+    let mut client = Client::to(address);
+    client.subscribe("/clock");
+    let clock = &client.message("/clock")["clock"];
+    let number = |key: &str| clock[key].as_f64().expect("a number");
+    (number("sec") + 1e-9 * number("nanosec"), Instant::now())
 }
 
 fn main() {

@@ -8,37 +8,29 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use pendularm_benches::program::Program;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 const REQUEST: &[u8] =
     b"{\"op\":\"call_service\",\"id\":\"1\",\"service\":\"/arm_sim/set_params\",\"args\":{}}\n";
 
-/// A server process that prints `listening on ADDRESS`, and a connection to it.
+/// A server, and a connection to it.
 struct Server {
-    child: Child,
+    _program: Program,
     stream: TcpStream,
     answers: BufReader<TcpStream>,
 }
 
 impl Server {
-    fn start(mut command: Command) -> Self {
-        let mut child = command
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the server starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped"))
-            .read_line(&mut line)
-            .expect("a line");
-        let address = line.trim().trim_start_matches("listening on ").to_owned();
-        let stream = TcpStream::connect(address).expect("the server accepts");
+    fn start(path: &str, arguments: &[&str]) -> Self {
+        let program = Program::start(path, arguments).expect("the server starts");
+        let stream = TcpStream::connect(program.address).expect("the server accepts");
         stream.set_nodelay(true).expect("nodelay");
         let answers = BufReader::new(stream.try_clone().expect("clone"));
         Self {
-            child,
+            _program: program,
             stream,
             answers,
         }
@@ -50,13 +42,6 @@ impl Server {
         self.stream.write_all(request).expect("sent");
         self.answers.read_until(b'\n', answer).expect("answered");
         began.elapsed()
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -100,11 +85,9 @@ fn main() {
     let count: usize = arguments
         .next()
         .map_or(20_000, |count| count.parse().expect("a number"));
-    let mut arm = Command::new(program);
-    arm.args(["--bind", "127.0.0.1:0"]);
-    let mut bare = Command::new(std::env::current_exe().expect("own path"));
-    bare.arg("echo");
-    let (mut arm, mut bare) = (Server::start(arm), Server::start(bare));
+    let own = std::env::current_exe().expect("own path");
+    let mut arm = Server::start(&program, &["--bind", "127.0.0.1:0"]);
+    let mut bare = Server::start(&own.to_string_lossy(), &["echo"]);
     let (mut answer, mut echoed) = (Vec::new(), Vec::new());
     for _ in 0..1000 {
         arm.exchange(REQUEST, &mut answer);

@@ -1,6 +1,6 @@
 //! A soak: attacks picked at random, several at a time, for minutes, beside healthy clients.
 //!
-//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (names of attacks, between commas; all) in the environment.
+//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (parts of names of attacks, between commas; all) in the environment.
 //! Attacks come in tides. After each tide there is an ebb with the healthy clients alone, at which the program must have let go of
 //! descriptors and threads. Its memory is compared from ebb to ebb. Exit status 1 if a bar is missed. Linux only.
 //!
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use pendularm_benches::attack::script::Client;
 use pendularm_benches::attack::stage::{Deeds, play};
-use pendularm_benches::attack::{Attack, groups};
+use pendularm_benches::attack::{Attack, groups, picks};
 use pendularm_benches::healthy::{Health, Healthy, Target};
 use pendularm_benches::program::{Program, Vitals, peak, vitals};
 
@@ -154,16 +154,14 @@ fn soak(path: &str, time: Duration, seed: u64) -> Result<bool, String> {
 /// Attacks on a program as it is by default, which leave the arm's clock and settings alone and do not take all places.
 fn attacks() -> Result<Vec<Attack>, String> {
     let only = std::env::var("ONLY").unwrap_or_default();
-    let wanted =
-        |attack: &&Attack| only.is_empty() || only.split(',').any(|name| name == attack.name);
     let fits = |attack: &&Attack| {
-        !attack.moves && !attack.fills && !attack.locked && attack.options.is_empty()
+        let is_default = !attack.locked && attack.options.is_empty();
+        is_default && !attack.moves && !attack.fills && picks(&only, attack.name)
     };
     let all: Vec<Attack> = groups()
         .iter()
         .flat_map(|(_, attacks)| attacks.iter())
         .filter(fits)
-        .filter(wanted)
         .copied()
         .collect();
     if all.is_empty() {

@@ -70,17 +70,7 @@ pub(super) fn python(number: f64) -> String {
 
 /// A text as JSON.
 pub(super) fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for character in text.chars() {
-        match character {
-            '"' | '\\' => quoted.extend(['\\', character]),
-            '\0'..=' ' if character != ' ' => {
-                let _ = write!(quoted, "\\u{:04x}", u32::from(character));
-            }
-            _ => quoted.push(character),
-        }
-    }
-    quoted + "\""
+    serde_json::Value::from(text).to_string()
 }
 
 pub(super) fn put(frame: &mut String, key: &str, value: Option<&impl std::fmt::Display>) {

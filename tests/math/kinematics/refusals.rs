@@ -74,39 +74,14 @@ fn other_numbers_of_links_have_no_closed_form() {
 
 #[test]
 fn the_reach_of_an_arm_is_a_ring_or_a_disc() {
-    assert_eq!(
-        Reach::of(&[1.0, 1.0]),
-        Reach {
-            inner: 0.0,
-            outer: 2.0
-        }
-    );
-    assert_eq!(
-        Reach::of(&[0.5, 2.0]),
-        Reach {
-            inner: 1.5,
-            outer: 2.5
-        }
-    );
-    assert_eq!(
-        Reach::of(&[1.0, 4.0, 0.5]),
-        Reach {
-            inner: 2.5,
-            outer: 5.5
-        }
-    );
-    assert_eq!(
-        Reach::of(&[1.0, 1.0, 1.0]),
-        Reach {
-            inner: 0.0,
-            outer: 3.0
-        }
-    );
-    assert_eq!(
-        Reach::of(&[2.0]),
-        Reach {
-            inner: 2.0,
-            outer: 2.0
-        }
-    );
+    let links: [(&[f64], f64, f64); 5] = [
+        (&[1.0, 1.0], 0.0, 2.0),
+        (&[0.5, 2.0], 1.5, 2.5),
+        (&[1.0, 4.0, 0.5], 2.5, 5.5),
+        (&[1.0, 1.0, 1.0], 0.0, 3.0),
+        (&[2.0], 2.0, 2.0),
+    ];
+    for (lengths, inner, outer) in links {
+        assert_eq!(Reach::of(lengths), Reach { inner, outer }, "{lengths:?}");
+    }
 }

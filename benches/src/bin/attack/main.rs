@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use pendularm_benches::attack::admission::REPORT;
 use pendularm_benches::attack::stage::{Deeds, play};
-use pendularm_benches::attack::{Attack, TOKEN, groups};
+use pendularm_benches::attack::{Attack, TOKEN, groups, picks};
 use pendularm_benches::healthy::{Healthy, Target};
 use pendularm_benches::program::{Program, peak};
 
@@ -34,7 +34,8 @@ struct Plan {
     bars: Bars,
     /// How often an attack is played until it is in time.
     tries: usize,
-    only: Vec<String>,
+    /// Parts of the names of what is played, between commas; all if empty.
+    only: String,
 }
 
 impl Plan {
@@ -48,9 +49,7 @@ impl Plan {
             patience: Duration::from_secs(2),
             bars: Bars::FULL,
             tries: 1,
-            only: only
-                .map(|words| words.split(',').map(str::to_owned).collect())
-                .unwrap_or_default(),
+            only: only.unwrap_or_default().to_owned(),
         };
         if !arguments.iter().any(|argument| argument == "--quick") {
             return full;
@@ -64,10 +63,6 @@ impl Plan {
             tries: 3,
             ..full
         }
-    }
-
-    fn picks(&self, name: &str) -> bool {
-        self.only.is_empty() || self.only.iter().any(|word| name.contains(word.as_str()))
     }
 }
 
@@ -118,7 +113,7 @@ fn run(plan: &Plan) -> Result<Vec<&'static str>, String> {
     for (group, attacks) in groups() {
         let mut picked = attacks
             .iter()
-            .filter(|attack| plan.picks(attack.name))
+            .filter(|attack| picks(&plan.only, attack.name))
             .peekable();
         if picked.peek().is_some() {
             println!("-- {group}");
@@ -155,12 +150,7 @@ fn start(attack: &Attack, program: &str) -> Result<Program, String> {
         arguments.extend(["--token", TOKEN]);
     }
     arguments.extend(attack.options);
-    let Some(files) = attack.files else {
-        return Program::start(program, &arguments);
-    };
-    let script = format!("ulimit -n {files}; exec \"$0\" \"$@\"");
-    arguments.splice(0..0, ["-c", &script, program]);
-    Program::start("sh", &arguments)
+    Program::start(program, &arguments)
 }
 
 /// Attacks the program; SIGTERM comes before the attack ends.

@@ -1,7 +1,7 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
-//! `load ports N` prints N free ports of loopback. `load SERVER=ADDRESS=PID ... [--quick]` measures servers that run
-//! already, for `benches/load/run.sh`. Round after round every scene is played to each server in turn, by the same
+//! `load ports N` prints N free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
+//! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene is played to each server in turn, by the same
 //! client on one thread. The processor time of the server for a delivery is compared: it hardly depends on other work
 //! of the machine. Fails if a message is lost, comes twice or comes out of order. Linux only: the figures are read from
 //! `/proc`.
@@ -15,7 +15,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
 use fleet::{Fleet, Outcome, Pace, Scene};
-use pendularm_benches::program::processor;
+use pendularm_benches::program::{Program, processor};
 use pendularm_benches::protocol::Protocol;
 
 /// How often the arm publishes, and so everybody here that does not flood.
@@ -82,7 +82,7 @@ struct Plan {
     bars: bool,
 }
 
-/// A program that runs already.
+/// A program that runs.
 #[derive(Clone, Copy)]
 struct Server {
     protocol: Protocol,
@@ -117,15 +117,26 @@ fn main() {
         );
     }
     let quick = arguments.iter().any(|argument| argument == "--quick");
-    let only = arguments
+    let mut words = arguments
         .iter()
-        .find_map(|argument| argument.strip_prefix("--only="))
-        .map(|only| only.replace("_", " "));
-    let servers: Vec<Server> = arguments
-        .iter()
-        .filter(|argument| !argument.starts_with("--"))
-        .map(|text| server(text))
-        .collect();
+        .filter(|argument| !argument.starts_with("--"));
+    let path = words.next().expect("the path of the pendularm binary");
+    let options = [
+        "--bind",
+        "127.0.0.1:0",
+        "--clients",
+        "1100",
+        "--log",
+        "warn",
+    ];
+    let program = Program::start(path, &options).expect("the runtime starts");
+    let ours = Server {
+        protocol: Protocol::Pendularm,
+        address: program.address,
+        pid: program.pid(),
+    };
+    let peers = words.map(|text| server(text));
+    let servers: Vec<Server> = std::iter::once(ours).chain(peers).collect();
     let plan = if quick {
         Plan {
             rounds: 1,
@@ -147,10 +158,7 @@ fn main() {
         .collect();
     report::print_rest(&at_rest);
     let mut verdicts = Vec::new();
-    for scene in SCENES.iter().filter(|scene| {
-        only.as_ref()
-            .is_none_or(|only| scene.name.contains(only.as_str()))
-    }) {
+    for scene in &SCENES {
         let played = play(scene, &servers, &plan);
         report::print_scene(scene, &played, &at_rest);
         verdicts.push((*scene, played));
