@@ -24,36 +24,12 @@ use pendularm::record;
 #[cfg(feature = "report")]
 use pendularm::report;
 
-/// Memory that was freed goes back to the system soon, by a thread that nobody waits for. The C library's allocator
-/// keeps it for ever where the last of it lies behind something small, which after a burst of small messages is the
-/// rule.
-#[cfg(unix)]
-#[global_allocator]
-static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
-
-/// How long freed memory is kept for reuse, in milliseconds. The allocator's own ten seconds are enough to
-/// fill it with what one client held, and then as much again with what the next one does: beyond what README promises.
-#[cfg(unix)]
-const FREED_KEPT_MS: isize = 500;
-
 /// Exit status for every other failure.
 const FAILED: u8 = 1;
 /// Exit status for a bad option or a bad environment variable.
 const BAD_USAGE: u8 = 2;
 
-/// Has freed memory given back in [`FREED_KEPT_MS`].
-#[cfg(unix)]
-fn give_memory_back_soon() {
-    use tikv_jemalloc_ctl::{Access, AsName};
-    // Arenas yet to come, and the one that this thread has. An allocator that refuses keeps its own time.
-    for key in ["arenas.dirty_decay_ms\0", "arena.0.dirty_decay_ms\0"] {
-        let _ = key.name().write(FREED_KEPT_MS);
-    }
-}
-
 fn main() -> ExitCode {
-    #[cfg(unix)]
-    give_memory_back_soon();
     #[cfg(unix)]
     // Without the handler a file that is too long kills the process, which nothing else depends on.
     let _ = pendularm::actors::signals::survive_file_size_limit();
