@@ -38,7 +38,7 @@ pub struct Vitals {
     pub resident: f64,
     /// Open descriptors.
     pub descriptors: usize,
-    /// Threads, without the allocator's.
+    /// Threads.
     pub threads: usize,
 }
 
