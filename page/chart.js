@@ -110,10 +110,11 @@ export class Chart {
       write(context, label, left - 6, y, "right", colors.muted, font);
     }
     const below = bottom + (this.height - bottom > 24 ? 13 : 9);
+    context.font = font;
     for (const [value, label] of this.across.marks) {
       const x = Math.round(this.x(value)) + 0.5;
       if (grid === true) line(context, x, top, x, bottom, value === 0 ? colors.line : colors.grid);
-      const half = 3.4 * label.length;
+      const half = context.measureText(label).width / 2;
       write(context, label, Math.min(this.width - half, Math.max(half, x)), below, "center", colors.muted, font);
     }
     if (across) write(context, across, (left + right) / 2, this.height - 8, "center", colors.muted, font);

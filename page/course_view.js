@@ -61,7 +61,6 @@ let at = 0; // the step that is shown
 let now = anew(); // what has happened in it; another object once its scene is set anew
 let surface;
 let dial; // { field, show } of the present step
-let border = /** @type {import("./chart.js").Row[]} */ ([]);
 let stripTime = NaN;
 
 function anew() {
@@ -78,6 +77,8 @@ function anew() {
     runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
     runsKey: "", // the settings that `runs` are about
     asked: "", // those that the chart is about
+    border: /** @type {import("./chart.js").Row[]} */ ([]),
+    borderAsked: "", // the arm and the gains besides damping that the border is about
   };
 }
 
@@ -172,7 +173,7 @@ function damped(factor) {
 
 /** The damping gains as a multiple of the usual ones. */
 function damping() {
-  return state.gains ? state.gains.kd[0] / damped(1)[0] : NaN;
+  return state.gains && state.links > 0 ? state.gains.kd[0] / damped(1)[0] : NaN;
 }
 
 // The visible parts
@@ -402,16 +403,21 @@ async function askErrors(common) {
   mine.seen.gain = mine.firstError / (values.error ?? NaN);
 }
 
-async function askMap({ params, gains }) {
+/** A row at a time, each drawn as it comes. The damping moves the dot, not the border. */
+async function askMap() {
   const mine = now;
-  const found = /** @type {import("./chart.js").Row[]} */ ([]);
-  for (let row = 0; row < ROWS; row += 1) {
+  const about = () => JSON.stringify([state.params, state.gains.kp, state.gains.ki]);
+  const key = about();
+  if (key === mine.borderAsked) return;
+  mine.borderAsked = key;
+  mine.border = [];
+  const { params, gains } = state;
+  for (let row = 0; row < ROWS && mine === now && key === about(); row += 1) {
     const factor = FACTORS.value(row / (ROWS - 1));
     const { result, values } = await stability({ params, gains: { ...gains, kd: damped(factor) }, setpoint: new Array(state.links).fill(0), integrator: "rk4", control_period: 0 });
-    if (mine !== now) return;
-    if (result) found.push({ factor, limit: values.control_period_limit ?? Infinity });
+    if (result) mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
+    surface.redraw();
   }
-  border = found;
 }
 
 async function measure() {
@@ -436,5 +442,5 @@ function strip(series) {
 function paintMap() {
   const chart = new Chart(surface.context, surface.width, surface.height, PERIODS, FACTORS, ROOMY);
   chart.frame({ across: "control period", up: "damping gains", grid: false });
-  drawMap(chart, border, period(), damping());
+  drawMap(chart, now.border, period(), damping());
 }

@@ -101,6 +101,7 @@ class Tasks(CourseTest):
     def test_less_damping_makes_the_period_stable(self):
         self.step(6)
         self.page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'")
+        self.wait(lambda: self.image("#course-chart").count(self.color("unstable")) > 500, "the map")
         self.page.fill(DIAL, "0.5")
         self.done("stable")
         self.assertRegex(self.big(), r"^5\.5 of (8\.\d|9) ms$")
