@@ -5,8 +5,7 @@
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { Pencil } from "./pencil.js";
-import { LogScale, powerOfTen } from "./scale.js";
+import { LogScale, powerOfTen, strokes } from "./scale.js";
 import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
@@ -160,13 +159,14 @@ export class Chart {
    */
   line(count, across, up, color, style = {}) {
     this.begin(color, style);
-    const pencil = new Pencil(this.context);
-    for (let i = 0; i < count; i += 1) {
-      const value = up(i);
-      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
-      else pencil.lift();
+    const height = (/** @type {number | null} */ value) => (value !== null && Number.isFinite(value) ? this.y(value) : NaN);
+    for (const stroke of strokes(count, (i) => this.x(across(i)), (i) => height(up(i)))) {
+      this.context.moveTo(stroke[0].x, stroke[0].low);
+      for (const { x, low, high } of stroke) {
+        this.context.lineTo(x, low);
+        if (high !== low) this.context.lineTo(x, high);
+      }
     }
-    pencil.lift();
     this.end();
   }
 

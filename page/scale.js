@@ -154,3 +154,28 @@ export function times(from, to) {
   for (let k = Math.max(0, Math.ceil(from / every - 1e-9)); k * every <= to; k += 1) marks.push([k * every, significant(k * every, 7)]);
   return { place: (time) => (time - from) / span, marks };
 }
+
+/**
+ * The strokes of a line through many points from left to right, with a gap where there is no number: for each column of pixels the
+ * lowest and the highest point.
+ * @param {number} count @param {(i: number) => number} across @param {(i: number) => number} up [px] @returns {{x: number, low: number, high: number}[][]}
+ */
+export function strokes(count, across, up) {
+  const found = /** @type {{x: number, low: number, high: number}[][]} */ ([]);
+  let isDown = false;
+  for (let i = 0; i < count; i += 1) {
+    const [x, y] = [across(i), up(i)];
+    if (!isDown && !Number.isNaN(y)) found.push([]);
+    isDown = !Number.isNaN(y);
+    if (!isDown) continue;
+    const stroke = found[found.length - 1];
+    const last = stroke[stroke.length - 1];
+    if (last && Math.floor(x) === Math.floor(last.x)) {
+      last.low = Math.min(last.low, y);
+      last.high = Math.max(last.high, y);
+    } else {
+      stroke.push({ x, low: y, high: y });
+    }
+  }
+  return found;
+}
