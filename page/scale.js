@@ -165,8 +165,8 @@ export function strokes(count, across, up) {
   let isDown = false;
   for (let i = 0; i < count; i += 1) {
     const [x, y] = [across(i), up(i)];
-    if (!isDown && !Number.isNaN(y)) found.push([]);
-    isDown = !Number.isNaN(y);
+    if (!isDown && Number.isFinite(y)) found.push([]);
+    isDown = Number.isFinite(y);
     if (!isDown) continue;
     const stroke = found[found.length - 1];
     const last = stroke[stroke.length - 1];

@@ -146,7 +146,7 @@ class Tasks(CourseTest):
         self.step(10)
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the scene")
         gains = self.values("/pid_controller/set_gains")
-        self.page.fill("#own-form .own-row:nth-child(5) label:nth-child(2) input", "44")
+        self.page.fill("#own-form .option:nth-child(10) input", "44")
         self.page.click("#own-form button")
         self.done("a sheet")
         limit = 1e3 * self.values("/study/stability", gains={**gains, "kd": [110, 44]}, setpoint=[0, 0], control_period=0)["control_period_limit"]
