@@ -161,10 +161,11 @@ export class Chart {
     this.begin(color, style);
     const height = (/** @type {number | null} */ value) => (value !== null && Number.isFinite(value) ? this.y(value) : NaN);
     for (const stroke of strokes(count, (i) => this.x(across(i)), (i) => height(up(i)))) {
-      this.context.moveTo(stroke[0].x, stroke[0].low);
-      for (const { x, low, high } of stroke) {
-        this.context.lineTo(x, low);
-        if (high !== low) this.context.lineTo(x, high);
+      this.context.moveTo(stroke[0].low.x, stroke[0].low.y);
+      for (const { low, high } of stroke) {
+        const [first, last] = low.x <= high.x ? [low, high] : [high, low];
+        this.context.lineTo(first.x, first.y);
+        if (last.x > first.x) this.context.lineTo(last.x, last.y);
       }
     }
     this.end();

@@ -38,7 +38,7 @@ const shortcuts = [
   ["r", "reset", resetArm],
   ["z", "undo the last change", takeBack],
   ["g", "cancel the goal", cancelGoal],
-  ["+", "plots: less time (also Ctrl and the wheel)", () => zoomPlots(1)],
+  ["+", "plots: less time", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],
 ];

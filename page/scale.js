@@ -157,11 +157,11 @@ export function times(from, to) {
 
 /**
  * The strokes of a line through many points from left to right, with a gap where there is no number: for each column of pixels the
- * lowest and the highest point.
- * @param {number} count @param {(i: number) => number} across @param {(i: number) => number} up [px] @returns {{x: number, low: number, high: number}[][]}
+ * lowest and the highest point, which may be the same one.
+ * @param {number} count @param {(i: number) => number} across @param {(i: number) => number} up [px]
  */
 export function strokes(count, across, up) {
-  const found = /** @type {{x: number, low: number, high: number}[][]} */ ([]);
+  const found = /** @type {{low: {x: number, y: number}, high: {x: number, y: number}}[][]} */ ([]);
   let isDown = false;
   for (let i = 0; i < count; i += 1) {
     const [x, y] = [across(i), up(i)];
@@ -170,12 +170,9 @@ export function strokes(count, across, up) {
     if (!isDown) continue;
     const stroke = found[found.length - 1];
     const last = stroke[stroke.length - 1];
-    if (last && Math.floor(x) === Math.floor(last.x)) {
-      last.low = Math.min(last.low, y);
-      last.high = Math.max(last.high, y);
-    } else {
-      stroke.push({ x, low: y, high: y });
-    }
+    if (!last || Math.floor(x) !== Math.floor(last.low.x)) stroke.push({ low: { x, y }, high: { x, y } });
+    else if (y < last.low.y) last.low = { x, y };
+    else if (y > last.high.y) last.high = { x, y };
   }
   return found;
 }

@@ -65,8 +65,8 @@ test("a line keeps each spike at its full height, and its gaps, with two points 
   const height = (i) => (i === 300 ? 1e6 : i > 400 && i < 500 ? NaN : i % 2);
   const found = strokes(601, (i) => i / 10, height);
   assert.deepEqual(found.map((stroke) => stroke.length), [41, 11]);
-  assert.deepEqual(found[0][30], { x: 30, low: 0, high: 1e6 });
-  assert.deepEqual([found[0][40], found[1][0]], [{ x: 40, low: 0, high: 0 }, { x: 50, low: 0, high: 1 }]);
+  assert.deepEqual(found[0][30], { low: { x: 30.2, y: 0 }, high: { x: 30, y: 1e6 } });
+  assert.deepEqual([found[0][40].high, found[1][0].low], [{ x: 40, y: 0 }, { x: 50, y: 0 }]);
 });
 
 test("settings survive a link", () => {
