@@ -7,13 +7,13 @@ import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./char
 import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, METHODS, shortName } from "./format.js";
+import { duration, METHODS, seconds, shortName } from "./format.js";
 import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { controlPeriodLimit, limitInForce, question as loopQuestion, verdict } from "./policy.js";
+import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, stability, step as stepArm } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
@@ -156,14 +156,13 @@ async function slowMotion(mine) {
   for (let k = 0; k < STEPS_SHOWN && mine === now && state.view === "course"; k += 1) {
     await new Promise((done) => setTimeout(done, LOOK_MS));
     if (mine !== now || state.view !== "course" || !state.paused || document.hidden) continue;
-    await stepArm(Math.max(1, Math.round(period() / (state.integrator?.timestep ?? 1))));
+    await stepArm(stepsPerUpdate(state));
   }
 }
 
 /** The time between two looks of the controller [s]. */
 function period() {
-  const timestep = state.integrator?.timestep ?? NaN;
-  return Math.max(1, Math.round((state.period?.period ?? 0) / timestep)) * timestep;
+  return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
 }
 
 /** The usual damping gains, times a factor. @param {number} factor */
@@ -255,9 +254,9 @@ async function runScene(scene) {
 
 /** The clock that a step is about: its slider, how long it takes now, and its limit [ms]. */
 function clock(one) {
-  if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: rounded(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
+  if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
   const inErrors = one.chart === "errors"; // there the period stays
-  const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : rounded(ms) });
+  const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : seconds(ms) });
   return { label: "timestep", unit: "ms", low: 0.1, high: inErrors ? 4 : 100, commit, value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
 }
 
@@ -277,11 +276,6 @@ function makeDial(one) {
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
   place.append(field.element);
   dial.show();
-}
-
-/** Milliseconds as seconds, without the digits that a division leaves behind. */
-function rounded(ms) {
-  return Number((ms / 1e3).toPrecision(6));
 }
 
 /** The timestep nearest to `ms` that is a whole part of the control period, so that the period stays [s]. */
