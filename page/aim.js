@@ -143,14 +143,10 @@ export function startAim(canvas) {
     if (event.pointerId === pointer) moveTo(place(event), event.shiftKey ? "setpoint" : aim.mode);
   });
   canvas.addEventListener("pointerup", (event) => {
-    if (!tap || tap.pointerId !== event.pointerId) return;
-    const still = Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX;
-    tap = null;
-    if (!still) return;
-    moveTo(place(event), modeOf(event));
-    end();
+    const isTap = tap?.pointerId === event.pointerId && Math.hypot(event.clientX - tap.clientX, event.clientY - tap.clientY) < TAP_PX;
+    if (isTap) moveTo(place(event), modeOf(event));
+    if (isTap || event.pointerId === pointer) end();
   });
-  canvas.addEventListener("pointerup", (event) => { if (event.pointerId === pointer) end(); });
   canvas.addEventListener("pointercancel", (event) => { if (event.pointerId === pointer) end(); });
   canvas.addEventListener("keydown", arrows);
 }

@@ -3,7 +3,6 @@
 // Invariant: nothing is drawn while nothing is seen to change. All that lies behind the arm is drawn ten times a second at most.
 
 import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
-import { byId } from "./dom.js";
 import { fixed, significant } from "./format.js";
 import { gravityLoad, innerReach, joints, reach } from "./mechanics.js";
 import { follow, shown } from "./history.js";
@@ -19,14 +18,11 @@ const NO_DASH = [];
 const BOTH_WAYS = [-1, 1];
 const ROOM = 1.14; // of the reach, so that circles and labels have space
 const EFFORT_RADIUS = 19; // px
-/** An arrow is as long as the way in this time [s], within bounds [px]. */
-const ARROW_SECONDS = 0.15;
-const [SHORTEST_ARROW, LONGEST_ARROW] = [4, 140];
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
 const load = new Float64Array(MOST_LINKS);
-const drawn = { position: new Float64Array(MOST_LINKS), velocity: new Float64Array(MOST_LINKS), effort: new Float64Array(MOST_LINKS) };
+const drawn = { position: new Float64Array(MOST_LINKS), effort: new Float64Array(MOST_LINKS) };
 const REST = new Float64Array(MOST_LINKS); // stretched along +x, where the gravity load is largest
 
 let surface;
@@ -37,7 +33,6 @@ let stale = true;
 let behindStale = true;
 let fullEffort = 1; // N m, all that gravity could ask for
 let scale = 100; // pixels per metre
-let arrows = false; // whether velocities are drawn
 /** Where the pointer aims, while it does: { x, y, phi, mode, refused }; see `aim.js`. */
 let aim = null;
 
@@ -49,10 +44,6 @@ export function startArmView(canvas) {
   watch("links", resized);
   watch("setpoint", () => { follow(); redraw(); });
   watch(["playback", "joint", "enabled", "diverged", "goal"], redraw);
-  byId("arrows").addEventListener("change", (event) => {
-    arrows = event.target.checked;
-    redraw();
-  });
   onFrame(drawArm);
 }
 
@@ -72,9 +63,8 @@ export function hasMoved() {
   const pixels = scale * reach(lengths());
   for (let i = 0; i < state.links; i += 1) {
     const change = Math.abs(shown.position[i] - drawn.position[i]) * pixels;
-    const arrow = arrows ? Math.abs(shown.velocity[i] - drawn.velocity[i]) * ARROW_SECONDS * pixels : 0;
     const sweep = Math.abs(shown.effort[i] - drawn.effort[i]) * (Math.PI / fullEffort) * EFFORT_RADIUS;
-    if (!(change < SEEN && arrow < SEEN && sweep < SEEN)) return true;
+    if (!(change < SEEN && sweep < SEEN)) return true;
   }
   return false;
 }
@@ -125,7 +115,8 @@ function py(metres) {
 function drawArm() {
   if (!stale && !hasMoved()) return false;
   stale = false;
-  for (const name of /** @type {const} */ (["position", "velocity", "effort"])) drawn[name].set(shown[name]);
+  drawn.position.set(shown.position);
+  drawn.effort.set(shown.effort);
   const n = state.links;
   const known = n > 0 && state.params?.lengths.length === n;
   if (behindStale) paintBehind(known ? n : 0);
@@ -226,7 +217,6 @@ function drawLinks(n) {
     circle(context, px(x[i]), py(y[i]), 8 * room, colors.panel, chosen ? colors.accent : colors.ink, chosen ? 4 : 2.5);
   }
   drawEfforts(n, room);
-  if (arrows) drawVelocities(n);
   circle(context, px(x[n]), py(y[n]), 6 * room, colors.ink, colors.panel, 2);
 }
 
@@ -260,23 +250,6 @@ function drawEfforts(n, room) {
     context.arc(px(x[i]), py(y[i]), radius, -Math.PI / 2, end, sweep > 0);
     context.stroke();
     arrowHead(context, px(x[i]) + radius * Math.cos(end), py(y[i]) + radius * Math.sin(end), end - Math.sign(sweep) * (Math.PI / 2), 8 * room);
-  }
-}
-
-/** How fast the end of each link moves. */
-function drawVelocities(n) {
-  let [vx, vy, omega] = [0, 0, 0];
-  for (let i = 0; i < n; i += 1) {
-    omega += shown.velocity[i];
-    vx -= omega * (y[i + 1] - y[i]);
-    vy += omega * (x[i + 1] - x[i]);
-    const size = ARROW_SECONDS * scale * Math.hypot(vx, vy);
-    if (!(size > SHORTEST_ARROW)) continue;
-    const part = (ARROW_SECONDS * scale * Math.min(size, LONGEST_ARROW)) / size;
-    const [fromX, fromY, dx, dy] = [px(x[i + 1]), py(y[i + 1]), part * vx, -part * vy];
-    context.fillStyle = colors.good;
-    line(context, fromX, fromY, fromX + dx, fromY + dy, colors.good, 2.5);
-    arrowHead(context, fromX + dx, fromY + dy, Math.atan2(dy, dx), 9);
   }
 }
 

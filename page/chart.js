@@ -5,8 +5,7 @@
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { Pencil } from "./pencil.js";
-import { LogScale, powerOfTen } from "./scale.js";
+import { LogScale, powerOfTen, strokes } from "./scale.js";
 import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
@@ -110,10 +109,11 @@ export class Chart {
       write(context, label, left - 6, y, "right", colors.muted, font);
     }
     const below = bottom + (this.height - bottom > 24 ? 13 : 9);
+    context.font = font;
     for (const [value, label] of this.across.marks) {
       const x = Math.round(this.x(value)) + 0.5;
       if (grid === true) line(context, x, top, x, bottom, value === 0 ? colors.line : colors.grid);
-      const half = 3.4 * label.length;
+      const half = context.measureText(label).width / 2;
       write(context, label, Math.min(this.width - half, Math.max(half, x)), below, "center", colors.muted, font);
     }
     if (across) write(context, across, (left + right) / 2, this.height - 8, "center", colors.muted, font);
@@ -159,13 +159,15 @@ export class Chart {
    */
   line(count, across, up, color, style = {}) {
     this.begin(color, style);
-    const pencil = new Pencil(this.context);
-    for (let i = 0; i < count; i += 1) {
-      const value = up(i);
-      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
-      else pencil.lift();
+    const height = (/** @type {number | null} */ value) => (value !== null && Number.isFinite(value) ? this.y(value) : NaN);
+    for (const stroke of strokes(count, (i) => this.x(across(i)), (i) => height(up(i)))) {
+      this.context.moveTo(stroke[0].low.x, stroke[0].low.y);
+      for (const { low, high } of stroke) {
+        const [first, last] = low.x <= high.x ? [low, high] : [high, low];
+        this.context.lineTo(first.x, first.y);
+        if (last.x > first.x) this.context.lineTo(last.x, last.y);
+      }
     }
-    pencil.lift();
     this.end();
   }
 

@@ -8,9 +8,9 @@ import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, fixed, METHODS, significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { describeRun, distances, divergedAt, partsAt } from "./ladder.js";
+import { describeRun, distances, endOf, partsAt } from "./ladder.js";
 import { rollout } from "./runtime.js";
-import { Axis, LogScale, times } from "./scale.js";
+import { Axis, LogScale, powerOfTen, times } from "./scale.js";
 import { MOST_LINKS, state, watch } from "./store.js";
 import { onFrame, Surface, wake } from "./surface.js";
 import { colors } from "./theme.js";
@@ -118,7 +118,7 @@ function showTable(found, away, reference, lasted) {
   const lines = found.map((run, i) => describeRun(run, away[i], lasted));
   fillTable(byId("compare-table"), ["method", ...COLUMNS.map(([, name]) => name)], lines.map((line, i) => [[line.name, `method${i + 1}`], ...COLUMNS.map(([key]) => line[key])]));
   const words = found.map((run, i) => {
-    const ended = divergedAt(run, lasted);
+    const ended = endOf(run.times, lasted, run.timestep);
     const parts = partsAt(reference.times, away[i], PARTED);
     if (ended !== null) return `${lines[i].name} diverged at t = ${fixed(ended, 2)} s`;
     return parts === null ? `${lines[i].name} stays within ${PARTED} rad` : `${lines[i].name} is ${PARTED} rad off after ${fixed(parts, 2)} s`;
@@ -193,10 +193,7 @@ function drawArms({ context, width, height }) {
 /** From the smallest error that is no rounding to the largest. */
 function errorScale() {
   const values = runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
-  const high = 10 ** Math.ceil(Math.log10(Math.max(1e-9, ...values)));
-  const scale = new LogScale(Math.max(SMALLEST, Math.min(high / 100, 10 ** Math.floor(Math.log10(Math.min(1, ...values))))), high, []);
-  scale.marks = scale.powers(6, (value) => significant(value, 1));
-  return { ...scale, place: (value) => scale.place(Math.max(value, scale.low)) };
+  return LogScale.around(values.length > 0 ? values : [SMALLEST], 6, powerOfTen);
 }
 
 /** @param {Surface} surface @param {(run: any) => number[]} timesOf @param {(run: any) => (number | null)[]} valuesOf @param {any} scale */

@@ -3,7 +3,7 @@
 
 import { byId, el, setText, warn } from "./dom.js";
 import { busy, numberField, refusal } from "./field.js";
-import { METHODS, shortName } from "./format.js";
+import { METHODS, seconds, shortName } from "./format.js";
 import { limitLabel } from "./stability_panel.js";
 import { controlPeriodLimit, limitInForce, periodText } from "./policy.js";
 import { enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, suggestGains } from "./runtime.js";
@@ -62,11 +62,6 @@ function startClocks() {
     period.mark(1e3 * controlPeriodLimit(state));
     setText(byId("period-text"), periodText(state));
   });
-}
-
-/** Of milliseconds: the nearest number of seconds, without the digits that a division leaves behind. @param {number} ms */
-function seconds(ms) {
-  return Number((ms / 1e3).toPrecision(15));
 }
 
 function startGravity() {

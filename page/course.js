@@ -5,19 +5,7 @@ import { DEFAULTS } from "./settings.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {{text: string, answers: string[], right: number, because: string}} Question */
-/**
- * Actions of the student in a step so far; a task looks at them.
- * @typedef {object} Seen
- * @property {Set<string>} methods that were in force
- * @property {boolean} reached whether a goal was reached
- * @property {boolean} shook whether the arm shook beyond the limit
- * @property {boolean} shrinks whether the bars shrink
- * @property {number} gain by what the method's error has fallen
- * @property {boolean} stable whether the loop in force is stable
- * @property {boolean} measured whether the ladder is complete
- * @property {number} scenes that were run
- * @property {boolean} sheet whether a sheet was made
- */
+/** @typedef {ReturnType<typeof nothingSeen>} Seen */
 /**
  * @typedef {object} Step
  * @property {string} id
@@ -170,9 +158,19 @@ export const STEPS = [
   },
 ];
 
-/** @returns {Seen} */
+/** Actions of the student in a step so far; a task looks at them. */
 export function nothingSeen() {
-  return { methods: new Set(), reached: false, shook: false, shrinks: false, gain: 1, stable: false, measured: false, scenes: 0, sheet: false };
+  return {
+    methods: /** @type {Set<string>} */ (new Set()), // that were in force
+    reached: false, // whether a goal was reached
+    shook: false, // whether the arm shook beyond the limit
+    shrinks: false, // whether the bars shrink
+    gain: 1, // by what the method's error has fallen
+    stable: false, // whether the loop in force is stable
+    measured: false, // whether the ladder is complete
+    scenes: 0, // that were run
+    sheet: false, // whether a sheet was made
+  };
 }
 
 /** Whether a deviation dies away: its last bars against its first ones. @param {number[]} bars */

@@ -7,13 +7,13 @@ import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./char
 import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
-import { duration, METHODS, shortName } from "./format.js";
+import { duration, METHODS, seconds, shortName } from "./format.js";
 import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { controlPeriodLimit, limitInForce, question as loopQuestion, verdict } from "./policy.js";
+import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
 import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, stability, step as stepArm } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
@@ -61,7 +61,6 @@ let at = 0; // the step that is shown
 let now = anew(); // what has happened in it; another object once its scene is set anew
 let surface;
 let dial; // { field, show } of the present step
-let border = /** @type {import("./chart.js").Row[]} */ ([]);
 let stripTime = NaN;
 
 function anew() {
@@ -78,6 +77,8 @@ function anew() {
     runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
     runsKey: "", // the settings that `runs` are about
     asked: "", // those that the chart is about
+    border: /** @type {import("./chart.js").Row[]} */ ([]),
+    borderAsked: "", // the arm and the gains besides damping that the border is about
   };
 }
 
@@ -155,14 +156,13 @@ async function slowMotion(mine) {
   for (let k = 0; k < STEPS_SHOWN && mine === now && state.view === "course"; k += 1) {
     await new Promise((done) => setTimeout(done, LOOK_MS));
     if (mine !== now || state.view !== "course" || !state.paused || document.hidden) continue;
-    await stepArm(Math.max(1, Math.round(period() / (state.integrator?.timestep ?? 1))));
+    await stepArm(stepsPerUpdate(state));
   }
 }
 
 /** The time between two looks of the controller [s]. */
 function period() {
-  const timestep = state.integrator?.timestep ?? NaN;
-  return Math.max(1, Math.round((state.period?.period ?? 0) / timestep)) * timestep;
+  return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
 }
 
 /** The usual damping gains, times a factor. @param {number} factor */
@@ -172,7 +172,7 @@ function damped(factor) {
 
 /** The damping gains as a multiple of the usual ones. */
 function damping() {
-  return state.gains ? state.gains.kd[0] / damped(1)[0] : NaN;
+  return state.gains && state.links > 0 ? state.gains.kd[0] / damped(1)[0] : NaN;
 }
 
 // The visible parts
@@ -254,9 +254,9 @@ async function runScene(scene) {
 
 /** The clock that a step is about: its slider, how long it takes now, and its limit [ms]. */
 function clock(one) {
-  if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: rounded(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
+  if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
   const inErrors = one.chart === "errors"; // there the period stays
-  const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : rounded(ms) });
+  const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : seconds(ms) });
   return { label: "timestep", unit: "ms", low: 0.1, high: inErrors ? 4 : 100, commit, value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
 }
 
@@ -276,11 +276,6 @@ function makeDial(one) {
   dial = { show: () => { field.accept(Number(value().toPrecision(6))); field.mark(one.guess && !now.ticked ? NaN : limit()); } };
   place.append(field.element);
   dial.show();
-}
-
-/** Milliseconds as seconds, without the digits that a division leaves behind. */
-function rounded(ms) {
-  return Number((ms / 1e3).toPrecision(6));
 }
 
 /** The timestep nearest to `ms` that is a whole part of the control period, so that the period stays [s]. */
@@ -402,16 +397,21 @@ async function askErrors(common) {
   mine.seen.gain = mine.firstError / (values.error ?? NaN);
 }
 
-async function askMap({ params, gains }) {
+/** A row at a time, each drawn as it comes. The damping moves the dot, not the border. */
+async function askMap() {
   const mine = now;
-  const found = /** @type {import("./chart.js").Row[]} */ ([]);
-  for (let row = 0; row < ROWS; row += 1) {
+  const about = () => JSON.stringify([state.params, state.gains.kp, state.gains.ki]);
+  const key = about();
+  if (key === mine.borderAsked) return;
+  mine.borderAsked = key;
+  mine.border = [];
+  const { params, gains } = state;
+  for (let row = 0; row < ROWS && mine === now && key === about(); row += 1) {
     const factor = FACTORS.value(row / (ROWS - 1));
     const { result, values } = await stability({ params, gains: { ...gains, kd: damped(factor) }, setpoint: new Array(state.links).fill(0), integrator: "rk4", control_period: 0 });
-    if (mine !== now) return;
-    if (result) found.push({ factor, limit: values.control_period_limit ?? Infinity });
+    if (result) mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
+    surface.redraw();
   }
-  border = found;
 }
 
 async function measure() {
@@ -436,5 +436,5 @@ function strip(series) {
 function paintMap() {
   const chart = new Chart(surface.context, surface.width, surface.height, PERIODS, FACTORS, ROOMY);
   chart.frame({ across: "control period", up: "damping gains", grid: false });
-  drawMap(chart, border, period(), damping());
+  drawMap(chart, now.border, period(), damping());
 }

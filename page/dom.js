@@ -50,6 +50,24 @@ export function setAttribute(element, name, text) {
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
 }
 
+/** A choice that outlives the page; null where there is none, or where storage is forbidden. @param {string} key @returns {string | null} */
+export function remembered(key) {
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  }
+}
+
+/** Keeps a choice; where storage is forbidden it lasts as long as the page. @param {string} key @param {string} choice */
+export function keepChoice(key, choice) {
+  try {
+    localStorage.setItem(key, choice);
+  } catch {
+    // then the page alone knows it
+  }
+}
+
 const REPEAT_MS = 3000;
 let lastText = "";
 let lastTime = -Infinity;

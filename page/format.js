@@ -47,6 +47,11 @@ export function plain(value) {
   return Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "";
 }
 
+/** Milliseconds as seconds, without the digits that a division leaves behind. @param {number} ms */
+export function seconds(ms) {
+  return Number((ms / 1e3).toPrecision(15));
+}
+
 /** A number with all its digits, for links and files; empty where it is not finite. @param {number} value */
 export function exact(value) {
   return Number.isFinite(value) ? String(value) : "";

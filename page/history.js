@@ -241,8 +241,7 @@ export function advance(seconds) {
   if (!shown.playing) return;
   const all = span();
   const next = shown.time + seconds * shown.speed;
-  if (!all) goLive();
-  else if (next >= all.to) goLive(); // caught up with the arm
+  if (!all || next >= all.to) goLive(); // nothing is left to play
   else seek(next);
 }
 

@@ -3,7 +3,7 @@
 
 import { resetArm, takeBack } from "./actions.js";
 import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
-import { announce, byId, el } from "./dom.js";
+import { announce, byId, el, keepChoice, remembered } from "./dom.js";
 import { METHODS } from "./format.js";
 import { stepBy } from "./history.js";
 import { zoomPlots } from "./plots.js";
@@ -38,7 +38,7 @@ const shortcuts = [
   ["r", "reset", resetArm],
   ["z", "undo the last change", takeBack],
   ["g", "cancel the goal", cancelGoal],
-  ["+", "plots: less time (also Ctrl and the wheel)", () => zoomPlots(1)],
+  ["+", "plots: less time", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],
 ];
@@ -68,12 +68,8 @@ export function startKeyboard() {
   byId("help-button").addEventListener("click", toggleHelp);
   byId("help-close").addEventListener("click", toggleHelp);
   const box = byId("shortcuts-on");
-  try {
-    box.checked = localStorage.getItem(SWITCH) !== "off";
-    box.addEventListener("change", () => localStorage.setItem(SWITCH, box.checked ? "on" : "off"));
-  } catch {
-    // then the choice lasts as long as the page
-  }
+  box.checked = remembered(SWITCH) !== "off";
+  box.addEventListener("change", () => keepChoice(SWITCH, box.checked ? "on" : "off"));
   document.addEventListener("keydown", pressed);
 }
 

@@ -100,16 +100,6 @@ export function cheapest(rungs, wanted) {
  * @property {number} wall_time
  */
 
-/** When the run diverged [s]; null if it lasted. @param {Run} run @param {number} seconds */
-export function divergedAt(run, seconds) {
-  return endOf(run.times, seconds, run.timestep);
-}
-
-/** Energy at the end less that at the start [J]; null where the run did not last. @param {Run} run @param {number} seconds */
-export function energyGained(run, seconds) {
-  return divergedAt(run, seconds) === null ? Number(run.energy.at(-1)) - Number(run.energy[0]) : null;
-}
-
 /**
  * The largest difference of a joint from the reference, at each of the instants that both are sampled at [rad]; null where one has ended.
  * @param {Run} run @param {Run} reference @returns {(number | null)[]}
@@ -124,13 +114,13 @@ export function distances(run, reference) {
 
 /** A line of the table. @param {Run} run @param {(number | null)[]} away @param {number} seconds */
 export function describeRun(run, away, seconds) {
-  const ended = divergedAt(run, seconds);
-  const gained = energyGained(run, seconds);
+  const ended = endOf(run.times, seconds, run.timestep);
+  const gained = Number(run.energy.at(-1)) - Number(run.energy[0]);
   const known = /** @type {number[]} */ (away.filter((one) => one !== null));
   return {
     name: shortName(run.method),
     outcome: ended === null ? "lasts" : `diverged at t = ${fixed(ended, 2)} s`,
-    energy: gained === null ? "–" : `${significant(gained, 3)} J`,
+    energy: ended !== null ? "–" : `${significant(gained, 3)} J`,
     error: ended !== null || known.length === 0 ? "–" : `${significant(Math.max(...known), 3)} rad`,
     evaluations: significant(run.evaluations, 6),
     time: duration(run.wall_time),

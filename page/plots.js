@@ -42,11 +42,6 @@ export function startPlots() {
   for (const { chart, surface: { canvas } } of plots.slice(0, 4)) {
     canvas.addEventListener("pointermove", (event) => hover(chart.timeAt(event.offsetX)));
     canvas.addEventListener("pointerleave", () => hover(NaN));
-    canvas.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey) return; // without it the wheel scrolls
-      event.preventDefault();
-      zoomPlots(event.deltaY < 0 ? 1 : -1);
-    }, { passive: false });
   }
   watch("cursor", () => { redraw(); showValues(); });
   watch("playback", () => { if (pose.playing) return; redraw(); showValues(); });

@@ -123,7 +123,7 @@ export function controlPeriodLimit(/** @type {any} */ state) {
 }
 
 /** Timesteps from one control update to the next, as the runtime counts them: at least 1. */
-function stepsPerUpdate(/** @type {any} */ { period, integrator }) {
+export function stepsPerUpdate(/** @type {any} */ { period, integrator }) {
   return Math.max(1, Math.round((period?.period ?? 0) / integrator.timestep));
 }
 

@@ -2,7 +2,7 @@
 // Invariant: the sheet asks the study about the form's arm; the live arm stays as it is.
 
 import { byId, el } from "./dom.js";
-import { option, refusal } from "./field.js";
+import { option, panel } from "./field.js";
 import { METHODS, significant } from "./format.js";
 import { cause, limitText, others } from "./policy.js";
 import { MOVE_TO } from "./ladder.js";
@@ -27,13 +27,10 @@ export function showForm(place, whenMade) {
   const known = /** @type {any} */ ({ ...DEFAULTS[state.links].params, ...DEFAULTS[state.links].gains, ...state.params, ...state.gains });
   gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
   fields = Object.fromEntries(LISTS.map(([key, name]) => [key, known[key].map((/** @type {number} */ value, /** @type {number} */ i) => option({ label: `${name} ${i + 1}`, value }))]));
-  const go = el("button", { type: "submit", class: "primary" }, "Make my sheet");
-  said = refusal(go);
-  place.replaceChildren(el("form", { id: "own-form", novalidate: true, onsubmit: async (/** @type {Event} */ event) => {
-    event.preventDefault();
-    if (await make()) whenMade();
-  } }, ...LISTS.map(([key]) => el("div", { class: "own-row" }, ...fields[key].map((one) => one.element))),
-  el("div", { class: "own-row" }, gravity.element, go), said.element), el("div", { id: "sheet", role: "region", "aria-label": "The sheet of your arm", hidden: true }));
+  const form = el("div", { id: "own-form" });
+  const go = async () => { if (await make()) whenMade(); };
+  said = panel(form, [...Object.values(fields).flat(), gravity], [["Make my sheet", go, { type: "submit", class: "primary" }]]);
+  place.replaceChildren(form, el("div", { id: "sheet", role: "region", "aria-label": "The sheet of your arm", hidden: true }));
 }
 
 async function make() {

@@ -1,7 +1,7 @@
 // Light and dark, and the colours that the canvases take from the style sheet.
 // Invariant: colours are spelled in `style.css` only.
 
-import { byId } from "./dom.js";
+import { byId, keepChoice, remembered } from "./dom.js";
 
 const KEY = "pendularm-theme";
 const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "method1", "method2", "method3", "method4"];
@@ -27,14 +27,6 @@ function read() {
   for (const react of listeners) react();
 }
 
-function stored() {
-  try {
-    return localStorage.getItem(KEY);
-  } catch {
-    return null; // storage may be forbidden
-  }
-}
-
 function apply(choice) {
   if (choice) document.documentElement.dataset.theme = choice;
   else delete document.documentElement.dataset.theme;
@@ -42,16 +34,12 @@ function apply(choice) {
 }
 
 export function startTheme() {
-  apply(stored());
+  apply(remembered(KEY));
   dark.addEventListener("change", read);
   byId("theme").addEventListener("click", () => {
     const isDark = (document.documentElement.dataset.theme ?? (dark.matches ? "dark" : "light")) === "dark";
     const choice = isDark ? "light" : "dark";
-    try {
-      localStorage.setItem(KEY, choice);
-    } catch {
-      // then the choice lasts as long as the page
-    }
+    keepChoice(KEY, choice);
     apply(choice);
   });
 }

@@ -225,17 +225,22 @@ class Page:
         self.mouse("mousePressed", x, y)
         self.mouse("mouseReleased", x, y)
 
-    def place(self, selector):
-        """The middle of the element, once it has come to rest."""
+    def box(self, selector):
+        """Left, top, width and height of the element in the window [CSS pixels], in its middle and once it has come to rest."""
         before = None
         for _ in range(50):
             box = self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}});"
-                           " const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
+                           " const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
             if box == before:
-                return box[0], box[1]
+                return box
             before = box
             time.sleep(0.05)
         raise AssertionError(f"{selector} does not come to rest")
+
+    def place(self, selector):
+        """The middle of the element."""
+        left, top, width, height = self.box(selector)
+        return left + width / 2, top + height / 2
 
     def mouse(self, kind, x, y, shift=False):
         held = kind != "mouseReleased"

@@ -52,22 +52,21 @@ class Runtime:
         return f"http://127.0.0.1:{self.port}/"
 
     def call(self, service, **args):
-        """The response to a call over raw TCP."""
-        with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as tcp, tcp.makefile("rw") as lines:
-            lines.write(json.dumps({"op": "call_service", "service": service, "args": args}) + "\n")
-            lines.flush()
-            while (frame := json.loads(lines.readline()))["op"] != "service_response":
-                pass
-            return frame
+        """The response to a call."""
+        return self.ask({"op": "call_service", "service": service, "args": args}, "service_response")
 
     def next(self, topic):
         """The next message on a topic."""
+        return self.ask({"op": "subscribe", "topic": topic}, "publish")["msg"]
+
+    def ask(self, frame, wanted):
+        """Sends a frame over raw TCP, and gives the first one with the wanted `op` that comes."""
         with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as tcp, tcp.makefile("rw") as lines:
-            lines.write(json.dumps({"op": "subscribe", "topic": topic}) + "\n")
+            lines.write(json.dumps(frame) + "\n")
             lines.flush()
-            while (frame := json.loads(lines.readline()))["op"] != "publish":
+            while (answer := json.loads(lines.readline()))["op"] != wanted:
                 pass
-            return frame["msg"]
+            return answer
 
     def joints(self):
         """Where each link ends [m], from the published state and the lengths: the base first, the end effector last."""

@@ -53,14 +53,19 @@ class PageTest(unittest.TestCase):
         self.addCleanup(self.runtime.__exit__)
         self.page = self.open(**self.view)
 
+    def visit(self, url, **view):
+        """A page at any address."""
+        page = browser().page(url, **view)
+        self.addCleanup(page.close)
+        return page
+
     def open(self, fragment="", **view):
         if IS_FILE and not self.course:
             # Its course would begin at once.
             fragment = fragment or "#workbench"
-        page = browser().page(self.runtime.url + fragment, **view)
+        page = self.visit(self.runtime.url + fragment, **view)
         if IS_FILE:
             self.runtime.page = page
-        self.addCleanup(page.close)
         self.addCleanup(lambda: self.assertEqual(page.complaints, []))
         self.addCleanup(lambda: page.screenshot(ARTEFACTS / f"{self.id()}.png"))
         self.connected(page)
@@ -98,16 +103,9 @@ class PageTest(unittest.TestCase):
 
     def image(self, selector):
         """A picture of the element as it is now."""
-        look = (f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
-                " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")
-        box = self.page.run(look)
-        for _ in range(50):
-            picture, before = self.page.screenshot(clip=[round(one) for one in box]), box
-            box = self.page.run(look)
-            # An element that came above it meanwhile has moved it out of the picture.
-            if box == before:
-                return self.page.decode(picture)
-        self.fail(f"{selector} does not come to rest")
+        left, top, width, height = self.page.box(selector)
+        x, y = self.page.run("[scrollX, scrollY]")
+        return self.page.decode(self.page.screenshot(clip=[round(one) for one in (left + x, top + y, width, height)]))
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""
@@ -143,8 +141,6 @@ class PageTest(unittest.TestCase):
     def on_canvas(self, place):
         """Where a place in metres is on the page, in CSS pixels; the same sums as the page's, written again."""
         lengths = self.runtime.call("/arm_sim/set_params")["values"]["lengths"]
-        self.page.run("document.querySelector('#arm').scrollIntoView({block: 'center'})")
-        left, top, width, height = self.page.run(
-            "(() => { const b = document.querySelector('#arm').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        left, top, width, height = self.page.box("#arm")
         scale = min(width, height) / (2 * 1.14 * sum(lengths))
         return left + width / 2 + scale * place[0], top + height / 2 - scale * place[1]

@@ -6,7 +6,7 @@ import pathlib
 import unittest
 
 from alone import FILE
-from stage import IS_FILE, PageTest, browser
+from stage import IS_FILE, PageTest
 
 # The texts of the page, told to the page around it.
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
@@ -31,8 +31,7 @@ class AloneTest(PageTest):
         self.assertEqual(ours, native)
 
     def test_it_runs_in_a_sandboxed_frame_and_its_course_goes_on_there(self):
-        page = browser().page("about:blank")
-        self.addCleanup(page.close)
+        page = self.visit("about:blank")
         step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);</script>"""
         page.run("addEventListener('message', ({ data }) => { window.heard = data; })")
         page.run("""((text) => { const frame = document.createElement("iframe"); frame.sandbox = "allow-scripts"; frame.width = 1200;
@@ -41,8 +40,7 @@ class AloneTest(PageTest):
         self.assertEqual(page.complaints, [])
 
     def test_without_a_worker_the_page_itself_runs_the_arm(self):
-        page = browser().page("about:blank")
-        self.addCleanup(page.close)
+        page = self.visit("about:blank")
         page.send("Page.addScriptToEvaluateOnNewDocument", {"source": "window.Worker = class { constructor() { throw new Error('forbidden'); } };"})
         page.go(self.runtime.url)
         page.until(SHOWN, why="the arm runs")
@@ -57,8 +55,7 @@ class AloneTest(PageTest):
         self.assertTrue(all(1e-7 < one < 1e-4 for one in times), times)
 
     def test_an_address_and_a_list_choose_the_number_of_links(self):
-        page = browser().page(f"{FILE.as_uri()}#step=2&links=3")
-        self.addCleanup(page.close)
+        page = self.visit(f"{FILE.as_uri()}#step=2&links=3")
         page.until(SHOWN, why="the arm runs")
         self.runtime.page = page
         self.assertEqual(len(self.runtime.next("/joint_states")["position"]), 3)

@@ -1,7 +1,7 @@
 """The connection: it comes back by itself, and a token that it needs does not stay in the address."""
 
 from runtime import Runtime
-from stage import PageTest, browser, needs_server
+from stage import PageTest, needs_server
 
 
 @needs_server("no server, no connection that others could have or lose")
@@ -54,12 +54,6 @@ class Reconnecting(PageTest):
         self.connected()
         self.page.until(f"{refused}.length === 0")
 
-    def test_it_takes_another_number_of_links(self):
-        self.page.expect_network_errors = True
-        self.runtime.restart(links=3)
-        self.connected(links=3)
-        self.page.until("document.querySelectorAll('#masses-fields .field').length === 3")
-
 
 @needs_server("no server, no connection that others could have or lose")
 class Token(PageTest):
@@ -81,8 +75,3 @@ class Token(PageTest):
         page.run("window.old = 1; location.reload()")
         page.until("window.old === undefined", why="the page anew")
         self.connected()
-
-    def test_a_page_opened_without_it_is_turned_away(self):
-        page = browser().page(self.runtime.url)
-        self.addCleanup(page.close)
-        self.assertEqual(page.run("document.querySelector('#arm')"), None)

@@ -101,6 +101,7 @@ class Tasks(CourseTest):
     def test_less_damping_makes_the_period_stable(self):
         self.step(6)
         self.page.until("document.querySelector('#course-figure').textContent === '5.5 of 4.3 ms'")
+        self.wait(lambda: self.image("#course-chart").count(self.color("unstable")) > 500, "the map")
         self.page.fill(DIAL, "0.5")
         self.done("stable")
         self.assertRegex(self.big(), r"^5\.5 of (8\.\d|9) ms$")
@@ -145,7 +146,7 @@ class Tasks(CourseTest):
         self.step(10)
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the scene")
         gains = self.values("/pid_controller/set_gains")
-        self.page.fill("#own-form .own-row:nth-child(5) label:nth-child(2) input", "44")
+        self.page.fill("#own-form .option:nth-child(10) input", "44")
         self.page.click("#own-form button")
         self.done("a sheet")
         limit = 1e3 * self.values("/study/stability", gains={**gains, "kd": [110, 44]}, setpoint=[0, 0], control_period=0)["control_period_limit"]

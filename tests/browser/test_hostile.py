@@ -10,7 +10,7 @@ import threading
 import time
 
 from runtime import Runtime
-from stage import FOREIGN, PageTest, browser, needs_server
+from stage import FOREIGN, PageTest, needs_server
 
 FRAME = '{"op":"call_service","service":"/arm_sim/set_params","args":{"gravity":0}}'
 
@@ -80,12 +80,10 @@ class Hostile(PageTest):
         self.runtime = Runtime("--report", self.report.name)
         self.addCleanup(self.runtime.__exit__)
 
-    def visit(self, html="", host=FOREIGN):
+    def foreign(self, html="", host=FOREIGN):
         port, stop = serve(html.replace("TARGET", f"127.0.0.1:{self.runtime.port}"))
         self.addCleanup(stop)
-        page = browser().page(f"http://{host}:{port}/")
-        self.addCleanup(page.close)
-        return page
+        return self.visit(f"http://{host}:{port}/")
 
     def tried(self, page, host=None):
         return page.run(f"{TRIES}('{host or f'127.0.0.1:{self.runtime.port}'}')")
@@ -99,17 +97,17 @@ class Hostile(PageTest):
     def test_a_foreign_page_can_neither_open_a_websocket_nor_send_a_command_nor_load_anything(self):
         self.write("figure.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
         self.write("index.html", "report")
-        told = self.tried(self.visit())
+        told = self.tried(self.foreign())
         self.assertEqual((told["socket"], told["read"], set(told["methods"].values()), set(told["loads"].values())), ("closed", "failed", {"failed"}, {"failed"}), told)
         self.unmoved()
 
     def test_these_tests_can_fail_a_page_of_this_machine_is_let_in(self):
-        self.assertEqual(self.tried(self.visit(host="127.0.0.1"))["socket"], "open")
+        self.assertEqual(self.tried(self.foreign(host="127.0.0.1"))["socket"], "open")
         self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 0, "a loopback origin may")
 
     def test_a_foreign_page_cannot_frame_the_page_to_have_it_clicked(self):
         for host in (FOREIGN, "127.0.0.1"):
-            page = self.visit('<iframe src="http://TARGET/"></iframe><iframe src="http://TARGET/report/"></iframe>', host)
+            page = self.foreign('<iframe src="http://TARGET/"></iframe><iframe src="http://TARGET/report/"></iframe>', host)
             refused = lambda: sum("frame-ancestors" in one and "blocked" in one for one in page.complaints)
             self.wait(lambda: refused() == 2, f"two refusals, got {page.complaints}")
 
@@ -122,16 +120,14 @@ class Hostile(PageTest):
         self.addCleanup(self.runtime.__exit__)
         _, stop = serve(f'<iframe src="{self.runtime.url}"></iframe>', port)
         self.addCleanup(stop)
-        page = browser().page(f"{site}/")
-        self.addCleanup(page.close)
+        page = self.visit(f"{site}/")
         heard = lambda: self.runtime.call("/rosapi/subscribers", topic="/joint_states")["values"]["subscribers"]
         self.wait(heard, f"the framed page hears the arm, got {page.complaints}")
 
     def test_a_page_whose_name_was_pointed_here_can_ask_for_nothing_by_any_method(self):
         """The page is of the runtime's own origin, as far as the browser knows."""
         port, stop = serve("x")
-        page = browser().page(f"http://{FOREIGN}:{port}/")
-        self.addCleanup(page.close)
+        page = self.visit(f"http://{FOREIGN}:{port}/")
         stop()
         self.runtime.stop()
         self.runtime.port = port
@@ -148,8 +144,7 @@ class Hostile(PageTest):
         self.write("index.html", page_text)
         self.write("figure.svg", f"<svg xmlns='http://www.w3.org/2000/svg'><title>still</title><script>{script}</script></svg>")
         for name in ("index.html", "figure.svg"):
-            page = browser().page(f"{self.runtime.url}report/{name}")
-            self.addCleanup(page.close)
+            page = self.visit(f"{self.runtime.url}report/{name}")
             self.wait(lambda: page.complaints, "the browser tells what it did not run")
             # A moment is left for what would run later.
             time.sleep(0.3)
@@ -189,7 +184,6 @@ class Cookie(PageTest):
         page = self.open(f"?token={self.token}")
         self.assertEqual(page.run("document.cookie"), "")
         self.assertEqual(self.socket(page), "open")
-        other = browser().page(self.foreign)
-        self.addCleanup(other.close)
+        other = self.visit(self.foreign)
         self.assertEqual(self.socket(other), "closed", "the browser has the cookie, and the origin is allowed")
         self.assertEqual(self.socket(other, f"?token={self.token}"), "open", "so it was the cookie that was missing")

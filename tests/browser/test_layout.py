@@ -98,13 +98,6 @@ class Desktop(Access, Steady, PageTest):
             return found; })""")
         self.assertEqual(clips, [])
 
-    def test_a_notice_does_not_cover_the_arm(self):
-        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
-        self.page.click("#controller")
-        self.page.until("!document.querySelector('#notice').hidden")
-        notice, arm = self.box("#notice"), self.box("#arm")
-        self.assertGreaterEqual(notice[1], arm[3])
-
 
 class DesktopDark(Access, PageTest):
     view = {"dark": True}

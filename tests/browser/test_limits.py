@@ -16,7 +16,7 @@ class BlowUp(PageTest):
 
     def click_map(self, timestep, factor):
         """A click at a timestep between 0.1 ms and 100 ms, and at a multiple of the gains between 1/16 and 16."""
-        left, top, width, height = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        left, top, width, height = self.page.box("#map")
         place = left + 46 + (width - 56) * math.log10(timestep / 1e-4) / 3, top + height - 32 - (height - 40) * (0.5 + math.log(factor, 256))
         self.page.mouse("mousePressed", *place)
         self.page.mouse("mouseReleased", *place)

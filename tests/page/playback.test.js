@@ -3,8 +3,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { advance, follow, goLive, play, seek, shown, span, stepBy } from "../../page/history.js";
-import { record, take } from "../../page/history.js";
+import { advance, follow, goLive, play, record, seek, shown, span, stepBy, take } from "../../page/history.js";
 import { state } from "../../page/store.js";
 
 /** A joint that moves as t³, sampled ten times a second through two seconds. */
