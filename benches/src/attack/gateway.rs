@@ -72,7 +72,9 @@ pub const ATTACKS: &[Attack] = &[
             let returns = asks.clone().returns().times(20);
             [asks.deaf().times(200), returns].concat()
         },
-    ),
+    )
+    // Each holds its place for 15 s after it has stopped.
+    .fills(),
     Attack::new(
         "byte-per-second",
         "200 clients send a frame at a byte a second",

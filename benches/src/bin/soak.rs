@@ -23,14 +23,14 @@ const AT_ONCE: usize = 200;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How long the program has to let go: half-open clients get their answers for up to 15 s, and computations go on.
 const LET_GO: Duration = Duration::from_secs(60);
-/// How long the ebb lasts before memory is read: the allocator gives memory back over ten seconds.
+/// How long the ebb lasts before memory is read.
 const QUIET: Duration = Duration::from_secs(13);
 /// Descriptors that the first subscriber has the program open for good, to ask Linux how much a client has not read.
 const OPENED_ONCE: usize = 1;
 /// Bound of the memory at any time, as in `make attack` \[MB\].
 const PEAK: f64 = 700.0;
-/// Growth of the memory from the ebb after the first third to the last \[MB\]. Before that the allocator's tables grow to the size of the
-/// busiest moment.
+/// Growth of the memory from the ebb after the first third to the last \[MB\]. Before that the heap grows to the size of the busiest
+/// moment.
 const GROWTH: f64 = 8.0;
 
 fn main() -> ExitCode {
