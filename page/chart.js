@@ -5,7 +5,8 @@
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
-import { LogScale, powerOfTen, strokes } from "./scale.js";
+import { Pencil } from "./pencil.js";
+import { LogScale, powerOfTen } from "./scale.js";
 import { colors } from "./theme.js";
 
 /** @typedef {import("./scale.js").Scale} Scale */
@@ -159,15 +160,13 @@ export class Chart {
    */
   line(count, across, up, color, style = {}) {
     this.begin(color, style);
-    const height = (/** @type {number | null} */ value) => (value !== null && Number.isFinite(value) ? this.y(value) : NaN);
-    for (const stroke of strokes(count, (i) => this.x(across(i)), (i) => height(up(i)))) {
-      this.context.moveTo(stroke[0].low.x, stroke[0].low.y);
-      for (const { low, high } of stroke) {
-        const [first, last] = low.x <= high.x ? [low, high] : [high, low];
-        this.context.lineTo(first.x, first.y);
-        if (last.x > first.x) this.context.lineTo(last.x, last.y);
-      }
+    const pencil = new Pencil(this.context);
+    for (let i = 0; i < count; i += 1) {
+      const value = up(i);
+      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
+      else pencil.lift();
     }
+    pencil.lift();
     this.end();
   }
 

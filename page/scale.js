@@ -154,25 +154,3 @@ export function times(from, to) {
   for (let k = Math.max(0, Math.ceil(from / every - 1e-9)); k * every <= to; k += 1) marks.push([k * every, significant(k * every, 7)]);
   return { place: (time) => (time - from) / span, marks };
 }
-
-/**
- * The strokes of a line through many points from left to right, with a gap where there is no number: for each column of pixels the
- * lowest and the highest point, which may be the same one.
- * @param {number} count @param {(i: number) => number} across @param {(i: number) => number} up [px]
- */
-export function strokes(count, across, up) {
-  const found = /** @type {{low: {x: number, y: number}, high: {x: number, y: number}}[][]} */ ([]);
-  let isDown = false;
-  for (let i = 0; i < count; i += 1) {
-    const [x, y] = [across(i), up(i)];
-    if (!isDown && Number.isFinite(y)) found.push([]);
-    isDown = Number.isFinite(y);
-    if (!isDown) continue;
-    const stroke = found[found.length - 1];
-    const last = stroke[stroke.length - 1];
-    if (!last || Math.floor(x) !== Math.floor(last.low.x)) stroke.push({ low: { x, y }, high: { x, y } });
-    else if (y < last.low.y) last.low = { x, y };
-    else if (y > last.high.y) last.high = { x, y };
-  }
-  return found;
-}

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { duration, exact, fixed, plain, short, significant } from "../../page/format.js";
-import { Axis, strokes, symmetricLog } from "../../page/scale.js";
+import { Axis, symmetricLog } from "../../page/scale.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
 
 test("a field shows four digits, and its exponent whole", () => {
@@ -59,14 +59,6 @@ test("a fixed scale stays", () => {
 test("the symmetric logarithm is odd and near zero the identity over ln 10", () => {
   assert.equal(symmetricLog(-9), -1);
   assert.ok(Math.abs(symmetricLog(1e-6) - 1e-6 / Math.LN10) < 1e-12);
-});
-
-test("a line keeps each spike at its full height, and its gaps, with two points in a column of pixels at most", () => {
-  const height = (i) => (i === 300 ? 1e6 : i > 400 && i < 500 ? NaN : i % 2);
-  const found = strokes(601, (i) => i / 10, height);
-  assert.deepEqual(found.map((stroke) => stroke.length), [41, 11]);
-  assert.deepEqual(found[0][30], { low: { x: 30.2, y: 0 }, high: { x: 30, y: 1e6 } });
-  assert.deepEqual([found[0][40].high, found[1][0].low], [{ x: 40, y: 0 }, { x: 50, y: 0 }]);
 });
 
 test("settings survive a link", () => {
