@@ -66,11 +66,8 @@ fn same(found: &Json, msg: &Value) -> bool {
         (Json::Number(_), Value::Number(number)) => found.number() == number.as_f64(),
         (Json::Text(found), Value::String(text)) => found.as_deref() == Some(text),
         (Json::Array(found), Value::Array(entries)) => {
-            found.len() == entries.len()
-                && found
-                    .iter()
-                    .zip(entries)
-                    .all(|(one, other)| same(one, other))
+            let mut pairs = found.iter().zip(entries);
+            found.len() == entries.len() && pairs.all(|(one, other)| same(one, other))
         }
         (Json::Object(found), Value::Object(members)) => {
             let has = |(name, value)| {
@@ -91,9 +88,6 @@ fn check_cdr(name: &str, tree: &MessageTree<'_>, length: usize) {
     let Some(Json::Array(bytes)) = bytes else {
         panic!("no bytes in {found:?}");
     };
-    assert!(
-        bytes.len() <= GROWTH * (length + 1),
-        "{} bytes of {length}",
-        bytes.len()
-    );
+    let longest = GROWTH * (length + 1);
+    assert!(bytes.len() <= longest, "{length} bytes made more");
 }
