@@ -1,4 +1,4 @@
-//! JSON as serde_json reads it, with all that its own values leave out: numbers keep their text, and an object keeps
+//! JSON as `serde_json` reads it, with all that its own values leave out: numbers keep their text, and an object keeps
 //! every member in its place. A string that holds half a surrogate pair is a string without a text.
 
 use std::fmt;
