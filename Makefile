@@ -1,4 +1,4 @@
-# Every target says what it does and stops at the first failure. Needed: a Rust toolchain; bash and tar for packaging.
+# Every target says what it does and stops at the first failure. Needed: a Rust toolchain with its linker; bash and tar for packaging.
 
 CARGO ?= cargo
 TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
