@@ -29,7 +29,7 @@ impl Workload<'_> {
                     "{{\"q0\":{q},\"duration\":{duration},\"timestep\":{timestep},\"integrator\":\"{name}\",\"params\":{params},\"samples\":{samples}}}"
                 );
                 // A sample a step at most, and the start.
-                let steps = (duration / timestep) as usize;
+                let steps = (duration / timestep).round() as usize;
                 let expect = Expect::Computed {
                     entries: samples.min(steps + 1),
                     is_short: false,
