@@ -6,6 +6,7 @@ use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveRun, LiveScene, live_scenes};
 use crate::report::section::{Cell, Section, Table, lines};
 use crate::report::svg::{HEIGHT, Key, Panel, PlotNumber, WIDTH, escape, number, plain, seconds};
+use crate::study::matrix::largest;
 
 pub(super) fn make(section: &mut Section) {
     let all = scenarios::all();
@@ -104,7 +105,8 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
     let (drawn, rows) = match live.watch() {
         Ok(watched) => {
             let link = escape(&live.fragment());
-            let largest = largest(&watched);
+            let angles = watched.samples.iter().flat_map(|(_, angles)| angles);
+            let largest = largest(angles.map(|angle| angle.abs()));
             let scale = format!("{}, ±{} rad", seconds(live.seconds()), number(largest));
             let drawn = format!(
                 "<a href=\"{PAGE}{link}\">{heading}</a>{}<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{scale}\
@@ -143,12 +145,6 @@ fn rows(name: &str, watched: &LiveRun) -> Vec<PlotNumber> {
         angles.map(row).collect::<Vec<_>>()
     };
     samples.flat_map(row).collect()
-}
-
-/// The largest angle from the start \[rad\].
-fn largest(watched: &LiveRun) -> f64 {
-    let all = watched.samples.iter().flat_map(|(_, angles)| angles);
-    all.fold(0.0, |largest, angle| largest.max(angle.abs()))
 }
 
 fn curves(watched: &LiveRun, largest: f64) -> String {

@@ -350,3 +350,15 @@ where
         })
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::LEFT_OUT;
+
+    #[test]
+    fn every_line_of_what_is_left_out_has_five_columns() {
+        for line in LEFT_OUT.lines() {
+            assert_eq!(line.split('|').count(), 5, "{line}");
+        }
+    }
+}
