@@ -1,6 +1,6 @@
 // One chart: a frame with two scales, their marks and titles; in it lines, areas, dots. The strokes that other pictures use; and
 // charts of what they are given: a map of limits, bars of a deviation, two errors, the arm of a scene.
-// Invariant: it draws on whatever context it is given, on the screen or of a picture to be saved. Axes are fixed where a student compares one setting
+// Invariant: it draws on any context, of the screen or of a picture to be saved. Axes are fixed where a student compares one setting
 // with the next.
 
 import { significant } from "./format.js";

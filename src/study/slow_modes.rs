@@ -53,8 +53,8 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
     slow.any(|mode| mode.re > GROWTH * mode.modulus())
 }
 
-/// The modes, to their own last digits, of those that converge. They are looked for from the moduli that the `guesses`
-/// have, of which rounding at the fastest `rate` \[1/s\] may have left nothing more, each at an angle of its own.
+/// The modes that converge, each to its own last digits. The search begins at the moduli of the `guesses`, each at an
+/// angle of its own: rounding at the fastest `rate` \[1/s\] may have left no other digit of a guess.
 fn settled(linear: &Linear, guesses: &[Complex], rate: f64) -> Vec<Complex> {
     let count = length_in_f64(guesses.len());
     let mut angle = 0.7;

@@ -20,7 +20,7 @@ pub enum Expect {
     Refusal,
     /// Success, with values that have this member.
     Member(&'static str),
-    /// A computation with so many entries in each column; a short one takes a few turns.
+    /// A computation, with the number of entries in each column. A short one takes a few turns.
     Computed { entries: usize, is_short: bool },
     /// The answer of another client, or a failure that has its reason: the number of the call.
     Forwarded(u64),

@@ -15,7 +15,7 @@ use crate::planner::{falling, plan};
 const README: &str = include_str!("../../README.md");
 const STUDY: &str = include_str!("../../docs/study.md");
 
-/// The number after `before` in a paper is `seen` rounded to so many digits.
+/// The number after `before` in a paper is `seen` rounded to `digits` digits.
 fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
     let said = printed(paper, before);
     let last = 10_f64.powi(seen.abs().log10().floor() as i32 + 1 - digits);

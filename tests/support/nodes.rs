@@ -71,7 +71,7 @@ where
     }
 }
 
-/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to; returns the last two.
+/// The nodes `ik`, `ik_action` and `ik_trial`, around the arm of these recipients. Returns the last two.
 pub fn start_goal_nodes<const N: usize>(
     registry: &Addr<Registry>,
     pose: Recipient<ArmPose<N>>,

@@ -43,7 +43,7 @@ fn who_works_for_one_client_gives_way_to_the_arm_and_the_gateway() {
     }
 }
 
-/// Whether those that work for one client are five steps behind the others, which are equal.
+/// Whether the threads that work for one client are five steps behind the others, which are equal.
 fn is_as_it_must_be(niceness: &BTreeMap<String, i32>) -> bool {
     let for_all = niceness["pendularm"];
     let (for_one, others): (Vec<_>, Vec<_>) = niceness

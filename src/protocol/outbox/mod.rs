@@ -57,7 +57,7 @@ fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
 pub struct Outbox {
     /// Topic messages in order.
     topics: VecDeque<QueuedMessage>,
-    /// So many of the first are too old. Each of them is the newest of its topic.
+    /// Number of messages at the front that are too old. Each is the newest of its topic.
     kept_old: usize,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,

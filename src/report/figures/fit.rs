@@ -5,7 +5,7 @@
 use crate::math::count::length_in_f64;
 use crate::study::fewest::StepSearch;
 
-/// The run of the fewest steps that is good enough, of those that a search makes.
+/// The run with the fewest steps among the runs of a search that are good enough.
 pub(super) fn fewest<R: Copy>(
     mut search: StepSearch,
     run: impl Fn(u64) -> R,

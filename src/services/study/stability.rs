@@ -1,6 +1,6 @@
 //! `/study/stability`: the largest stable timesteps of a control loop.
 //!
-//! The gains are those that are set, whether the controller is on or off. The question is its largest stable timestep.
+//! The present gains count, whether the controller is on or off. The question is its largest stable timestep.
 //! Gains that are all zero ask about the arm left to itself. The motion is the one that is ahead of the arm as it is
 //! now.
 //!
