@@ -291,7 +291,7 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
 /// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
 const LETTER: f64 = 10.4;
 
-/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word has its own line.
+/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word stands alone.
 pub(super) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in heading.split_whitespace() {
