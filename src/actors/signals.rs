@@ -69,16 +69,18 @@ fn runtime() -> io::Result<Runtime> {
     Builder::new_current_thread().enable_all().build()
 }
 
+/// The fatal signals that the program was not started with ignored.
+#[cfg(unix)]
+fn further() -> impl Iterator<Item = (&'static str, Signal)> {
+    let ignored = ignored_at_start();
+    let is_heard = move |one: Signal| ignored & (1 << (one.as_raw() - 1)) == 0;
+    FATAL.iter().copied().filter(move |(_, one)| is_heard(*one))
+}
+
 /// The signals of this process, from now on. It needs a runtime of Tokio's.
 #[cfg(unix)]
 fn arrivals() -> io::Result<Vec<Arrivals>> {
-    let ignored = ignored_at_start();
-    let is_heard = |number: i32| ignored & (1 << (number - 1)) == 0;
-    let further = FATAL
-        .iter()
-        .filter(|(_, one)| is_heard(one.as_raw()))
-        .copied();
-    let all = REQUESTS.into_iter().chain(further);
+    let all = REQUESTS.into_iter().chain(further());
     all.map(|(name, one)| {
         let mut one = signal(SignalKind::from_raw(one.as_raw()))?;
         let poll = move |cx: &mut Context<'_>| one.poll_recv(cx).map(|_| name);
@@ -159,30 +161,27 @@ impl Signals {
 #[cfg(unix)]
 mod tests {
     use super::*;
-    use std::process::Command;
     use std::time::Instant;
 
-    fn signal_this_process(name: &str) {
-        let pid = std::process::id().to_string();
-        let status = Command::new("kill").args([name, &pid]).status().unwrap();
-        assert!(status.success());
+    fn signal_this_process(one: Signal) {
+        rustix::process::kill_process(rustix::process::getpid(), one).unwrap();
     }
 
-    /// One test, since a signal is for the whole process.
+    /// One test, since a signal is for the whole process. A shell may have started it with SIGHUP ignored.
     #[test]
     fn who_does_not_end_in_time_is_ended_and_nobody_else() {
-        for name in ["-TERM", "-INT", "-HUP"] {
+        for (name, one) in REQUESTS.into_iter().chain(further().next()) {
             let (ended, end) = mpsc::channel();
             let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
             let before = Instant::now();
-            signal_this_process(name);
-            assert_eq!(signals.came.blocking_recv(), Ok(()));
+            signal_this_process(one);
+            assert_eq!(signals.came.blocking_recv(), Ok(()), "{name}");
             end.recv().expect("the last resort");
             assert!(before.elapsed() >= LAST_RESORT);
         }
         let (ended, end) = mpsc::channel::<()>();
         let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
-        signal_this_process("-TERM");
+        signal_this_process(Signal::TERM);
         drop(signals);
         assert!(end.recv().is_err(), "an orderly end has no last resort");
     }

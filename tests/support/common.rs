@@ -139,6 +139,13 @@ impl Runtime {
         Self::spawn(without_variables(shell), "127.0.0.1:0", arguments)
     }
 
+    /// The same with no signal ignored: a shell starts its jobs in the background with some ignored.
+    pub fn hearing_all(arguments: &[&str]) -> Self {
+        let mut env = Command::new("env");
+        env.args(["--default-signal", env!("CARGO_BIN_EXE_pendularm")]);
+        Self::spawn(without_variables(env), "127.0.0.1:0", arguments)
+    }
+
     fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
         let mut child = command
             .args(["--bind", bind])

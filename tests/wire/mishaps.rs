@@ -40,7 +40,7 @@ fn every_signal_that_ends_a_process_by_default_ends_the_program_in_order_and_its
         "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT",
     ] {
         let path = file(&format!("{name}.mcap"));
-        let mut runtime = Runtime::with(&["--record", path.to_str().unwrap()]);
+        let mut runtime = Runtime::hearing_all(&["--record", path.to_str().unwrap()]);
         let mut client = runtime.connect();
         client.subscribe("/joint_states");
         client.message("/joint_states");
