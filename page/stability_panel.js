@@ -10,7 +10,7 @@ import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, factorOf, limitsOf, limitText, question, scaled, whyText } from "./policy.js";
+import { answerInForce, factorOf, limitInForce, limitText, question, scaled, whyText } from "./policy.js";
 import { rollout, setGains, setIntegrator, stability } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
@@ -37,7 +37,7 @@ export function startStability() {
   startLimits();
   const canvas = byId("map");
   map = new Surface(canvas, drawStability);
-  watch(["integrator", "gains", "params", "setpoint", "stability", "enabled", "tab", "links"], () => map.redraw());
+  watch(["integrator", "gains", "params", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
   bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, "step"));
@@ -53,7 +53,7 @@ function mapSettings() {
   return { method: integrator.method, gains: anchor, params, pose };
 }
 
-/** Asks the study for the border, a row at a time; a new question ends the old one. */
+/** Asks the study for the border; a new question ends the old one. */
 async function askBorder() {
   const present = mapSettings();
   if (!present) return;
@@ -62,16 +62,24 @@ async function askBorder() {
   mapAsked = key;
   rows = [];
   const { params, method: integrator, pose: setpoint } = present;
-  while (rows.length < ROWS) {
-    const factor = factors.value(rows.length / (ROWS - 1));
-    const { result, values } = await stability({ params, integrator, setpoint, gains: scaled(present.gains, factor), control_period: 0 });
-    if (mapAsked !== key) return;
-    if (!result) {
-      mapAsked = ""; // mapAsked again at the next news
-      return;
-    }
+  const ask = (factor) => ({ params, integrator, setpoint, gains: scaled(present.gains, factor) });
+  await climbRows(factors, ROWS, ask, () => mapAsked === key, (factor, values) => {
     rows.push({ factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
     map.redraw();
+  });
+  if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next news
+}
+
+/**
+ * Asks the study about `count` multiples of the gains, the lowest first, and tells each answer as it comes.
+ * @param {LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the loop at a multiple
+ * @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void} tell
+ */
+export async function climbRows(scale, count, ask, isWanted, tell) {
+  for (let row = 0; row < count && isWanted(); row += 1) {
+    const factor = scale.value(row / (count - 1));
+    const { result, values } = await stability({ ...ask(factor), control_period: 0 });
+    if (result && isWanted()) tell(factor, values);
   }
 }
 
@@ -88,10 +96,9 @@ function drawStability() {
 function describeMap() {
   const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
   if (!row || !state.integrator) return;
-  const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
-  setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.limit)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
-    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the controller is on"}; click to go elsewhere.`);
+  setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller that never waits, ${limitText(row.continuous)}. `
+    + `Higher gains need a smaller timestep; gains that are too low never hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to go elsewhere.`);
 }
 
 function goTo(left, top) {
@@ -122,12 +129,24 @@ function byArrows(event) {
 }
 
 const PUSH_SPEED = 1e-6; // rad/s
-const STEPS = 14;
+const LOOKS = 14;
 const ASK_MS = 60;
 
 let bars;
 let heights = /** @type {number[]} */ ([]);
 let pushAsked = "";
+
+/**
+ * A tiny push of the last joint at rest: its speed [rad/s] at each of the next looks, `every` [s] apart. It is the difference of two
+ * runs, with the push and without; null where they are refused.
+ * @param {any} loop with method and timestep @param {number[]} rest pose [rad] @param {number} every
+ */
+export async function deviation(loop, rest, every) {
+  const common = { ...loop, q0: rest, duration: LOOKS * every, samples: LOOKS + 1 };
+  const [still, pushed] = await Promise.all([rollout(common), rollout({ ...common, qdot0: rest.map(() => 0).with(-1, PUSH_SPEED) })]);
+  if (!still.result || !pushed.result) return null;
+  return pushed.values.velocities.slice(1).map((row, k) => row.at(-1) - (still.values.velocities[k + 1]?.at(-1) ?? 0));
+}
 
 function lookAtPush() {
   const loop = question(state);
@@ -138,27 +157,21 @@ function lookAtPush() {
   push({ loop, key });
 }
 
-/** The same run with the push and without it: their difference is the deviation. */
 const push = latestOnly(async ({ loop, key }) => {
-  const n = state.links;
-  const { timestep } = state.integrator;
-  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(n).fill(0);
-  const common = { ...loop, timestep, setpoint: loop.setpoint ?? rest, duration: STEPS * timestep, samples: STEPS + 1 };
-  const [still, pushed] = [await rollout({ ...common, q0: rest }), await rollout({ ...common, q0: rest, qdot0: rest.map((_, i) => (i === n - 1 ? PUSH_SPEED : 0)) })];
-  if (key !== pushAsked || !still.result || !pushed.result) return;
-  heights = pushed.values.velocities.slice(1).map((row, k) => row[n - 1] - (still.values.velocities[k + 1]?.[n - 1] ?? 0));
-  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${STEPS} steps.`);
+  const { method: integrator, timestep } = state.integrator;
+  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(state.links).fill(0);
+  const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, timestep);
+  if (key !== pushAsked || !found) return;
+  heights = found;
+  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} steps.`);
   bars.redraw();
 }, ASK_MS);
 
 /** @type {Map<string, HTMLElement>} */
 const labels = new Map();
-/** Answers by method. @type {Record<string, any>} */
-let answers = {};
-let loopAsked = ""; // the question that they answer, without its method
 
 function startLimits() {
-  watch(LOOP, lookAtLoop);
+  watch(LOOP, showLimits);
   byId("why").addEventListener("click", () => {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
@@ -172,40 +185,10 @@ export function limitLabel(method) {
   return label;
 }
 
-function lookAtLoop() {
-  const asked = question(state);
-  const now = asked ? JSON.stringify({ ...asked, integrator: "" }) : "";
-  if (now !== loopAsked) {
-    loopAsked = now;
-    answers = {};
-  }
-  const own = answerInForce(state);
-  const method = state.integrator?.method;
-  if (own && answers[method] !== own) {
-    answers[method] = own;
-    askOthers(now);
-  }
-  showLimits();
-}
-
-/** Asks about the other methods, one at a time, each time the study has answered about the present one. */
-const askOthers = latestOnly(async (mine) => {
-  for (const [method] of METHODS) {
-    if (method === state.integrator?.method || mine !== loopAsked) continue;
-    const answer = await stability({ ...JSON.parse(mine), integrator: method });
-    if (mine !== loopAsked || !answer.result) continue;
-    answers[method] = answer.values;
-    showLimits();
-  }
-}, 0);
-
 function showLimits() {
-  const limits = limitsOf(state, answers);
-  for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
-  const known = METHODS.every(([method]) => method in limits);
-  const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
-  const why = known ? whyText(state, answerInForce(state), held) : "";
+  for (const [method, label] of labels) setText(label, limitText(limitInForce(state, method).limit));
+  const why = whyText(state);
   setText(byId("why-text"), why);
   // It stays while limits are computed anew, so that a click on its way meets it.
-  if (known || !question(state)) byId("why").hidden = why === "";
+  if (METHODS.every(([method]) => answerInForce(state, method)) || !question(state)) byId("why").hidden = why === "";
 }

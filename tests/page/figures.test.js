@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { csvText, record, take } from "../../page/history.js";
+import { between, csvText, record, take } from "../../page/history.js";
 import { TIMESTEPS, cheapest, describeRun, distances, endOf, errorText, partsAt, read, rungs, stamp, total, uncertaintyOf } from "../../page/ladder.js";
 import { nearestInReach } from "../../page/mechanics.js";
 import { LogScale } from "../../page/scale.js";
@@ -96,6 +96,24 @@ test("a file holds its settings, and what is not finite is empty", () => {
   const row = lines[lines.indexOf(header) + 1].split(",");
   assert.equal(header.split(",").length, row.length);
   assert.deepEqual(row.slice(0, 5), ["0.5", "", "0.25", "", ""]);
+});
+
+test("between two states the trail follows the motion, and goes straight where nobody has seen it", () => {
+  record.clear();
+  const at = (time, position, velocity) => {
+    state.time = time;
+    state.position.set([position, 0, 0]);
+    state.velocity.set([velocity, 0, 0]);
+    take();
+  };
+  at(0.2, 0.2 ** 3, 3 * 0.2 ** 2);
+  at(0.3, 0.3 ** 3, 3 * 0.3 ** 2);
+  at(0.4, 0.4 ** 3, 900);
+  const q = new Float64Array(3);
+  between(record.at(0), record.at(1), 0.5, q);
+  assert.ok(Math.abs(q[0] - 0.25 ** 3) < 1e-15);
+  between(record.at(1), record.at(2), 0.5, q);
+  assert.ok(Math.abs(q[0] - (0.3 ** 3 + 0.4 ** 3) / 2) < 1e-15);
 });
 
 test("an error is told apart from one that the reference can't resolve, and from one that nobody can follow", () => {
