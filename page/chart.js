@@ -249,12 +249,12 @@ export function drawBars({ context, width, height }, bars, name = "look of the c
   });
 }
 
-/** The errors of the method and of waiting, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
+/** The errors of the method and of the hold, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
 export function drawErrors({ context, width, height }, errors) {
   if (!errors) return;
   const chart = new Chart(context, width, height, ERRORS, NONE, ROOMY);
   chart.frame({ across: "largest error of a joint on the move [rad]" });
-  const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the waiting", errors.sampling, colors.bad]]);
+  const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the hold", errors.sampling, colors.bad]]);
   const room = (chart.bottom - chart.top) / rows.length;
   rows.forEach(([name, value, color], k) => {
     const y = chart.top + k * room;

@@ -44,7 +44,7 @@ let playing = false;
 let began = 0; // when it would have been at the first instant [ms]
 
 export function startCompare() {
-  said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Reckoning…", compare), { type: "submit", class: "primary" }]]);
+  said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
   const pictures = /** @type {[string, (surface: Surface) => void][]} */ ([
     ["arm", drawArms],
     ["chart", (surface) => drawLines(surface, () => instants, ({ away }) => away ?? [], errorScale())],

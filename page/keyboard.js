@@ -35,7 +35,7 @@ const shortcuts = [
   [".", "single step", singleStep],
   ["r", "reset", resetArm],
   ["z", "undo the last change", takeBack],
-  ["g", "cancel the goal", cancelGoal],
+  ["g", "cancel the target", cancelGoal],
   ["+", "plots: less time", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],

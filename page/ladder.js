@@ -41,7 +41,7 @@ const CLEAR = 4;
 /** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
 const FOLLOWED = 1e-3;
 
-/** A run's cell in the table: the error of the method, and with a controller the error of waiting. @param {Rung} rung */
+/** A run's cell in the table: the error of the method, and with a controller the error of the hold. @param {Rung} rung */
 export function errorText({ error, sampling, uncertainty, divergedAt }) {
   if (divergedAt !== null) return `diverged at ${significant(divergedAt, 3)} s`;
   if (error !== null) return `${significant(error, 2)}${sampling === null ? "" : ` + ${significant(sampling, 2)}`}`;

@@ -104,7 +104,7 @@ function describe(about) {
 /** @param {Rung[]} best of each method the cheapest run that is good enough */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const truths = controlled ? " Solid lines: what the method costs. Dashed: what the controller’s waiting costs; no method lowers it." : "";
+  const truths = controlled ? " Solid lines: what the method costs. Dashed: what the controller’s hold costs; no method lowers it." : "";
   if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${truths}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);

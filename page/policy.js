@@ -233,13 +233,13 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
       ? "these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
-      : "nothing damps the arm here, and a torque that is kept for a step comes a little late. Raise the derivative gains.";
+      : "nothing damps the arm here, and a torque that is held for a step comes a little late. Raise the derivative gains.";
   }
   if (!critical || !(least > 0)) return "beyond it a deviation grows.";
   const joint = `joint ${critical.joint + 1}`;
   const percent = significant(100 * (critical.growth_per_step - 1), 2);
   const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
-  if (flips) return `${joint} is the fastest. A torque that is kept longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
+  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
   return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain damps it.`;
 }
 

@@ -1,5 +1,5 @@
 // What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
-// timestep, where the loop with held efforts is stable and where not, the present point in it; a click goes there, and so do the
+// timestep, where the loop with a hold is stable and where not, the present point in it; a click goes there, and so do the
 // arrow keys. And a small push, in speed, of the loop in force, step by step.
 // Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown. The boundary is
 // drawn as far as it is known; a click sends what it shows. The bars are a run of the runtime's own at the present timestep.
@@ -28,7 +28,7 @@ const timesteps = new LogScale(1e-4, 0.1);
 let map;
 let chart;
 let mapAsked = ""; // the settings that `rows` are about
-/** Limits with held efforts and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
+/** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
 let rows = [];
 /** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
 let anchor = null;
@@ -97,7 +97,7 @@ function describeMap() {
   const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
-  setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller that never waits, ${limitText(row.continuous)}. `
+  setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
     + `Higher gains need a smaller timestep; gains that are too low never hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to go elsewhere.`);
 }
 

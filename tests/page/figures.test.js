@@ -134,7 +134,7 @@ test("a closed loop has two errors, and a run that diverged has none", () => {
   const whole = read({ method: "rk4", timestep: 0.004 }, values, 2);
   assert.deepEqual([whole.error, whole.sampling, total(whole)], [1e-8, 8e-3, 8e-3]);
   assert.equal(errorText(whole), "1e−8 + 0.008");
-  assert.deepEqual(cheapest([whole], 1e-3), [], "waiting counts: the method's own error is not all");
+  assert.deepEqual(cheapest([whole], 1e-3), [], "the hold counts: the method's own error is not all");
   const broken = read({ method: "rk4", timestep: 0.004 }, { ...values, error: 1e136, sampling_error: 1e136 }, 5);
   assert.deepEqual([broken.error, broken.sampling, broken.divergedAt], [null, null, 2]);
 });

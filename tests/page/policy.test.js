@@ -182,7 +182,7 @@ const why = (answer, limits, changed = {}) => whyText(arm({ answers: Object.from
 
 test("a deviation that flips at every step is named with its joint and its growth", () => {
   const text = why(SERVED, ALIKE);
-  assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is kept longer overshoots: .* flips at every step and grows by 21 %/);
+  assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is held longer overshoots: .* flips at every step and grows by 21 %/);
   assert.match(text, /A better method does not help/);
 });
 
