@@ -10,7 +10,7 @@ import { busy, numberField } from "./field.js";
 import { duration, METHODS, seconds, shortName } from "./format.js";
 import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
-import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
+import { drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
@@ -19,9 +19,9 @@ import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS } from "./settings.js";
 import { showForm } from "./sheet.js";
-import { climbRows, deviation } from "./stability_panel.js";
 import { state, watch, watchAll } from "./store.js";
 import { StripChart } from "./strip_chart.js";
+import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
 
 const SHAKES = 2; // rad/s: beyond the limit, and seen to

@@ -5,14 +5,13 @@ import { Chart, DASHED, line, STRONG, TEXT } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
-import { cheapest, errorText, MOVE_TO, read, rungs, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
-import { rollout } from "./runtime.js";
+import { cheapest, errorText, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
 import { LogScale, powerOfTen } from "./scale.js";
 import { state, watch } from "./store.js";
+import { climb } from "./study.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 
-const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
 const SECONDS = 2;
 const INVITATION = "Runs this arm on one fixed move, with every method at eight timesteps, and compares each run with the exact motion.";
@@ -66,30 +65,6 @@ async function measure() {
   if (mine !== running) return;
   said.show(refused);
   describe(about);
-}
-
-/**
- * Runs the ladder on the loop in force, a rung at a time; gives the refusal, if there is one.
- * @param {number} length [s] @param {() => boolean} isWanted whether to go on @param {(rung: Rung) => void} tell
- */
-export async function climb(length, isWanted, tell) {
-  const n = state.links;
-  const common = {
-    q0: new Array(n).fill(0), qdot0: new Array(n).fill(0), duration: length, params: state.params, samples: SAMPLES, reference: true,
-    ...(state.enabled ? { gains: state.gains, setpoint: MOVE_TO[n], control_period: state.period?.period ?? 0 } : {}),
-  };
-  for (const rung of rungs()) {
-    const args = { ...common, integrator: rung.method, timestep: rung.timestep };
-    const answer = await rollout(args);
-    if (!isWanted()) return "";
-    if (!answer.result) return answer.status;
-    // The shorter of two times: other work of the machine in between has no part in it.
-    const again = await rollout({ ...args, reference: false });
-    const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
-    if (!isWanted()) return "";
-    tell(read(rung, { ...answer.values, wall_time: wall }, length));
-  }
-  return "";
 }
 
 function describe(about) {

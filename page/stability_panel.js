@@ -11,9 +11,10 @@ import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
 import { answerInForce, factorOf, limitInForce, limitText, question, scaled, whyText } from "./policy.js";
-import { rollout, setGains, setIntegrator, stability } from "./runtime.js";
+import { setGains, setIntegrator } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
+import { climbRows, deviation, LOOKS } from "./study.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
@@ -70,19 +71,6 @@ async function askBorder() {
   if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next news
 }
 
-/**
- * Asks the study about `count` multiples of the gains, the lowest first, and tells each answer as it comes.
- * @param {LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the loop at a multiple
- * @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void} tell
- */
-export async function climbRows(scale, count, ask, isWanted, tell) {
-  for (let row = 0; row < count && isWanted(); row += 1) {
-    const factor = scale.value(row / (count - 1));
-    const { result, values } = await stability({ ...ask(factor), control_period: 0 });
-    if (result && isWanted()) tell(factor, values);
-  }
-}
-
 function drawStability() {
   askBorder();
   const { context, width, height } = map;
@@ -128,25 +116,11 @@ function byArrows(event) {
   moveTo(timesteps.within(state.integrator.timestep * step[0]), factors.within(factor));
 }
 
-const PUSH_SPEED = 1e-6; // rad/s
-const LOOKS = 14;
 const ASK_MS = 60;
 
 let bars;
 let heights = /** @type {number[]} */ ([]);
 let pushAsked = "";
-
-/**
- * A tiny push of the last joint at rest: its speed [rad/s] at each of the next looks, `every` [s] apart. It is the difference of two
- * runs, with the push and without; null where they are refused.
- * @param {any} loop with method and timestep @param {number[]} rest pose [rad] @param {number} every
- */
-export async function deviation(loop, rest, every) {
-  const common = { ...loop, q0: rest, duration: LOOKS * every, samples: LOOKS + 1 };
-  const [still, pushed] = await Promise.all([rollout(common), rollout({ ...common, qdot0: rest.map(() => 0).with(-1, PUSH_SPEED) })]);
-  if (!still.result || !pushed.result) return null;
-  return pushed.values.velocities.slice(1).map((row, k) => row.at(-1) - (still.values.velocities[k + 1]?.at(-1) ?? 0));
-}
 
 function lookAtPush() {
   const loop = question(state);
