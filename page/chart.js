@@ -229,6 +229,8 @@ export function drawMap(chart, rows, at, factor) {
 
 /** @typedef {import("./surface.js").Surface} Surface */
 
+/** Of a bar that is long, its thickness at most [px]. */
+const THICK = 40;
 const NONE = { place: () => 0, marks: [] };
 const ERRORS = new LogScale(1e-10, 1, []);
 ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));
@@ -260,7 +262,7 @@ export function drawErrors({ context, width, height }, errors) {
     const y = chart.top + k * room;
     chart.words(`Error of ${name}: ${value === null ? "not known" : `${significant(value, 2)} rad`}`, chart.left + 6, y + 14, "left");
     context.fillStyle = color;
-    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.max(10, room - 48));
+    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
   });
 }
 

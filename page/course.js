@@ -103,7 +103,7 @@ export const STEPS = [
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M).",
+    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M).",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
@@ -114,7 +114,7 @@ export const STEPS = [
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the black line.",
+    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => methods.has("rk4") || methods.has("verlet") },

@@ -8,7 +8,7 @@ import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, METHODS, seconds, shortName } from "./format.js";
-import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
+import { newest, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
 import { drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
@@ -20,7 +20,7 @@ import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
-import { StripChart } from "./strip_chart.js";
+import { ENERGIES, StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
 
@@ -47,7 +47,7 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
   velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
-  energy: { caption: () => "Energy [J]: kinetic, potential, total in black", draw: strip([{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }]) },
+  energy: { caption: () => "Energy [J]", draw: strip(ENERGIES) },
   bars: { caption: () => "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
   errors: { caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`, draw: () => drawErrors(surface, now.errors), ask: askErrors },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },

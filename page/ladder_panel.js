@@ -1,7 +1,7 @@
 // Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
 // Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
 
-import { Chart, DASHED, line, STRONG, TEXT } from "./chart.js";
+import { Chart, DASHED, line, STRONG, TEXT, write } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
@@ -99,7 +99,7 @@ const CROSS = 4;
 export function drawLadder({ context, width, height }, found) {
   const runs = found.filter(({ wall }) => wall > 0);
   const errors = runs.flatMap(({ error, sampling }) => [error ?? 0, sampling ?? 0]).filter((error) => error > 0);
-  if (errors.length === 0) return;
+  if (errors.length === 0) return write(context, "no measurement yet", width / 2, height / 2, "center");
   const chart = new Chart(context, width, height, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
   chart.frame({ across: "run time", up: "error [rad]" });
   METHODS.forEach(([method], i) => {

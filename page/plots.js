@@ -4,16 +4,15 @@
 
 import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
-import { csvText, EFFORT, ENERGY, firstAfter, KINETIC, LOAD, newest, POSITION, POTENTIAL, record, SETPOINT, VELOCITY } from "./history.js";
+import { csvText, EFFORT, ENERGY, firstAfter, LOAD, newest, POSITION, record, SETPOINT, VELOCITY } from "./history.js";
 import { energyName } from "./policy.js";
 import { presentSettings } from "./settings.js";
 import { state, watch } from "./store.js";
-import { PhasePlot, StripChart } from "./strip_chart.js";
+import { ENERGIES, PhasePlot, StripChart } from "./strip_chart.js";
 import { Surface } from "./surface.js";
 
 /** No more than this is shown of an arm that has diverged: the blow-up is the end of it [s]. */
 const BLOW_UP_SECONDS = 2;
-const ENERGIES = [{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }];
 /** Of each plot its name and its chart; where joints have values in its legend, their column, unit and digits. @type {[string, any, number?, string?, number?][]} */
 const CHARTS = [
   ["position", new StripChart([{ column: POSITION }, { column: SETPOINT, dashed: true }], 0.2, 300), POSITION, "rad", 3],

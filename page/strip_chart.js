@@ -3,11 +3,16 @@
 // Invariant: rows are read where they stand in the history. They draw on whatever context they are given.
 
 import { Chart, circle, DASHED } from "./chart.js";
-import { firstAfter, POSITION, record, TIME, VELOCITY } from "./history.js";
+import { ENERGY, firstAfter, KINETIC, POSITION, POTENTIAL, record, TIME, VELOCITY } from "./history.js";
 import { Axis, LOG_END, times } from "./scale.js";
 import { colors } from "./theme.js";
 
-/** @typedef {{column: number, dashed?: boolean, color?: string}} Series of each joint, or one in a colour of its own */
+/** @typedef {{column: number, dashed?: boolean, color?: string, name?: string}} Series of each joint, or one in a colour of its own with its name */
+
+/** @type {Series[]} */
+export const ENERGIES = [
+  { column: KINETIC, color: "kinetic", name: "kinetic" }, { column: POTENTIAL, color: "potential", name: "potential" }, { column: ENERGY, color: "ink", name: "total" },
+];
 
 /** The smallest and the largest number in columns of the rows from `first` to before `last`. @param {number[]} columns @returns {[number, number]} */
 function extent(columns, first, last) {
@@ -59,6 +64,8 @@ export class StripChart {
       chart.upright(leftAt, colors.bad);
       chart.upright(cursor, colors.accent);
     });
+    const named = lines.filter(({ name }) => name);
+    named.forEach(({ name, color }, i) => chart.words(name, chart.right - 6 - 64 * (named.length - 1 - i), chart.bottom - 8, "right", color, chart.font));
     if (!this.axis.log) return;
     const end = Number.isFinite(leftAt) ? `, beyond 1e12 from ${leftAt.toFixed(2)} s` : "";
     chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);

@@ -31,7 +31,7 @@ export function startTransport() {
 }
 
 export function togglePause() {
-  return said.report(pause(!state.paused));
+  return setPaused(!state.paused);
 }
 
 export function setPaused(paused) {
