@@ -163,7 +163,8 @@ export class Chart {
     const pencil = new Pencil(this.context);
     for (let i = 0; i < count; i += 1) {
       const value = up(i);
-      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
+      const y = Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN;
+      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // no error at all has no place on a logarithmic scale
       else pencil.lift();
     }
     pencil.lift();

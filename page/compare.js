@@ -1,5 +1,5 @@
-// All methods at one timestep against a reference: the same arm, from the same state, computed offline by the runtime, drawn over one
-// another and played back together, with error, energy and a joint's angle over time. Other timesteps are in the panel Error.
+// All methods at one timestep against a reference. The runtime computes the same arm from the same state offline. The runs are drawn
+// over one another and played back together, with error, energy and a joint's angle over time. The panel Error has other timesteps.
 // Invariant: the runs that are compared are the runtime's answers; the live arm is not touched. All are shown at the same instant; a
 // run that ends early is drawn as far as it goes, its last pose as a ghost.
 

@@ -1,6 +1,6 @@
-// What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
-// timestep, where the loop with a hold is stable and where not, the present point in it; a click goes there, and so do the
-// arrow keys. And a small push, in speed, of the loop in force, step by step.
+// What limits the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of the
+// loop in force, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot. A click
+// or an arrow key moves the dot, and with it the settings.
 // Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown. The boundary is
 // drawn as far as it is known; a click sends what it shows. The bars are a run of the runtime's own at the present timestep.
 
