@@ -103,7 +103,7 @@ export const STEPS = [
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M).",
+    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M), with the mass matrix M and the smallest eigenvalue λmin.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
@@ -153,7 +153,7 @@ export const STEPS = [
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
     question: {
       text: "Your period is too long. What helps?", answers: ["A better method", "Less damping gain or a faster controller", "A shorter timestep"], right: 1,
-      because: "Only the controller’s clock and its gains set that limit.",
+      because: "The gains and the masses set that limit. Method and timestep do not.",
     },
   },
 ];
