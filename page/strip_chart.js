@@ -28,6 +28,9 @@ function extent(columns, first, last) {
   return [min, max];
 }
 
+/** Room for the name of a line [px]. */
+const NAME = 64;
+
 export class StripChart {
   /** @param {Series[]} series @param {number} least smallest span of the vertical axis @param {number} sane beyond it the scale is logarithmic */
   constructor(series, least, sane) {
@@ -52,7 +55,8 @@ export class StripChart {
     const [min, max] = extent(lines.map(({ column }) => column), first, last);
     this.axis.fit(level < min ? level : min, level > max ? level : max);
     const leftAt = this.leftAt(lines, first, last);
-    const chart = new Chart(context, width, height, times(this.from, now), this.axis);
+    const named = lines.filter(({ name }) => name);
+    const chart = new Chart(context, width, height, times(this.from, now), this.axis, named.length > 0 ? { top: 18 } : {});
     this.chart = chart;
     chart.frame();
     const { data } = record;
@@ -64,8 +68,7 @@ export class StripChart {
       chart.upright(leftAt, colors.bad);
       chart.upright(cursor, colors.accent);
     });
-    const named = lines.filter(({ name }) => name);
-    named.forEach(({ name, color }, i) => chart.words(name, chart.right - 6 - 64 * (named.length - 1 - i), chart.bottom - 8, "right", color, chart.font));
+    named.forEach(({ name, color }, i) => chart.words(name, chart.left + NAME * i, 8, "left", color, chart.font));
     if (!this.axis.log) return;
     const end = Number.isFinite(leftAt) ? `, beyond 1e12 from ${leftAt.toFixed(2)} s` : "";
     chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);
