@@ -69,11 +69,11 @@ impl Divergence {
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
 /// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`,
-/// `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each. A gain that
-/// is not given has the value of a fresh runtime. The controller runs once per `control_period` [s], rounded to a whole
-/// number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is applied one period later.
-/// Threads may share one. It can be neither copied nor pickled. A process that is forked while another thread steps it
-/// must not use it.
+/// `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each. A gain
+/// that is not given has the value of a fresh runtime. The controller runs once per `control_period` [s], rounded to a
+/// whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is applied one period
+/// later. Threads may share one. It can be neither copied nor pickled. A process that is forked while another thread
+/// steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {

@@ -47,13 +47,13 @@ enum Either {
 
 /// Many arms, advanced in whole steps; each is a `Simulation`, to the bit, whatever the number of threads.
 ///
-/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays, made
-/// once and overwritten by every call that changes the arms. Copy values that you need later. An array argument has one
-/// row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read without a copy.
-/// `threads` share the work: by default as many as there are cores, and fewer if the system allows no more. With 1 the
-/// caller's thread does the work. Calls that change one batch from several threads wait for each other. The arrays can
-/// be read meanwhile, and show the present state of each arm. A batch can be neither copied nor pickled. A process that
-/// is forked while another thread steps the batch must not use it.
+/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
+/// made once and overwritten by every call that changes the arms. Copy values that you need later. An array argument
+/// has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read without a
+/// copy. `threads` share the work: by default as many as there are cores, and fewer if the system allows no more. With
+/// 1 the caller's thread does the work. Calls that change one batch from several threads wait for each other. The
+/// arrays can be read meanwhile, and show the present state of each arm. A batch can be neither copied nor pickled. A
+/// process that is forked while another thread steps the batch must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {

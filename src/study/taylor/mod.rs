@@ -1,8 +1,8 @@
 //! An arm followed to rounding or within a tolerance: under constant efforts in doubles, and for the report's
 //! references under any drive and in more digits.
 //!
-//! Its motion is a power series (`series.rs`). A step is so short that the last terms of the series are small. Positions
-//! and velocities are summed with compensation.
+//! Its motion is a power series (`series.rs`). A step is so short that the last terms of the series are small.
+//! Positions and velocities are summed with compensation.
 //!
 //! **Invariant:** it computes the motion differently from every method under study, and the work of a span is bounded.
 

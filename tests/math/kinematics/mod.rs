@@ -19,7 +19,8 @@ use serde_json::Value;
 const ROUND_TRIP: f64 = 1e-9;
 
 /// Error of the closed form on targets that are not moved onto a boundary. The wrist, the angles and their sines take a
-/// dozen roundings, each 2⁻⁵³ of at most the sum of the lengths or π. An orientation a whole turn away loses 1e-15 more.
+/// dozen roundings, each 2⁻⁵³ of at most the sum of the lengths or π. An orientation a whole turn away loses 1e-15
+/// more.
 const INTERIOR: f64 = 4e-15;
 
 fn oracle(kind: &str) -> Vec<Value> {

@@ -1,5 +1,5 @@
-//! The commands that contact a running arm: their output in YAML and in JSON, and their errors when the runtime refuses.
-//! They end properly when no server listens, and when the server is hostile.
+//! The commands that contact a running arm: their output in YAML and in JSON, and their errors when the runtime
+//! refuses. They end properly when no server listens, and when the server is hostile.
 
 mod calls;
 mod diagnostics;
