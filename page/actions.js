@@ -3,7 +3,6 @@
 // Invariant: every change can be undone, and what the runtime refused is said.
 
 import { announce, byId } from "./dom.js";
-import { goLive } from "./history.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
 import { DEFAULTS, Undo, presentSettings } from "./settings.js";
 import { state, tell, watch } from "./store.js";
@@ -62,7 +61,6 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
 
 /** Sets all of the settings, from the starting pose, then running or paused; gives the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
-  goLive();
   await enable(false);
   const refusals = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
@@ -74,7 +72,6 @@ export async function setScene({ controller, setpoint, ...rest }, paused) {
 
 /** Back to the starting pose. */
 export async function resetArm() {
-  goLive();
   const answer = await reset();
   if (answer.result) announce("Reset: the arm is in its starting pose.");
   return answer;
@@ -88,7 +85,6 @@ export async function recover(timestep) {
 
 /** From the starting pose with all settings as they are; the setpoint stays too. */
 export async function beginAnew() {
-  goLive();
   const setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;
   const answer = await reset();
   if (answer.result && setpoint) sendSetpoint(setpoint);

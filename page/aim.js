@@ -7,7 +7,6 @@ import { endEffector, showAim, toWorld } from "./arm_view.js";
 import { goalOptions, showGoalPlace, showGoalRefusal } from "./tasks_panel.js";
 import { latestOnly } from "./latest.js";
 import { nearestInReach, nearestTurn } from "./mechanics.js";
-import { goLive } from "./history.js";
 import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.js";
 import { state } from "./store.js";
 
@@ -86,7 +85,6 @@ function moveTo(wished, mode) {
   lastPlace = { ...aim };
   showAim(aim);
   if (mode === "arm") {
-    goLive();
     lift(lastPlace);
   } else {
     showGoalPlace(place);

@@ -5,7 +5,6 @@
 import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
 import { fixed, significant } from "./format.js";
 import { gravityLoad, innerReach, joints, reach } from "./mechanics.js";
-import { follow, shown } from "./history.js";
 import { DEFAULT_EPSILON } from "./runtime.js";
 import { MOST_LINKS, state, watch } from "./store.js";
 import { onFrame, Surface, wake } from "./surface.js";
@@ -42,8 +41,7 @@ export function startArmView(canvas) {
   context = surface.context;
   watch("params", resized);
   watch("links", resized);
-  watch("setpoint", () => { follow(); redraw(); });
-  watch(["playback", "joint", "enabled", "diverged", "goal"], redraw);
+  watch(["setpoint", "joint", "enabled", "diverged", "goal"], redraw);
   onFrame(drawArm);
 }
 
@@ -55,15 +53,15 @@ export function redraw() {
 
 /** The trail moves on, if time does; between, only its latest piece is drawn. */
 export function redrawTrail() {
-  if (behindTime !== shown.time) redraw();
+  if (behindTime !== state.time) redraw();
 }
 
 /** Whether the arm would be seen otherwise than it was drawn last. */
 export function hasMoved() {
   const pixels = scale * reach(lengths());
   for (let i = 0; i < state.links; i += 1) {
-    const change = Math.abs(shown.position[i] - drawn.position[i]) * pixels;
-    const sweep = Math.abs(shown.effort[i] - drawn.effort[i]) * (Math.PI / fullEffort) * EFFORT_RADIUS;
+    const change = Math.abs(state.position[i] - drawn.position[i]) * pixels;
+    const sweep = Math.abs(state.effort[i] - drawn.effort[i]) * (Math.PI / fullEffort) * EFFORT_RADIUS;
     if (!(change < SEEN && sweep < SEEN)) return true;
   }
   return false;
@@ -115,8 +113,8 @@ function py(metres) {
 function drawArm() {
   if (!stale && !hasMoved()) return false;
   stale = false;
-  drawn.position.set(shown.position);
-  drawn.effort.set(shown.effort);
+  drawn.position.set(state.position);
+  drawn.effort.set(state.effort);
   const n = state.links;
   const known = n > 0 && state.params?.lengths.length === n;
   if (behindStale) paintBehind(known ? n : 0);
@@ -126,7 +124,7 @@ function drawArm() {
   if (!known) return false;
   context.lineCap = "round";
   context.lineJoin = "round";
-  drawTrail(context, n, lengths(), px, py, behindTime, shown.time, 1);
+  drawTrail(context, n, lengths(), px, py, behindTime, state.time, 1);
   drawTarget(n);
   drawLinks(n);
   return false;
@@ -144,13 +142,13 @@ function paintBehind(n) {
   drawReach(paint);
   drawGrid(paint);
   drawGravity(paint, state.params?.gravity ?? 0);
-  if (n > 0) drawTrail(paint, n, lengths(), px, py, shown.time - TRAIL_SECONDS, shown.time);
-  if (n > 0 && shown.setpointKnown) drawGhost(paint, n);
-  behindTime = shown.time;
+  if (n > 0) drawTrail(paint, n, lengths(), px, py, state.time - TRAIL_SECONDS, state.time);
+  if (n > 0 && state.setpointKnown) drawGhost(paint, n);
+  behindTime = state.time;
 }
 
 function drawGhost(paint, n) {
-  joints(n, shown.setpoint, lengths(), x, y);
+  joints(n, state.setpoint, lengths(), x, y);
   paint.lineCap = "round";
   paint.lineJoin = "round";
   paint.globalAlpha = state.enabled ? 0.9 : 0.5;
@@ -163,12 +161,12 @@ function drawGhost(paint, n) {
 
 function drawTarget(n) {
   const { goal } = state;
-  const shown = aim?.mode === "goal" ? aim : goal?.target;
-  if (shown) {
+  const target = aim?.mode === "goal" ? aim : goal?.target;
+  if (target) {
     const done = !aim && goal?.outcome !== "active";
     const color = aim?.refused ? colors.bad : done && goal?.outcome === "reached" ? colors.good : colors.target;
-    if (!aim && goal?.outcome === "active") drawWay(n, shown, color);
-    drawCross(shown, goal?.epsilon ?? DEFAULT_EPSILON, color, done ? 0.75 : 1);
+    if (!aim && goal?.outcome === "active") drawWay(n, target, color);
+    drawCross(target, goal?.epsilon ?? DEFAULT_EPSILON, color, done ? 0.75 : 1);
   }
   if (aim?.mode === "setpoint" || (aim?.mode === "arm" && aim.refused)) drawCross(aim, 0, aim.refused ? colors.bad : colors.ink, 1);
   context.globalAlpha = 1;
@@ -176,7 +174,7 @@ function drawTarget(n) {
 
 /** A thin line of what is left to go. */
 function drawWay(n, target, color) {
-  joints(n, shown.position, lengths(), x, y);
+  joints(n, state.position, lengths(), x, y);
   context.globalAlpha = 0.6;
   line(context, px(x[n]), py(y[n]), px(target.x), py(target.y), color, 1.25);
 }
@@ -203,7 +201,7 @@ function drawCross(target, epsilon, color, alpha) {
 
 function drawLinks(n) {
   const l = lengths();
-  joints(n, shown.position, l, x, y);
+  joints(n, state.position, l, x, y);
   const room = Math.min(1, Math.min(surface.width, surface.height) / 420); // smaller on a telephone
   for (let i = 0; i < n; i += 1) {
     // Heavier rods of the same length are drawn thicker, within reason.
@@ -239,7 +237,7 @@ function base(room) {
 function drawEfforts(n, room) {
   context.lineWidth = 3;
   for (let i = 0; i < n; i += 1) {
-    const effort = shown.effort[i];
+    const effort = state.effort[i];
     const sweep = Math.PI * Math.max(-1.6, Math.min(1.6, effort / fullEffort));
     if (Math.abs(sweep) < 0.03) continue;
     const radius = EFFORT_RADIUS * room;

@@ -163,7 +163,8 @@ export class Chart {
     const pencil = new Pencil(this.context);
     for (let i = 0; i < count; i += 1) {
       const value = up(i);
-      if (value !== null && Number.isFinite(value)) pencil.to(this.x(across(i)), this.y(value));
+      const y = Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN;
+      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // no error at all has no place on a logarithmic scale
       else pencil.lift();
     }
     pencil.lift();
@@ -229,6 +230,8 @@ export function drawMap(chart, rows, at, factor) {
 
 /** @typedef {import("./surface.js").Surface} Surface */
 
+/** Of a bar that is long, its thickness at most [px]. */
+const THICK = 40;
 const NONE = { place: () => 0, marks: [] };
 const ERRORS = new LogScale(1e-10, 1, []);
 ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));
@@ -249,18 +252,18 @@ export function drawBars({ context, width, height }, bars, name = "look of the c
   });
 }
 
-/** The errors of the method and of waiting, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
+/** The errors of the method and of the hold, as two bars on one fixed scale. @param {Surface} surface @param {{error: number | null, sampling: number | null} | null} errors */
 export function drawErrors({ context, width, height }, errors) {
   if (!errors) return;
   const chart = new Chart(context, width, height, ERRORS, NONE, ROOMY);
   chart.frame({ across: "largest error of a joint on the move [rad]" });
-  const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the waiting", errors.sampling, colors.bad]]);
+  const rows = /** @type {const} */ ([["the method", errors.error, colors.accent], ["the hold", errors.sampling, colors.bad]]);
   const room = (chart.bottom - chart.top) / rows.length;
   rows.forEach(([name, value, color], k) => {
     const y = chart.top + k * room;
     chart.words(`Error of ${name}: ${value === null ? "not known" : `${significant(value, 2)} rad`}`, chart.left + 6, y + 14, "left");
     context.fillStyle = color;
-    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.max(10, room - 48));
+    if (value !== null && value > 0) context.fillRect(chart.left, y + 28, Math.max(2, chart.x(ERRORS.within(value)) - chart.left), Math.min(THICK, Math.max(10, room - 48)));
   });
 }
 

@@ -48,8 +48,8 @@ export const STEPS = [
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
     question: {
-      text: "What does the controller do between two measurements?", answers: ["It keeps the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
-      because: "A computer looks only now and then. In between it cannot know better.",
+      text: "What does the controller do between two measurements?", answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
+      because: "A computer looks only now and then. From one look to the next it holds each torque. This is called a hold.",
     },
   },
   {
@@ -76,7 +76,7 @@ export const STEPS = [
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
     question: {
       text: "Beyond the limit each bar points the other way. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is kept too long. It pushes past the target, and beyond the limit each time further.",
+      because: "The torque is held too long. It pushes past the target, and beyond the limit each time further.",
     },
   },
   {
@@ -87,7 +87,7 @@ export const STEPS = [
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
       text: "Why does a better method not help?", answers: ["The controller still looks as rarely", "Euler is exact enough", "The gains are too low"], right: 0,
-      because: "The limit comes from the waiting. A real robot has the same limit, without any method.",
+      because: "The limit comes from the hold between two looks. A real robot has the same limit, without any method.",
     },
   },
   {
@@ -97,13 +97,13 @@ export const STEPS = [
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
     question: {
-      text: "Which error stayed?", answers: ["That of waiting", "That of the method", "None"], right: 0,
+      text: "Which error stayed?", answers: ["That of the hold", "That of the method", "None"], right: 0,
       because: "A finer timestep improves the simulation. Only a shorter period improves the control.",
     },
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M).",
+    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M), with the mass matrix M and the smallest eigenvalue λmin.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
@@ -114,7 +114,7 @@ export const STEPS = [
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the black line.",
+    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => methods.has("rk4") || methods.has("verlet") },
@@ -125,13 +125,13 @@ export const STEPS = [
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of waiting.",
+    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of the hold.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
     task: { text: "Measure, and find where more work buys nothing.", done: ({ measured }) => measured },
     question: {
       text: "Your controller looks every 4 ms. What does Runge–Kutta 4 buy at 0.25 ms?", answers: ["A better robot", "Nearly nothing", "A longer limit"], right: 1,
-      because: "The error of waiting is far larger than the error of the method. Work on the larger one.",
+      because: "The error of the hold is far larger than the error of the method. Work on the larger one.",
     },
   },
   {
@@ -153,7 +153,7 @@ export const STEPS = [
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
     question: {
       text: "Your period is too long. What helps?", answers: ["A better method", "Less damping gain or a faster controller", "A shorter timestep"], right: 1,
-      because: "Only the controller’s clock and its gains set that limit.",
+      because: "The gains and the masses set that limit. Method and timestep do not.",
     },
   },
 ];

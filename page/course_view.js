@@ -8,24 +8,23 @@ import { ofLimit, nothingSeen, shrinks, stepIn, STEPS } from "./course.js";
 import { announce, byId, el, setAddress, setAttribute, setText } from "./dom.js";
 import { busy, numberField } from "./field.js";
 import { duration, METHODS, seconds, shortName } from "./format.js";
-import { ENERGY, KINETIC, newest, POTENTIAL, VELOCITY } from "./history.js";
+import { newest, VELOCITY } from "./history.js";
 import { MOVE_TO, rungs } from "./ladder.js";
-import { climb, drawLadder, settingsKey } from "./ladder_panel.js";
+import { drawLadder, settingsKey } from "./ladder_panel.js";
 import { isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
 import { controlPeriodLimit, limitInForce, question as loopQuestion, stepsPerUpdate, verdict } from "./policy.js";
-import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, stability, step as stepArm } from "./runtime.js";
+import { rollout, setGains, setIntegrator, setParams, setPeriod, setState, step as stepArm } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { SCENES, settingsOf } from "./scenes.js";
 import { DEFAULTS } from "./settings.js";
 import { showForm } from "./sheet.js";
 import { state, watch, watchAll } from "./store.js";
-import { StripChart } from "./strip_chart.js";
+import { ENERGIES, StripChart } from "./strip_chart.js";
+import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
 
 const SHAKES = 2; // rad/s: beyond the limit, and seen to
-const LOOKS = 14; // bars
-const PUSH = 1e-6; // rad/s
 const LOOK_MS = 500;
 const STEPS_SHOWN = 40; // looks of the arm in slow motion
 const ROWS = 13; // of the map's border
@@ -48,7 +47,7 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
 /** @type {Record<string, ChartOfStep>} */
 const CHARTS = {
   velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
-  energy: { caption: () => "Energy [J]: kinetic, potential, total in black", draw: strip([{ column: KINETIC, color: "kinetic" }, { column: POTENTIAL, color: "potential" }, { column: ENERGY, color: "ink" }]) },
+  energy: { caption: () => "Energy [J]", draw: strip(ENERGIES) },
   bars: { caption: () => "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
   errors: { caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`, draw: () => drawErrors(surface, now.errors), ask: askErrors },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
@@ -380,12 +379,12 @@ const inquire = latestOnly(async ({ ask, mine }) => {
 
 async function askBars(common) {
   const mine = now;
-  const zero = new Array(state.links).fill(0);
+  const rest = new Array(state.links).fill(0);
   // Without gravity, so that nothing but the push is seen. It is one of speed, which the fastest motion of the loop answers.
-  const { result, values } = await rollout({ ...common, params: { ...state.params, gravity: 0 }, q0: zero, qdot0: zero.with(-1, PUSH), setpoint: zero, duration: LOOKS * period(), samples: LOOKS + 1 });
-  if (!result) return;
-  mine.bars = values.velocities.slice(1).map((row) => row.at(-1));
-  mine.seen.shrinks = shrinks(mine.bars);
+  const bars = await deviation({ ...common, params: { ...state.params, gravity: 0 }, setpoint: rest }, rest, period());
+  if (!bars) return;
+  mine.bars = bars;
+  mine.seen.shrinks = shrinks(bars);
 }
 
 async function askErrors(common) {
@@ -397,21 +396,20 @@ async function askErrors(common) {
   mine.seen.gain = mine.firstError / (values.error ?? NaN);
 }
 
-/** A row at a time, each drawn as it comes. The damping moves the dot, not the border. */
+/** The border of the map: the damping moves the dot, not the border. */
 async function askMap() {
   const mine = now;
   const about = () => JSON.stringify([state.params, state.gains.kp, state.gains.ki]);
   const key = about();
   if (key === mine.borderAsked) return;
-  mine.borderAsked = key;
-  mine.border = [];
+  Object.assign(mine, { borderAsked: key, border: [] });
   const { params, gains } = state;
-  for (let row = 0; row < ROWS && mine === now && key === about(); row += 1) {
-    const factor = FACTORS.value(row / (ROWS - 1));
-    const { result, values } = await stability({ params, gains: { ...gains, kd: damped(factor) }, setpoint: new Array(state.links).fill(0), integrator: "rk4", control_period: 0 });
-    if (result) mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
+  const setpoint = new Array(state.links).fill(0);
+  const ask = (factor) => ({ params, gains: { ...gains, kd: damped(factor) }, setpoint, integrator: "rk4" });
+  await climbRows(FACTORS, ROWS, ask, () => mine === now && key === about(), (factor, values) => {
+    mine.border.push({ factor, limit: values.control_period_limit ?? Infinity });
     surface.redraw();
-  }
+  });
 }
 
 async function measure() {

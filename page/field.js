@@ -136,7 +136,6 @@ export function numberField({ label, short = label, unit, low, high, log = false
     element: el("div", { class: "field" },
       el("label", { for: id, title: label }, el("span", { class: "visually-hidden" }, label), el("span", { "aria-hidden": "true" }, short)),
       track, input, el("span", { class: "unit" }, unit), said.element),
-    input,
     /** The runtime's value. Not shown while its own change is under way or somebody types. */
     accept(value) {
       if (value === accepted) return;
@@ -157,7 +156,6 @@ export function numberField({ label, short = label, unit, low, high, log = false
       }
       describe();
     },
-    value: () => accepted,
     report: said.report,
   };
 }

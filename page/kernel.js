@@ -11,7 +11,7 @@ export const isAlone = carried !== null;
 const LINKS = /(?:^|[?#&])links=([23])(?:&|$)/;
 
 /** @param {string} text base64 of gzip */
-async function unpack(text) {
+export async function unpack(text) {
   const packed = Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();

@@ -5,7 +5,6 @@ import { resetArm, takeBack } from "./actions.js";
 import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
 import { announce, byId, el, keepChoice, remembered } from "./dom.js";
 import { METHODS } from "./format.js";
-import { stepBy } from "./history.js";
 import { zoomPlots } from "./plots.js";
 import { cancelGoal, setIntegrator } from "./runtime.js";
 import { state } from "./store.js";
@@ -34,10 +33,9 @@ const shortcuts = [
   ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
   [" ", "pause or run", togglePause],
   [".", "single step", singleStep],
-  [",", "one recorded state back", () => stepBy(-1)],
   ["r", "reset", resetArm],
   ["z", "undo the last change", takeBack],
-  ["g", "cancel the goal", cancelGoal],
+  ["g", "cancel the target", cancelGoal],
   ["+", "plots: less time", () => zoomPlots(1)],
   ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],
@@ -85,7 +83,7 @@ function pressed(event) {
   const act = actions.get(key.length === 1 ? key.toLowerCase() : key);
   if (!act) return;
   event.preventDefault();
-  if (event.repeat && !["a", "d", "q", "e", ".", ","].includes(key.toLowerCase())) return;
+  if (event.repeat && !["a", "d", "q", "e", "."].includes(key.toLowerCase())) return;
   act();
 }
 

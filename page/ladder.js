@@ -41,7 +41,7 @@ const CLEAR = 4;
 /** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
 const FOLLOWED = 1e-3;
 
-/** A run's cell in the table: the error of the method, and with a controller the error of waiting. @param {Rung} rung */
+/** A run's cell in the table: the error of the method, and with a controller the error of the hold. @param {Rung} rung */
 export function errorText({ error, sampling, uncertainty, divergedAt }) {
   if (divergedAt !== null) return `diverged at ${significant(divergedAt, 3)} s`;
   if (error !== null) return `${significant(error, 2)}${sampling === null ? "" : ` + ${significant(sampling, 2)}`}`;
@@ -112,23 +112,21 @@ export function distances(run, reference) {
   });
 }
 
+/** From this distance on it is another motion [rad]. */
+const PARTED = 0.1;
+
 /** A line of the table. @param {Run} run @param {(number | null)[]} away @param {number} seconds */
 export function describeRun(run, away, seconds) {
   const ended = endOf(run.times, seconds, run.timestep);
   const gained = Number(run.energy.at(-1)) - Number(run.energy[0]);
+  const parts = run.times[away.findIndex((one) => Number(one) > PARTED)];
   const known = /** @type {number[]} */ (away.filter((one) => one !== null));
   return {
     name: shortName(run.method),
-    outcome: ended === null ? "lasts" : `diverged at t = ${fixed(ended, 2)} s`,
+    outcome: ended !== null ? `diverged at t = ${fixed(ended, 2)} s` : parts === undefined ? `within ${PARTED} rad` : `${PARTED} rad off from ${fixed(parts, 2)} s on`,
     energy: ended !== null ? "–" : `${significant(gained, 3)} J`,
     error: ended !== null || known.length === 0 ? "–" : `${significant(Math.max(...known), 3)} rad`,
     evaluations: significant(run.evaluations, 6),
     time: duration(run.wall_time),
   };
-}
-
-/** When runs have parted by more than `wanted` [rad] for the first time [s]; null if never. */
-export function partsAt(/** @type {number[]} */ times, /** @type {(number | null)[]} */ away, wanted = 0.1) {
-  const k = away.findIndex((one) => one !== null && one > wanted);
-  return k < 0 ? null : times[k];
 }

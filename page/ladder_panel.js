@@ -1,18 +1,17 @@
 // Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
 // Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
 
-import { Chart, DASHED, line, STRONG, TEXT } from "./chart.js";
+import { Chart, DASHED, line, STRONG, TEXT, write } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
 import { busy, option, panel } from "./field.js";
 import { duration, methodName, METHODS, shortName, significant } from "./format.js";
-import { cheapest, errorText, MOVE_TO, read, rungs, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
-import { rollout } from "./runtime.js";
+import { cheapest, errorText, stamp, TIMESTEPS, uncertaintyOf } from "./ladder.js";
 import { LogScale, powerOfTen } from "./scale.js";
 import { state, watch } from "./store.js";
+import { climb } from "./study.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 
-const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
 const SECONDS = 2;
 const INVITATION = "Runs this arm on one fixed move, with every method at eight timesteps, and compares each run with the exact motion.";
@@ -68,30 +67,6 @@ async function measure() {
   describe(about);
 }
 
-/**
- * Runs the ladder on the loop in force, a rung at a time; gives the refusal, if there is one.
- * @param {number} length [s] @param {() => boolean} isWanted whether to go on @param {(rung: Rung) => void} tell
- */
-export async function climb(length, isWanted, tell) {
-  const n = state.links;
-  const common = {
-    q0: new Array(n).fill(0), qdot0: new Array(n).fill(0), duration: length, params: state.params, samples: SAMPLES, reference: true,
-    ...(state.enabled ? { gains: state.gains, setpoint: MOVE_TO[n], control_period: state.period?.period ?? 0 } : {}),
-  };
-  for (const rung of rungs()) {
-    const args = { ...common, integrator: rung.method, timestep: rung.timestep };
-    const answer = await rollout(args);
-    if (!isWanted()) return "";
-    if (!answer.result) return answer.status;
-    // The shorter of two times: other work of the machine in between has no part in it.
-    const again = await rollout({ ...args, reference: false });
-    const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
-    if (!isWanted()) return "";
-    tell(read(rung, { ...answer.values, wall_time: wall }, length));
-  }
-  return "";
-}
-
 function describe(about) {
   const text = found.length > 0 ? `${inWords(cheapest(found, WANTED))} ${about}` : INVITATION;
   setText(byId("ladder-text"), text);
@@ -104,7 +79,7 @@ function describe(about) {
 /** @param {Rung[]} best of each method the cheapest run that is good enough */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const truths = controlled ? " Solid lines: what the method costs. Dashed: what the controller’s waiting costs; no method lowers it." : "";
+  const truths = controlled ? " Solid lines: what the method costs. Dashed: what the controller’s hold costs; no method lowers it." : "";
   if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${truths}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
@@ -124,7 +99,7 @@ const CROSS = 4;
 export function drawLadder({ context, width, height }, found) {
   const runs = found.filter(({ wall }) => wall > 0);
   const errors = runs.flatMap(({ error, sampling }) => [error ?? 0, sampling ?? 0]).filter((error) => error > 0);
-  if (errors.length === 0) return;
+  if (errors.length === 0) return write(context, "no measurement yet", width / 2, height / 2, "center");
   const chart = new Chart(context, width, height, LogScale.around(runs.map(({ wall }) => wall), 6, duration), LogScale.around(errors, 8, powerOfTen), ROOM);
   chart.frame({ across: "run time", up: "error [rad]" });
   METHODS.forEach(([method], i) => {

@@ -12,14 +12,14 @@ import { wake } from "./surface.js";
 import { startKeyboard } from "./keyboard.js";
 import { startLadder } from "./ladder_panel.js";
 import { startStability } from "./stability_panel.js";
-import { movePlots, redraw as redrawPlots, showValues, startPlots, startSave } from "./plots.js";
+import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
-import { follow, goLive, record, take } from "./history.js";
+import { record, take } from "./history.js";
 import { start } from "./runtime.js";
 import { watch, watchAll } from "./store.js";
 import { startTasks } from "./tasks_panel.js";
 import { startTheme } from "./theme.js";
-import { showHistory, startHistory, startTransport } from "./transport.js";
+import { startTransport } from "./transport.js";
 import { startShare, startTabs, startViews } from "./views.js";
 
 /** Plots and the trail change this often [ms], all in one frame; the arm itself moves in every frame. */
@@ -46,9 +46,7 @@ startTasks();
 startStability();
 startLadder();
 startCompare();
-startHistory();
 startActions();
-startSave();
 startKeyboard();
 startShare();
 startAim(byId("arm"));
@@ -63,13 +61,11 @@ if (matchMedia("(max-width: 779px)").matches) {
 /** Forgets the recording: a reset begins anew. */
 function forget() {
   record.clear();
-  goLive();
   redrawPlots();
 }
 
 watch("version", () => {
   take();
-  follow();
   if (hasMoved()) wake();
 });
 watch("links", forget);
@@ -87,7 +83,6 @@ function beat() {
   if (beats % FIGURES === 0) {
     showReadouts();
     showValues();
-    showHistory();
   }
   const now = performance.now();
   if (now - described >= SENTENCE_MS) {

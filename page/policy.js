@@ -22,11 +22,10 @@ const AFTER_DIVERGENCE = 0.5;
 /** A free swing that takes longer to double its energy loses its sense for other reasons first [s]. */
 const SLOW_GROWTH = 600;
 
-/** The question whose answer is about the loop in force: with the controller off that is the arm left to itself. */
+/** The loop in force, as the study is asked about it for one method at a time: with the controller off it is the arm left to itself. */
 export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
   if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
   return {
-    integrator: integrator.method,
     params,
     gains: enabled ? gains : noGains(links),
     ...(enabled && period?.period > 0 ? { control_period: period.period } : {}),
@@ -34,18 +33,18 @@ export function question(/** @type {any} */ { links, integrator, gains, params, 
   };
 }
 
-/** The study's answer, if it is about the loop in force; null while it is not. */
-export function answerInForce(/** @type {any} */ state) {
+/** The study's answer for a method, if it is about the loop in force; null while it is not. */
+export function answerInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
   const asked = question(state);
-  return asked && state.stability && state.stabilityAsked === JSON.stringify(asked) ? state.stability : null;
+  return asked && state.limits.loop === JSON.stringify(asked) ? state.limits.answers[method] ?? null : null;
 }
 
 /** Parts of a limit that are no news. */
 const NEWS = 0.05;
 
 /** Whether the motion has another limit than when the study was last asked: that limit changes as the arm moves. */
-export function motionHasChanged(/** @type {any} */ { stability, diagnostics }) {
-  const [then, now] = [stability?.timestep_limit_motion, diagnostics?.timestep_limit_motion];
+export function motionHasChanged(/** @type {any} */ answer, /** @type {any} */ diagnostics) {
+  const [then, now] = [answer?.timestep_limit_motion, diagnostics?.timestep_limit_motion];
   if (then === undefined || !(now > 0)) return false;
   return open(then) !== now && !(Math.abs(now / open(then) - 1) < NEWS);
 }
@@ -55,23 +54,26 @@ function open(served) {
   return served ?? Infinity;
 }
 
-/** The limit of the loop in force [s], and what pose or speed it is about. */
-export function limitInForce(/** @type {any} */ state) {
-  const answer = answerInForce(state);
+/** The limit of the loop in force with a method [s], and what pose or speed it is about. */
+export function limitInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
+  const answer = answerInForce(state, method);
   const free = state.enabled === false || (state.gains != null && isFree(state.gains));
   const { links } = state;
   if (!answer) return { limit: NaN, where: "", everyPose: NaN, advised: NaN };
   const diverged = state.diagnostics?.state === "diverged";
-  const held = free && doublingTime(state, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
+  const held = free && doublingTime(method, state.integrator.timestep, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
   const fast = diverged || state.integrator?.timestep > held;
-  const before = state.motion?.asked === state.stabilityAsked ? state.motion : null;
+  const before = state.limits.motions[method];
   // An arm that has diverged, or shakes, is fast because of that: its motion before that counts.
   const motion = fast ? before?.limit ?? Infinity : open(answer.timestep_limit_motion);
   const speed = fast ? before?.speed : answer.motion_speed;
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
-  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
-  const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
+  const places = {
+    setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, saddle: `where it falls to, ${named}`,
+    hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns", unstable: `at ${named}, where the gains themselves are at fault`,
+  };
+  const place = places[/** @type {keyof typeof places} */ (answer.equilibrium_kind ?? (free ? "hanging" : "setpoint"))];
   const moving = motion < held;
   const inForce = Math.min(held, motion);
   const usual = free ? SHARE * inForce : Math.min(afterReset(answer), SHARE * motion);
@@ -90,22 +92,21 @@ function heldLimit(/** @type {any} */ state, /** @type {any} */ answer) {
   return state.period?.period > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
 }
 
-/** The limits of all methods for the loop in force, of answers by method: the smaller of pose and motion [s]. @param {any} state @param {Record<string, any>} answers */
-export function limitsOf(state, answers) {
-  return Object.fromEntries(Object.entries(answers).map(([method, answer]) => {
-    const integrator = { ...state.integrator, method };
-    const asked = JSON.stringify(question({ ...state, integrator }));
-    const motion = state.motion && state.motion.asked === state.stabilityAsked && method === state.integrator?.method ? { ...state.motion, asked } : null;
-    return [method, limitInForce({ ...state, integrator, stability: answer, stabilityAsked: asked, motion }).limit];
-  }));
+/** Keeps an answer of the study about the loop in force, of which `asked` is the text. */
+export function keepAnswer(/** @type {any} */ state, /** @type {string} */ asked, /** @type {string} */ method, /** @type {any} */ answer) {
+  if (state.limits.loop !== asked) state.limits = { loop: asked, answers: {}, motions: {} };
+  const { answers, motions } = state.limits;
+  answers[method] = answer;
+  // A simulation that runs away is fast because of that, from the first answer on: the motion's limit is the one from before.
+  const isAway = state.diagnostics?.state === "diverged" || (state.enabled && state.integrator.timestep > open(answer?.timestep_limit_held));
+  if (answer && !isAway) motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
 }
 
 /**
- * By when Euler or midpoint double the energy of the fastest small free swing [s]; 0 for other methods and other loops.
+ * By when Euler or midpoint double the energy of the fastest small free swing, at a timestep [s]; 0 for other methods and other loops.
  * A step multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its angular frequency.
  */
-export function doublingTime(/** @type {any} */ state, /** @type {any} */ answer) {
-  const { method, timestep } = state.integrator ?? {};
+export function doublingTime(/** @type {string} */ method, /** @type {number} */ timestep, /** @type {any} */ answer) {
   if (answer?.timestep_limit_held !== 0 || !answer.critical || !["euler", "midpoint"].includes(method)) return 0;
   const z = timestep * 2 * Math.PI * answer.critical.frequency;
   return (Math.LN2 * timestep) / Math.log1p(method === "euler" ? z * z : z ** 4 / 4);
@@ -207,19 +208,17 @@ const BEYOND = 1.1;
 const FLIP = 2;
 const NEARLY = 0.99;
 
-/** @param {any} state @param {any} answer of the present method, null while it is not known @param {Limits} limits */
-export function whyText(state, answer, limits) {
-  const method = state.integrator?.method;
-  if (!answer || !(limits[method] >= 0)) return "";
+/** The reason for the limit of the present method; empty until the limits of all methods are known. */
+export function whyText(/** @type {any} */ state) {
+  const answers = METHODS.map(([method]) => answerInForce(state, method));
+  if (!answers.every(Boolean)) return "";
+  const limits = Object.fromEntries(METHODS.map(([method], i) => [method, open(answers[i].timestep_limit_held)]));
+  const { method } = state.integrator;
+  const answer = answerInForce(state, method);
   const limit = limits[method];
   if (state.enabled === false || isFree(state.gains)) return whyFree(answer, method, limit);
   if (limit === Infinity) return "";
-  if (limit === 0) {
-    return answer.equilibrium_kind === "unstable" || answer.timestep_limit_continuous === 0
-      ? "Why: these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
-      : "Why: nothing damps the arm here, and a torque that is kept for a step comes a little late. Raise the derivative gains.";
-  }
-  return `Why ${duration(limit)}: ${cause(answer)} ${others(limits)}`;
+  return limit === 0 ? `Why: ${cause(answer, limit)}` : `Why ${duration(limit)}: ${cause(answer, limit)} ${others(limits)}`;
 }
 
 /** @param {any} answer @param {string} method @param {number} limit */
@@ -229,13 +228,18 @@ function whyFree({ critical }, method, limit) {
   return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings have a smaller limit.`;
 }
 
-/** The motion that grows first beyond the smallest limit of all poses. @param {any} answer */
-export function cause({ critical, minimum_over_poses_held: least }) {
+/** What limits a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
+export function cause({ critical, minimum_over_poses_held: least, equilibrium_kind, timestep_limit_continuous }, limit) {
+  if (limit === 0) {
+    return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
+      ? "these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
+      : "nothing damps the arm here, and a torque that is held for a step comes a little late. Raise the derivative gains.";
+  }
   if (!critical || !(least > 0)) return "beyond it a deviation grows.";
   const joint = `joint ${critical.joint + 1}`;
   const percent = significant(100 * (critical.growth_per_step - 1), 2);
   const flips = critical.frequency * FLIP * BEYOND * least > NEARLY;
-  if (flips) return `${joint} is the fastest. A torque that is kept longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
+  if (flips) return `${joint} is the fastest. A torque that is held longer overshoots: 10 % beyond the limit the deviation flips at every step and grows by ${percent} %.`;
   return `a swing of ${joint} at ${significant(critical.frequency, 3)} Hz grows first: the torque comes too late and drives it. A higher derivative gain damps it.`;
 }
 

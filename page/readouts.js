@@ -4,7 +4,6 @@
 import { byId, setAttribute, setText } from "./dom.js";
 import { fixed, significant } from "./format.js";
 import { endEffector } from "./arm_view.js";
-import { shown } from "./history.js";
 import { answerInForce, doublingTime, limitInForce, limitText, verdict } from "./policy.js";
 import { isAlone } from "./kernel.js";
 import { LOOP, state, watch } from "./store.js";
@@ -24,9 +23,9 @@ export function startReadouts() {
 /** Called a few times a second. */
 export function showReadouts() {
   const diagnostics = state.connection === "open" ? state.diagnostics : null;
-  setText(byId("sim-time"), fixed(shown.time, 2));
+  setText(byId("sim-time"), fixed(state.time, 2));
   setText(byId("run-state"), runState());
-  setAttribute(byId("run-state"), "class", `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`);
+  setAttribute(byId("run-state"), "class", `state ${diagnostics?.state === "diverged" ? "diverged" : ""}`);
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);
@@ -34,7 +33,6 @@ export function showReadouts() {
 
 function runState() {
   if (state.connection !== "open") return "no connection";
-  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, 1/${fixed(1 / shown.speed, 0)} speed` : "recording";
   if (state.diagnostics?.state === "diverged") return "diverged";
   return state.paused ? "paused" : "running";
 }
@@ -61,7 +59,8 @@ function showLimit() {
 
 /** How fast a small free swing gains energy. */
 function growthText() {
-  const seconds = doublingTime(state, answerInForce(state));
+  const { method, timestep } = state.integrator;
+  const seconds = doublingTime(method, timestep, answerInForce(state));
   return seconds > 0 ? `The energy of a small swing doubles every ${significant(seconds, 2)} s.` : "";
 }
 

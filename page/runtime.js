@@ -2,18 +2,17 @@
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
 import { announce, warn } from "./dom.js";
+import { METHODS } from "./format.js";
 import { Kernel, isAlone } from "./kernel.js";
 import { latestOnly } from "./latest.js";
-import { motionHasChanged, question } from "./policy.js";
+import { answerInForce, keepAnswer, motionHasChanged, question } from "./policy.js";
 import { Rosbridge } from "./rosbridge.js";
-import { MOST_LINKS, set, state, tell, watch } from "./store.js";
+import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
 
 /** Other clients change settings too, and no topic tells of it. */
 const POLL_MS = 1000;
-/** A trajectory may be on its way to the arm while diagnostics from before it still arrive. */
+/** A trajectory that came so lately is newer than what other messages say of the setpoint; the next diagnostics are right again. */
 const TRAJECTORY_MS = 400;
-/** So long after our own reset the clock's jump is taken to be its. */
-const OWN_RESET_MS = 2000;
 /** A picture that stands still needs few joint states [ms between two]. */
 const STILL_MS = 1000;
 /** One that nobody sees needs more: they are recorded, and a swing must be known by them when somebody looks again. */
@@ -22,8 +21,6 @@ const HIDDEN_MS = 100;
 const TOUCHED_MS = 300;
 /** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
-/** A joint state is as old as this at most when it arrives. */
-const LATENESS_MS = 40;
 /** Setpoints may come many a second; the study is asked about the latest. */
 const STABILITY_MS = 200;
 /** Radius within which a goal counts as reached, unless it says otherwise [m]; the runtime's own default. */
@@ -31,7 +28,6 @@ export const DEFAULT_EPSILON = 0.02;
 
 let bridge;
 let lastTrajectory = -Infinity;
-let lastReset = -Infinity;
 let touched = -Infinity;
 let onReset = () => {};
 let beforeChange = () => {};
@@ -83,8 +79,7 @@ function connection(now) {
   if (now === "open") {
     // It may be another runtime, or the same one started anew: nothing of the old one holds.
     state.setpointKnown = false;
-    set("stability", null);
-    state.motion = null;
+    set("limits", nothingAsked());
     set("goal", null);
     set("trial", null);
     poll();
@@ -105,15 +100,12 @@ function jointStates(msg) {
   } else if (time === state.time && same(msg, n)) {
     return; // a paused arm says the same sixty times a second
   }
-  // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose. A trajectory may have come
-  // since: after our own reset's answer, or, as far as the new clock tells, after somebody else's.
+  // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose.
   if (time < state.time) {
-    const now = performance.now();
-    const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
-    if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
+    if (noTrajectoryOfLate()) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
-    state.motion = null;
-    if (state.stability) askNow(question(state));
+    state.limits.motions = {};
+    if (answerInForce(state)) askNow();
     set("goal", null);
     onReset();
   }
@@ -148,6 +140,10 @@ function trajectory(msg) {
   keepSetpoint(positions);
 }
 
+function noTrajectoryOfLate() {
+  return performance.now() - lastTrajectory > TRAJECTORY_MS;
+}
+
 function keepSetpoint(positions) {
   if (state.setpointKnown && positions.every((q, i) => q === state.setpoint[i])) return;
   state.setpoint.set(positions);
@@ -167,8 +163,7 @@ function diagnostics(msg) {
     if (status.name === "arm_sim") {
       for (const key of Object.keys(values)) report[key] = key === "state" ? values[key] : told(values[key]);
       const setpoint = values.setpoint ? JSON.parse(values.setpoint) : [];
-      const late = performance.now() - lastTrajectory > TRAJECTORY_MS;
-      if (late && setpoint.length === state.links && setpoint.every(Number.isFinite)) keepSetpoint(setpoint);
+      if (noTrajectoryOfLate() && setpoint.length === state.links && setpoint.every(Number.isFinite)) keepSetpoint(setpoint);
       report.level = status.level;
       report.message = status.message;
     }
@@ -177,7 +172,7 @@ function diagnostics(msg) {
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
   keep("diverged", report.state === "diverged");
-  if (motionHasChanged(state) && question(state)) askNow(question(state));
+  if (motionHasChanged(answerInForce(state), report)) askNow();
   if (before === report.state) return;
   poll(); // another client may have done what led here
   if (report.state === "diverged") warn(`The simulation has ${report.message}`);
@@ -258,7 +253,6 @@ export async function step(steps) {
 export async function reset() {
   const answer = await bridge.call("/arm_sim/reset");
   if (answer.result) {
-    lastReset = performance.now();
     touch();
     keepSetpoint(new Array(state.links).fill(0));
   }
@@ -302,27 +296,24 @@ export function sendSetpoint(positions) {
   });
 }
 
-/** Asks about the loop in force, unless its answer is there; computing takes a while, so only the newest question counts. */
-const askNow = latestOnly(async (asked) => {
-  const answer = await bridge.call("/study/stability", asked);
-  state.stabilityAsked = answer.result ? JSON.stringify(asked) : "";
-  keepMotion(answer.result ? answer.values : null);
-  set("stability", answer.result ? answer.values : null);
-}, STABILITY_MS);
-
-/** A simulation that runs away is fast because of that: the motion's limit is the one from before. */
-function keepMotion(answer) {
-  if (!answer || state.diagnostics?.state === "diverged" || state.motion?.asked === state.stabilityAsked) return;
-  // Under a controller that shakes, the motion is the shaking's from the first answer on.
-  if (state.enabled && state.integrator.timestep > (answer.timestep_limit_held ?? Infinity)) return;
-  state.motion = { asked: state.stabilityAsked, limit: answer.timestep_limit_motion ?? Infinity, speed: answer.motion_speed };
-}
-
-/** The study's answer to a question of the page. */
+/** The study's answer about any loop. */
 export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
 
+/** Asks about the loop in force with each method, the present one first; computing takes a while, so only the newest loop counts. */
+const askNow = latestOnly(async () => {
+  const loop = question(state);
+  if (!loop) return;
+  const asked = JSON.stringify(loop);
+  const present = state.integrator?.method;
+  for (const [method] of METHODS.toSorted(([one], [other]) => Number(other === present) - Number(one === present))) {
+    const { result, values } = await stability({ ...loop, integrator: method });
+    if (JSON.stringify(question(state)) !== asked) return;
+    keepAnswer(state, asked, method, result ? values : null);
+    tell("limits");
+  }
+}, STABILITY_MS);
+
+/** Asks unless the answer is there. */
 function askStability() {
-  const asked = question(state);
-  if (!asked || !bridge.open || (state.stability && state.stabilityAsked === JSON.stringify(asked))) return;
-  askNow(asked);
+  if (question(state) && bridge.open && !answerInForce(state)) askNow();
 }

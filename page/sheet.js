@@ -75,7 +75,7 @@ function sheet(params, gains, answers, link) {
       row("Longest timestep in every pose, Runge–Kutta 4", limitText(answers.rk4.minimum_over_poses_held ?? Infinity)),
       ...METHODS.map(([method, name]) => row(`Error of a move of ${MOVE} s at ${1e3 * AT} ms, ${name}`, answers[method].error === null ? "too small to measure, or diverged" : `${significant(answers[method].error, 2)} rad`)),
     )),
-    el("p", {}, reason(answers.rk4, period, gains)),
+    el("p", {}, `Reason: ${period === Infinity ? "nothing limits this arm." : cause(answers.rk4, period)}`),
     ...(period === 0 ? [] : [el("p", {}, others(Object.fromEntries(METHODS.map(([method]) => [method, least(answers[method])]))))]),
     el("p", { class: "sheet-link" }, "This arm as a link: ", el("a", { href: link }, link)),
     el("div", { class: "buttons no-print" }, el("button", { type: "button", onclick: () => print() }, "Print")),
@@ -90,10 +90,4 @@ function least(answer) {
 /** A refusal in the words of the form: "kd of joint 1 must be a number". @param {string} status */
 function plain(status) {
   return status.replace(/\b(?:gains|params)\.(\w+)(?:\[(\d)\])?/g, (_, name, i) => i === undefined ? name : `${name.replace(/s$/, "")} ${Number(i) + 1}`).replace(/, got null$/, "");
-}
-
-/** @param {any} answer @param {number} period @param {{ki: number[]}} gains */
-export function reason(answer, period, { ki }) {
-  if (period === 0) return `Reason: these gains do not hold the arm, however often the controller looks. Raise the derivative gains${ki.some((one) => one > 0) ? " or lower the integral gains" : ""}.`;
-  return !answer.critical || period === Infinity ? "Reason: nothing limits this arm." : `Reason: ${cause(answer)}`;
 }

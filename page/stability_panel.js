@@ -1,6 +1,6 @@
-// What limits the timestep. On each method's button its limit; in the panel Stability the reason, and the map: gains against
-// timestep, where the loop with held efforts is stable and where not, the present point in it; a click goes there, and so do the
-// arrow keys. And a small push, in speed, of the loop in force, step by step.
+// What limits the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of the
+// loop in force, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot. A click
+// or an arrow key moves the dot, and with it the settings.
 // Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown. The boundary is
 // drawn as far as it is known; a click sends what it shows. The bars are a run of the runtime's own at the present timestep.
 
@@ -10,10 +10,11 @@ import { shrinks } from "./course.js";
 import { byId, el, setText } from "./dom.js";
 import { duration, methodName, METHODS } from "./format.js";
 import { latestOnly } from "./latest.js";
-import { answerInForce, factorOf, limitsOf, limitText, question, scaled, whyText } from "./policy.js";
-import { rollout, setGains, setIntegrator, stability } from "./runtime.js";
+import { answerInForce, factorOf, limitInForce, limitText, question, scaled, whyText } from "./policy.js";
+import { setGains, setIntegrator } from "./runtime.js";
 import { LogScale } from "./scale.js";
 import { LOOP, state, watch } from "./store.js";
+import { climbRows, deviation, LOOKS } from "./study.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
@@ -28,7 +29,7 @@ const timesteps = new LogScale(1e-4, 0.1);
 let map;
 let chart;
 let mapAsked = ""; // the settings that `rows` are about
-/** Limits with held efforts and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
+/** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
 let rows = [];
 /** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
 let anchor = null;
@@ -37,7 +38,7 @@ export function startStability() {
   startLimits();
   const canvas = byId("map");
   map = new Surface(canvas, drawStability);
-  watch(["integrator", "gains", "params", "setpoint", "stability", "enabled", "tab", "links"], () => map.redraw());
+  watch(["integrator", "gains", "params", "setpoint", "limits", "enabled", "tab", "links"], () => map.redraw());
   canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
   canvas.addEventListener("keydown", byArrows);
   bars = new Surface(byId("push-bars"), () => drawBars(bars, heights, "step"));
@@ -53,7 +54,7 @@ function mapSettings() {
   return { method: integrator.method, gains: anchor, params, pose };
 }
 
-/** Asks the study for the border, a row at a time; a new question ends the old one. */
+/** Asks the study for the border; a new question ends the old one. */
 async function askBorder() {
   const present = mapSettings();
   if (!present) return;
@@ -62,17 +63,12 @@ async function askBorder() {
   mapAsked = key;
   rows = [];
   const { params, method: integrator, pose: setpoint } = present;
-  while (rows.length < ROWS) {
-    const factor = factors.value(rows.length / (ROWS - 1));
-    const { result, values } = await stability({ params, integrator, setpoint, gains: scaled(present.gains, factor), control_period: 0 });
-    if (mapAsked !== key) return;
-    if (!result) {
-      mapAsked = ""; // mapAsked again at the next news
-      return;
-    }
+  const ask = (factor) => ({ params, integrator, setpoint, gains: scaled(present.gains, factor) });
+  await climbRows(factors, ROWS, ask, () => mapAsked === key, (factor, values) => {
     rows.push({ factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
     map.redraw();
-  }
+  });
+  if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next news
 }
 
 function drawStability() {
@@ -88,10 +84,9 @@ function drawStability() {
 function describeMap() {
   const row = rows[Math.round(factors.place(factorOf(state.gains, anchor)) * (ROWS - 1))];
   if (!row || !state.integrator) return;
-  const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
-  setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.limit)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
-    + `Higher gains need a smaller timestep, and gains that are too low hold the arm at none. The dot is the arm${state.enabled ? "" : " once the controller is on"}; click to go elsewhere.`);
+  setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
+    + `Higher gains need a smaller timestep; gains that are too low never hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to go elsewhere.`);
 }
 
 function goTo(left, top) {
@@ -121,8 +116,6 @@ function byArrows(event) {
   moveTo(timesteps.within(state.integrator.timestep * step[0]), factors.within(factor));
 }
 
-const PUSH_SPEED = 1e-6; // rad/s
-const STEPS = 14;
 const ASK_MS = 60;
 
 let bars;
@@ -138,27 +131,21 @@ function lookAtPush() {
   push({ loop, key });
 }
 
-/** The same run with the push and without it: their difference is the deviation. */
 const push = latestOnly(async ({ loop, key }) => {
-  const n = state.links;
-  const { timestep } = state.integrator;
-  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(n).fill(0);
-  const common = { ...loop, timestep, setpoint: loop.setpoint ?? rest, duration: STEPS * timestep, samples: STEPS + 1 };
-  const [still, pushed] = [await rollout({ ...common, q0: rest }), await rollout({ ...common, q0: rest, qdot0: rest.map((_, i) => (i === n - 1 ? PUSH_SPEED : 0)) })];
-  if (key !== pushAsked || !still.result || !pushed.result) return;
-  heights = pushed.values.velocities.slice(1).map((row, k) => row[n - 1] - (still.values.velocities[k + 1]?.[n - 1] ?? 0));
-  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${STEPS} steps.`);
+  const { method: integrator, timestep } = state.integrator;
+  const rest = answerInForce(state)?.equilibrium ?? loop.setpoint ?? new Array(state.links).fill(0);
+  const found = await deviation({ setpoint: rest, ...loop, integrator, timestep }, rest, timestep);
+  if (key !== pushAsked || !found) return;
+  heights = found;
+  setText(byId("push-text"), `${state.enabled ? "The controller’s loop" : "The free arm"} at ${duration(timestep)}: the push ${shrinks(heights) ? "dies away" : "does not die away"} within ${LOOKS} steps.`);
   bars.redraw();
 }, ASK_MS);
 
 /** @type {Map<string, HTMLElement>} */
 const labels = new Map();
-/** Answers by method. @type {Record<string, any>} */
-let answers = {};
-let loopAsked = ""; // the question that they answer, without its method
 
 function startLimits() {
-  watch(LOOP, lookAtLoop);
+  watch(LOOP, showLimits);
   byId("why").addEventListener("click", () => {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
@@ -172,40 +159,10 @@ export function limitLabel(method) {
   return label;
 }
 
-function lookAtLoop() {
-  const asked = question(state);
-  const now = asked ? JSON.stringify({ ...asked, integrator: "" }) : "";
-  if (now !== loopAsked) {
-    loopAsked = now;
-    answers = {};
-  }
-  const own = answerInForce(state);
-  const method = state.integrator?.method;
-  if (own && answers[method] !== own) {
-    answers[method] = own;
-    askOthers(now);
-  }
-  showLimits();
-}
-
-/** Asks about the other methods, one at a time, each time the study has answered about the present one. */
-const askOthers = latestOnly(async (mine) => {
-  for (const [method] of METHODS) {
-    if (method === state.integrator?.method || mine !== loopAsked) continue;
-    const answer = await stability({ ...JSON.parse(mine), integrator: method });
-    if (mine !== loopAsked || !answer.result) continue;
-    answers[method] = answer.values;
-    showLimits();
-  }
-}, 0);
-
 function showLimits() {
-  const limits = limitsOf(state, answers);
-  for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
-  const known = METHODS.every(([method]) => method in limits);
-  const held = Object.fromEntries(Object.entries(answers).map(([method, one]) => [method, one.timestep_limit_held ?? Infinity]));
-  const why = known ? whyText(state, answerInForce(state), held) : "";
+  for (const [method, label] of labels) setText(label, limitText(limitInForce(state, method).limit));
+  const why = whyText(state);
   setText(byId("why-text"), why);
   // It stays while limits are computed anew, so that a click on its way meets it.
-  if (known || !question(state)) byId("why").hidden = why === "";
+  if (METHODS.every(([method]) => answerInForce(state, method)) || !question(state)) byId("why").hidden = why === "";
 }

@@ -3,6 +3,11 @@
 
 export const MOST_LINKS = 3;
 
+/** Limits before the study has answered. */
+export function nothingAsked() {
+  return { loop: "", answers: {}, motions: {} };
+}
+
 export const state = {
   connection: "connecting", // or "open", "lost"
   links: 0, // 0 until the runtime has said
@@ -23,9 +28,9 @@ export const state = {
   enabled: null, // is PID on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
-  stability: null, // values of /study/stability
-  stabilityAsked: "", // the question that they answer; see `policy.js`
-  motion: null, // { asked, limit, speed }: the motion's limit as first served for a question since the last reset [s, rad/s]
+  // What /study/stability says of the loop in force: the loop as asked (see `policy.js`), and for each method the values, and the
+  // motion's limit and speed as first served since the last reset [s, rad/s].
+  limits: nothingAsked(),
   pushed: false, // whether an effort has acted with the controller off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
@@ -38,7 +43,7 @@ const watchers = new Map(); // key -> functions
 const everything = []; // functions
 
 /** What the verdict on the loop in force depends on. */
-export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "stability"];
+export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "limits"];
 
 /** @param {string | string[]} keys @param {(value: any) => void} react */
 export function watch(keys, react) {

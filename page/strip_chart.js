@@ -2,13 +2,17 @@
 // is a dot; one colour per joint.
 // Invariant: rows are read where they stand in the history. They draw on whatever context they are given.
 
-import { Chart, DASHED } from "./chart.js";
-import { between, firstAfter, POSITION, record, TIME, VELOCITY } from "./history.js";
+import { Chart, circle, DASHED } from "./chart.js";
+import { ENERGY, firstAfter, KINETIC, POSITION, POTENTIAL, record, TIME, VELOCITY } from "./history.js";
 import { Axis, LOG_END, times } from "./scale.js";
-import { MOST_LINKS } from "./store.js";
 import { colors } from "./theme.js";
 
-/** @typedef {{column: number, dashed?: boolean, color?: string}} Series of each joint, or one in a colour of its own */
+/** @typedef {{column: number, dashed?: boolean, color?: string, name?: string}} Series of each joint, or one in a colour of its own with its name */
+
+/** @type {Series[]} */
+export const ENERGIES = [
+  { column: KINETIC, color: "kinetic", name: "kinetic" }, { column: POTENTIAL, color: "potential", name: "potential" }, { column: ENERGY, color: "ink", name: "total" },
+];
 
 /** The smallest and the largest number in columns of the rows from `first` to before `last`. @param {number[]} columns @returns {[number, number]} */
 function extent(columns, first, last) {
@@ -23,6 +27,9 @@ function extent(columns, first, last) {
   }
   return [min, max];
 }
+
+/** Room for the name of a line [px]. */
+const NAME = 64;
 
 export class StripChart {
   /** @param {Series[]} series @param {number} least smallest span of the vertical axis @param {number} sane beyond it the scale is logarithmic */
@@ -48,7 +55,8 @@ export class StripChart {
     const [min, max] = extent(lines.map(({ column }) => column), first, last);
     this.axis.fit(level < min ? level : min, level > max ? level : max);
     const leftAt = this.leftAt(lines, first, last);
-    const chart = new Chart(context, width, height, times(this.from, now), this.axis);
+    const named = lines.filter(({ name }) => name);
+    const chart = new Chart(context, width, height, times(this.from, now), this.axis, named.length > 0 ? { top: 18 } : {});
     this.chart = chart;
     chart.frame();
     const { data } = record;
@@ -60,6 +68,7 @@ export class StripChart {
       chart.upright(leftAt, colors.bad);
       chart.upright(cursor, colors.accent);
     });
+    named.forEach(({ name, color }, i) => chart.words(name, chart.left + NAME * i, 8, "left", color, chart.font));
     if (!this.axis.log) return;
     const end = Number.isFinite(leftAt) ? `, beyond 1e12 from ${leftAt.toFixed(2)} s` : "";
     chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);
@@ -87,20 +96,11 @@ export class StripChart {
 const PIECES = 5;
 /** Beyond it the scales are logarithmic [rad, rad/s]. */
 const SANE = 300;
-/** Points of the path are about so far from each other, but for an arm that shakes [px]. */
-const NEAR = 4;
-const MOST_POINTS = 6;
-/** A way so short is drawn with the next one [px]. */
-const UNSEEN = 0.05;
-
-const q = new Float64Array(MOST_LINKS);
-const v = new Float64Array(MOST_LINKS);
 
 export class PhasePlot {
   constructor() {
     this.across = new Axis(4, 0.5, SANE);
     this.axis = new Axis(4, 0.5, SANE);
-    this.chart = /** @type {Chart | null} */ (null);
   }
 
   /** @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number}} what */
@@ -111,37 +111,24 @@ export class PhasePlot {
     this.across.fit(...extent(joints.map((joint) => POSITION + joint), first, last));
     this.axis.fit(...extent(joints.map((joint) => VELOCITY + joint), first, last));
     const chart = new Chart(context, width, height, this.across, this.axis, { right: 10, top: 8, bottom: 30 });
-    this.chart = chart;
     chart.frame({ across: "position [rad]" });
     const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
-    chart.inside(() => { for (const joint of joints) this.drawPath(context, joint, first, last, at); });
+    if (last - 1 > first) chart.inside(() => { for (const joint of joints) drawPath(chart, joint, first, last - 1, record.at(at)); });
   }
+}
 
-  drawPath(context, joint, first, last, at) {
-    const { data } = record;
-    const { chart } = this;
-    const rows = last - 1 - first;
-    for (let piece = 0; piece < PIECES && rows > 0; piece += 1) {
-      chart.begin(colors.joints[joint], { width: 1.5, alpha: (piece + 1) / PIECES });
-      const to = first + Math.floor(((piece + 1) * rows) / PIECES);
-      for (let i = first + Math.floor((piece * rows) / PIECES); i < to; i += 1) this.extend(context, joint, record.at(i), record.at(i + 1));
-      chart.end();
-    }
-    const row = record.at(at) + joint;
-    if (rows > 0) chart.dot(data[row + POSITION], data[row + VELOCITY], colors.joints[joint]);
+/** A path through the rows from `first` to `last` that fades towards the past, and a dot at the row that begins at `dot`. */
+function drawPath(chart, joint, first, last, dot) {
+  const x = (row) => chart.x(record.data[row + POSITION + joint]);
+  const y = (row) => chart.y(record.data[row + VELOCITY + joint]);
+  const color = colors.joints[joint];
+  let from = first;
+  for (let piece = 1; piece <= PIECES; piece += 1) {
+    const to = first + Math.floor((piece * (last - first)) / PIECES);
+    chart.begin(color, { width: 1.5, alpha: piece / PIECES });
+    for (let i = from; i <= to; i += 1) chart.context.lineTo(x(record.at(i)), y(record.at(i)));
+    chart.end();
+    from = to;
   }
-
-  /** From the row at `a` to the one at `b`, on the way that the replay shows. */
-  extend(context, joint, a, b) {
-    const { data } = record;
-    const { chart } = this;
-    const [across, up] = [chart.x(data[b + POSITION + joint]), chart.y(data[b + VELOCITY + joint])];
-    const way = Math.abs(across - chart.x(data[a + POSITION + joint])) + Math.abs(up - chart.y(data[a + VELOCITY + joint]));
-    if (way < UNSEEN) return;
-    const points = Math.min(MOST_POINTS, Math.ceil(way / NEAR) || 1);
-    for (let point = 0; point <= points; point += 1) {
-      between(a, b, data[a + TIME] + (point / points) * (data[b + TIME] - data[a + TIME]), q, v);
-      context.lineTo(chart.x(q[joint]), chart.y(v[joint]));
-    }
-  }
+  circle(chart.context, x(dot), y(dot), 4, color);
 }

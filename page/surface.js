@@ -1,8 +1,8 @@
 // When to draw: a frame is asked for only if something has changed, and painters say whether they need one more. And a canvas as
 // sharp as the screen: sized in device pixels, drawn in CSS pixels, painted in the next frame after something of it has changed.
 // Invariant: with nothing to show, no frame is asked for; a page that is paused or hidden draws nothing. A canvas's size is read when
-// it changes, not at every frame. It is opaque and has a pixel for each of the screen's that it covers, so that a frame of it is
-// copied to the screen, neither blended nor resampled.
+// it changes, not at every frame. A canvas is opaque and has a pixel for each pixel of the screen that it covers: the browser copies it,
+// and neither blends nor resamples.
 
 import { colors, onTheme } from "./theme.js";
 

@@ -29,8 +29,8 @@ function startGoal() {
   text = el("p", { class: "note", id: "goal-text" });
   goalSaid = panel(byId("goal-body"), Object.values(fields), [
     // The runtime names the fields that are missing.
-    ["Send goal", () => goalSaid.report(sendGoal({ x: fields.x.number(), y: fields.y.number(), ...goalOptions() })), { type: "submit", class: "primary" }],
-    ["Cancel goal", () => goalSaid.report(cancelGoal())],
+    ["Send target", () => goalSaid.report(sendGoal({ x: fields.x.number(), y: fields.y.number(), ...goalOptions() })), { type: "submit", class: "primary" }],
+    ["Cancel target", () => goalSaid.report(cancelGoal())],
   ], text);
   watch("links", (links) => { fields.phi.element.hidden = links < 3; });
   watch("goal", showGoal);
@@ -63,7 +63,7 @@ function showGoal(goal) {
   if (!goal) setText(text, "Drag in the view, or type a place for the end effector.");
   else if (goal.outcome === "active") setText(text, `On the way: ${fixed(goal.distance, 3)} m left, ${fixed(goal.elapsed, 1)} s.`);
   else if (goal.outcome === "reached") setText(text, `Reached, ${fixed(goal.distance * 1000, 1)} mm from the target.`);
-  else setText(text, "Given up: another goal, a cancellation or a reset took its place.");
+  else setText(text, "Given up: another target, a cancellation or a reset took its place.");
 }
 
 // The timed trial
@@ -108,7 +108,7 @@ function showTrial(trial) {
   byId("trial-progress").value = trial.duration > 0 ? Math.min(1, trial.elapsed / trial.duration) : 0;
   setText(byId("trial-error"), trial.error == null ? "" : `${fixed(trial.error, 3)} m to go`);
   const waits = trial.running && trial.action_status === "preempted";
-  setText(byId("trial-note"), waits ? "Another goal took over: skip to go on." : trial.running && state.enabled === false ? "The controller is off: nothing will be reached." : "");
+  setText(byId("trial-note"), waits ? "Another target took over: skip to go on." : trial.running && state.enabled === false ? "The controller is off: nothing will be reached." : "");
   if (wasRunning && !trial.running) announce(`Trial over: ${count}.`);
   wasRunning = trial.running;
 }
@@ -118,7 +118,7 @@ function showTrial(trial) {
 const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
 
-const pushEffort = option({ label: "effort", unit: "N m", value: PUSH_EFFORT });
+const pushEffort = option({ label: "torque", unit: "N m", value: PUSH_EFFORT });
 const pushSeconds = option({ label: "for", unit: "s", value: PUSH_SECONDS });
 let pushSaid;
 

@@ -1,7 +1,7 @@
 // The way of the end effector through the last seconds, fading towards the past.
-// Invariant: between two states it goes where the replay shows the arm: no polygon while the arm can be followed, and never out of reach.
+// Invariant: between two states it is a curve while the arm can be followed, else a straight line; it never leaves the reach.
 
-import { POSITION, TIME, between, firstAfter, record } from "./history.js";
+import { POSITION, between, firstAfter, record } from "./history.js";
 import { joints } from "./mechanics.js";
 import { MOST_LINKS } from "./store.js";
 import { colors } from "./theme.js";
@@ -16,7 +16,6 @@ const TURN = 0.15;
 const FAR = Math.PI;
 
 const q = new Float64Array(MOST_LINKS);
-const v = new Float64Array(MOST_LINKS);
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
 
@@ -47,7 +46,7 @@ function extend(context, n, lengths, px, py, i) {
   for (let k = 0; k < n; k += 1) turned += Math.abs(data[b + POSITION + k] - data[a + POSITION + k]);
   const points = turned < FAR ? Math.ceil(turned / TURN) || 1 : 1;
   for (let point = 0; point <= points; point += 1) {
-    between(a, b, data[a + TIME] + (point / points) * (data[b + TIME] - data[a + TIME]), q, v);
+    between(a, b, point / points, q);
     joints(n, q, lengths, x, y);
     context.lineTo(px(x[n]), py(y[n]));
   }

@@ -1,18 +1,14 @@
-// Under the arm: pause, single step and reset; the recording's controls: scrub, step, replay in slow motion, back to live, and the
-// stopwatch; and what is said there: the verdict on the timestep, warnings, divergence.
-// Invariant: a notice offers what can be done about it, and goes when its cause is gone. The recording's controls move what is shown,
-// never the arm.
+// Under the arm: pause, single step and reset; and what is said there: the verdict on the timestep, warnings, divergence.
+// Invariant: a notice offers what can be done about it, and goes when its cause is gone.
 
 import { beginAnew, recover, resetArm } from "./actions.js";
 import { switchController, takeSuggestion } from "./controls.js";
-import { announce, byId, el, setAttribute, setText, warn } from "./dom.js";
+import { announce, byId, el, setText, warn } from "./dom.js";
 import { refusal } from "./field.js";
 import { duration, fixed } from "./format.js";
-import { advance, goLive, halt, play, seek, shown, span, stepBy } from "./history.js";
 import { limitInForce, verdict } from "./policy.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
-import { onFrame, wake } from "./surface.js";
 
 /** Below this real-time factor a warning of the runtime is about its pace. */
 const SLOW = 0.95;
@@ -35,7 +31,7 @@ export function startTransport() {
 }
 
 export function togglePause() {
-  return said.report(pause(!state.paused));
+  return setPaused(!state.paused);
 }
 
 export function setPaused(paused) {
@@ -100,78 +96,4 @@ function choose() {
 function whenOf(message) {
   const time = /t = ([\d.e-]+) s/.exec(message);
   return time ? ` at t = ${fixed(Number(time[1]), 3)} s` : "";
-}
-
-/** How far back a replay begins [s]. */
-const REPLAY_SECONDS = 5;
-const SCRUB_STEPS = 1000;
-
-let lastFrame = NaN;
-let watchFrom = NaN; // simulation time at which the stopwatch was started
-let watchTo = NaN; // and stopped
-
-export function startHistory() {
-  byId("history-play").addEventListener("click", () => {
-    if (shown.playing) halt();
-    else play(speed(), REPLAY_SECONDS);
-    wake();
-  });
-  byId("history-speed").addEventListener("change", () => { shown.speed = speed(); });
-  byId("history-back").addEventListener("click", () => stepBy(-1));
-  byId("history-on").addEventListener("click", () => stepBy(1));
-  byId("history-live").addEventListener("click", goLive);
-  byId("watch").addEventListener("click", stopwatch);
-  byId("history-scrub").addEventListener("input", ({ target }) => {
-    const all = span();
-    if (!all) return;
-    shown.playing = false;
-    const part = Number(target.value) / SCRUB_STEPS;
-    if (part === 1) goLive();
-    else seek(all.from + part * (all.to - all.from));
-  });
-  watch("playback", showHistory);
-  onFrame(playOn);
-}
-
-function speed() {
-  return Number(byId("history-speed").value);
-}
-
-/** Gives whether it plays on. */
-function playOn(now) {
-  const seconds = Number.isFinite(lastFrame) ? (now - lastFrame) / 1000 : 0;
-  lastFrame = shown.playing ? now : NaN;
-  advance(seconds);
-  return shown.playing;
-}
-
-/** A few times a second, and whenever the recording is touched. */
-export function showHistory() {
-  const all = span();
-  const scrub = byId("history-scrub");
-  const part = shown.live || !all || all.to === all.from ? 1 : (shown.time - all.from) / (all.to - all.from);
-  scrub.value = String(Math.round(part * SCRUB_STEPS));
-  setAttribute(scrub, "aria-valuetext", shown.live ? "live" : `${fixed(shown.time, 2)} s, ${fixed(state.time - shown.time, 2)} s ago`);
-  byId("history-live").disabled = shown.live;
-  setText(byId("history-play"), shown.playing ? "Hold" : "Replay");
-  byId("stage").classList.toggle("recording", !shown.live);
-  showStopwatch();
-}
-
-function stopwatch() {
-  const time = shown.time;
-  if (Number.isNaN(watchFrom)) watchFrom = time;
-  else if (Number.isNaN(watchTo)) watchTo = time;
-  else {
-    watchFrom = NaN;
-    watchTo = NaN;
-  }
-  showStopwatch();
-}
-
-function showStopwatch() {
-  const runs = Number.isFinite(watchFrom);
-  byId("watch-hud").hidden = !runs;
-  setText(byId("watch"), !runs ? "Stopwatch" : Number.isNaN(watchTo) ? "Stop" : "Clear");
-  if (runs) setText(byId("watch-hud"), `stopwatch ${fixed((Number.isNaN(watchTo) ? shown.time : watchTo) - watchFrom, 3)} s`);
 }

@@ -1,5 +1,5 @@
-// The two views of the page, Course and Workbench, the panels beside the arm as tabs, the full screen, the number of links; and
-// the settings in the page's address, behind the #, to be sent to others.
+// The two views of the page, Course and Workbench; the panels beside the arm as tabs; the full screen; the number of links. And links
+// to share: the settings are in the page's address, behind the #.
 // Invariant: a view only shows and hides; the arm and all settings are the same in both. Opening an address changes nothing; its
 // settings wait for a click. Any page can link here, and a link must not be able to drive the arm.
 

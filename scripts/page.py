@@ -34,13 +34,15 @@ def packed(data):
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def modules(name, done):
+def modules(name, done, above=()):
     """The module and all that it imports, those before it, each as a function that gives its exports."""
+    if name in above:
+        raise SystemExit(f"page.py: a circle of imports, {' '.join(above)} {name}")
     if name in done:
         return ""
     done.add(name)
     text = (PAGE / name).read_text()
-    before = "".join(modules(other, done) for _, other in IMPORT.findall(text))
+    before = "".join(modules(other, done, (*above, name)) for _, other in IMPORT.findall(text))
     imported = lambda found: f'const {{{found[1].replace(" as ", ": ")}}} = pendularm["{found[2]}"];\n'
     body = EXPORT.sub(r"\1\2", IMPORT.sub(imported, text))
     if re.search(r"^(import|export)\b", body, re.M):

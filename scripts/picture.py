@@ -34,7 +34,7 @@ def take():
         page.run("import('/runtime.js').then((arm) => arm.sendSetpoint([0.9, -1.3]))")
         page.click("#tab-stability")
         page.until("/^stable$/m.test(document.body.innerText)", why="the limit is known")
-        page.until("/The dot is the arm;/.test(document.querySelector('#stability').innerText)", why="the servo is on")
+        page.until("/The dot is the arm\\./.test(document.querySelector('#stability').innerText)", why="the controller is on")
         page.until("document.querySelector('#push-text').textContent.includes('dies away')", why="the push")
         # The map is refined while one looks; it is whole once it has not changed for two seconds.
         page.run("""(() => { let last = '', since = 0; window.rests = () => {

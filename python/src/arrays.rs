@@ -53,8 +53,7 @@ pub(crate) fn property<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Held<'p
     read_only(values.to_pyarray(py))
 }
 
-/// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
-/// row.
+/// Numbers in an array of any shape. Contiguous doubles, row by row, stay in the caller's memory.
 pub(crate) struct Numbers<'py> {
     field: String,
     array: PyReadonlyArrayDyn<'py, f64>,

@@ -69,11 +69,11 @@ impl Divergence {
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
 /// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`,
-/// `verlet` or `rk4`; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each, and what
-/// is left out of it is as in a fresh runtime. The controller runs once per `control_period` [s], rounded to a whole
-/// number of timesteps, at least 1, and its effort is held in between. With `control_delay` it is applied one period
-/// later. Threads may share one. It can be neither copied nor pickled, and a process that is forked while another
-/// thread steps it must not use it.
+/// `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each. A gain
+/// that is not given has the value of a fresh runtime. The controller runs once per `control_period` [s], rounded to a
+/// whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is applied one period
+/// later. Threads may share one. It can be neither copied nor pickled. A process that is forked while another thread
+/// steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
@@ -213,8 +213,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Adds `effort` [N m], (links,), to that of every step that begins within `duration` [s] from now, in place of
-    /// what was added so far. With the controller off, this is all the effort there is.
+    /// Adds `effort` [N m], (links,), to the controller's in every step that begins within `duration` [s] from now. It
+    /// replaces an earlier disturbance. With the controller off it is the whole effort.
     fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: Real) -> PyResult<()> {
         let duration = fields::number("duration", duration, Bound::Positive)?;
         for_either!(Either, &self.own, one => {
@@ -408,8 +408,8 @@ impl Simulation {
         })
     }
 
-    /// The place at which a step led out of the finite numbers, if one did since the reset; from
-    /// there on no step is taken.
+    /// The step whose result would not have been finite, if there was one since the reset. The simulation takes no
+    /// step after it.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
         for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {

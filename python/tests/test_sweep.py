@@ -362,7 +362,7 @@ def test_a_cluster_that_loses_a_worker_midway_answers_the_same(cluster, tmp_path
     client, workers = cluster
 
     def slowly(run):
-        # So that the worker that is lost has a piece under way, and others are left, also where it is lost late.
+        # The lost worker then has a piece under way, and others are left, even if it is lost late.
         time.sleep(0.3)
         return np.abs(run.positions[-1] - run.setpoint).max(axis=1)
 

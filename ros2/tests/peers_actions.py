@@ -210,6 +210,6 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
         assert one.joint_names == ["joint1", "joint2"] and len(one.actual.positions) == 2, one
         # For other robots; in CDR they are there all the same.
         assert not one.multi_dof_joint_names and not one.multi_dof_error.transforms, one
-    # A path ends within 0.05 rad of its goal, but perhaps not at rest; a hundredth is what a goal must reach above.
+    # A path ends within 0.05 rad of its goal, but perhaps not at rest. The goal above must be reached to 0.01 rad.
     wait_for("the end of the path", lambda: all(abs(a - b) < 0.01 for a, b in zip(states[-1].position, goal)))
     return len(told)

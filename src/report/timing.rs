@@ -1,7 +1,7 @@
 //! The only clock of the study: how long a computation takes, as the minimum of repeats with their spread.
 //!
-//! Other work of the machine can only make a run longer, so the minimum is the best estimate of the computation itself;
-//! the quartiles say how noisy the machine was. Source: Chen and Revels, *Robust benchmarking in noisy environments*
+//! Other work of the machine can only make a run longer, so the minimum is the best estimate of the computation itself.
+//! The quartiles show how noisy the machine was. Source: Chen and Revels, *Robust benchmarking in noisy environments*
 //! (2016), arXiv:1608.04295.
 //!
 //! **Invariant:** one untimed run comes first, nothing is compared, counted or written while the clock runs.

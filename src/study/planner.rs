@@ -6,8 +6,8 @@
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //! | the same with a control period that is given | the loop whose law runs once a period: holding is none |
 //!
-//! The truth is followed with ever smaller steps, or, for an arm left to itself, within ever smaller tolerances, until
-//! two truths agree to a part of the allowed error. Then each method is run beside the truth, as the live arm runs it.
+//! The truth is computed with smaller and smaller steps, until two truths agree to a part of the allowed error. For a
+//! free arm the tolerance becomes smaller instead. Then each method is run beside the truth, as the live arm runs it.
 //! The fewest steps are searched ([`StepSearch`]) with which it stays within the rest of the error after each of them.
 //! The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A run that
 //! could only be dearer than another is not made.

@@ -5,7 +5,7 @@
 //!
 //! `P(λ) = λ² I + S + M⁻¹ (Kp + λ Kd + Ki/λ)`
 //!
-//! whose columns alone are large where a joint's gains are, so that elimination keeps the other digits. Aberth's rule
+//! A joint with large gains makes only its own column large, so that elimination keeps the other digits. Aberth's rule
 //! brings all zeros of `det P` to their own last digits at once. It is Newton's rule on `log det P` with the other
 //! zeros divided out, so that no two guesses come to the same zero:
 //!

@@ -27,7 +27,7 @@ pub const ASSETS: &[Asset] = assets! {
     "history.js" "kernel.js" "keyboard.js" "ladder.js" "ladder_panel.js" "latest.js" "main.js"
     "mechanics.js" "pencil.js" "plots.js" "policy.js" "readouts.js" "rosbridge.js" "runtime.js"
     "scale.js" "scenes.js" "settings.js" "sheet.js" "stability_panel.js" "store.js"
-    "strip_chart.js" "surface.js" "tasks_panel.js" "theme.js" "trail.js"
+    "strip_chart.js" "study.js" "surface.js" "tasks_panel.js" "theme.js" "trail.js"
     "transport.js" "views.js"
 };
 

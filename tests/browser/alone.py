@@ -11,23 +11,16 @@ from runtime import Runtime
 
 FILE = pathlib.Path(os.environ.get("PAGE", "pendularm.html")).resolve()
 
-# Calls past the page: the answers have ids that the page does not know.
-CALL = """new Promise((done) => {
-  const kernel = pendularm["kernel.js"].Kernel.current, before = kernel.onmessage, id = `test-${Math.random()}`;
-  kernel.onmessage = (event) => {
-    const frame = JSON.parse(event.data);
-    if (frame.op === "service_response" && frame.id === id) { kernel.onmessage = before; done(frame); } else before(event);
-  };
-  kernel.send(JSON.stringify({ op: "call_service", id, service: %s, args: %s }));
-})"""
-# The next message of a topic to which the page has subscribed.
-NEXT = """new Promise((done) => {
+# Waits for a frame of the kernel, after sending one; the page hears both, and ignores answers to ids that it does not know.
+HEAR = """new Promise((done) => {
   const kernel = pendularm["kernel.js"].Kernel.current, before = kernel.onmessage;
   kernel.onmessage = (event) => {
     before(event);
     const frame = JSON.parse(event.data);
-    if (frame.op === "publish" && frame.topic === %s) { kernel.onmessage = before; done(frame.msg); }
+    if (Object.entries(%s).every(([key, value]) => frame[key] === value)) { kernel.onmessage = before; done(frame); }
   };
+  const sent = %s;
+  if (sent) kernel.send(JSON.stringify(sent));
 })"""
 
 
@@ -51,7 +44,11 @@ class Alone(Runtime):
         return f"{FILE.as_uri()}?links={self.links}"
 
     def call(self, service, **args):
-        return self.page.run(CALL % (json.dumps(service), json.dumps(args)))
+        return self.hear({"op": "service_response", "id": "test"}, {"op": "call_service", "id": "test", "service": service, "args": args})
 
     def next(self, topic):
-        return self.page.run(NEXT % json.dumps(topic))
+        """The next message of a topic to which the page has subscribed."""
+        return self.hear({"op": "publish", "topic": topic})["msg"]
+
+    def hear(self, wanted, sent=None):
+        return self.page.run(HEAR % (json.dumps(wanted), json.dumps(sent)))

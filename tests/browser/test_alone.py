@@ -20,9 +20,7 @@ class AloneTest(PageTest):
         native = pathlib.Path(os.environ["RUNS"]).read_text()
         self.assertEqual(len(native.splitlines()), 32)
         ours = self.page.run("""(async () => {
-          const packed = Uint8Array.from(atob(document.querySelector("#kernel-module").textContent), (one) => one.charCodeAt(0));
-          const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-          const bytes = await new Response(stream).arrayBuffer();
+          const bytes = await (await own("kernel.js")).unpack(document.querySelector("#kernel-module").textContent);
           const { instance } = await WebAssembly.instantiate(bytes, { env: { milliseconds: () => performance.now() } });
           const { memory, compare, output } = instance.exports;
           const length = compare();

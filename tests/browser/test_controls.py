@@ -197,9 +197,10 @@ class Controls(PageTest):
         self.page.fill(f"#compare-form {NUMBER}", "7")  # 5 s have no whole number of such steps
         self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
         self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 30, "played to its end")
-        picture = self.image("#compare-arm")
-        for method in (1, 2, 3, 4):
-            self.assertGreater(picture.count(self.color(f"method{method}"), 60), 20, f"method {method}")
+        for picture in ("arm", "chart"):
+            image = self.image(f"#compare-{picture}")
+            for method in (1, 2, 3, 4):
+                self.assertGreater(image.count(self.color(f"method{method}"), 60), 20, f"method {method} in {picture}")
         rows = self.page.run("[...document.querySelectorAll('#compare-table tbody tr')].map((row) => [...row.cells].map((one) => one.textContent))")
         self.assertEqual([row[0] for row in rows], ["Euler", "Midpoint", "Verlet", "RK 4"])
         # The same run by itself, with the runtime's own reference.
@@ -265,7 +266,7 @@ class Controls(PageTest):
         for _ in range(120):
             self.page.key("Tab")
             seen.add(self.page.run("document.activeElement.id"))
-        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "controller", "plot-save", "tab-plots", "defaults", "history-scrub"} - seen
+        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "controller", "plot-save", "tab-plots", "defaults"} - seen
         self.assertEqual(missing, set())
 
     # Links to share

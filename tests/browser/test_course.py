@@ -53,7 +53,7 @@ class Tasks(CourseTest):
         self.done("the tip has arrived")
         self.answer("It sets them to zero")
         self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Not that one')")
-        self.answer("It keeps the torques as they are")
+        self.answer("It holds the torques as they are")
         self.page.until("document.querySelector('#course-question .note').textContent.startsWith('Right.')")
 
     def test_the_mark_comes_after_the_guess_and_the_shaking(self):

@@ -81,7 +81,7 @@ class Desktop(Access, Steady, PageTest):
         return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
 
     def test_the_first_screen_holds_the_arm_its_settings_and_a_panel(self):
-        for selector in ("#arm", "#notice", "#transport", "#history", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
+        for selector in ("#arm", "#notice", "#transport", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
             self.assertLessEqual(self.box(selector)[3], 900, selector)
         for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#push-bars")):
             self.tab(panel)

@@ -115,9 +115,9 @@ fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
     }
 }
 
-/// Largest difference between effort and gravity load, in parts of the load \[1\], from the first instant on at which
-/// the arm is within tolerance and slower than 0.01 rad/s. A load under a tenth of that of the stretched arm counts as
-/// that.
+/// Largest difference between effort and gravity load, in parts of the load \[1\]. It counts from the first instant at
+/// which the arm is within tolerance and slower than 0.01 rad/s. The load counts as at least a tenth of the stretched
+/// arm's.
 fn ringing(arm: Arm<3>, free: u64, setpoint: [f64; 3]) -> f64 {
     let mut simulation = Simulation::new(arm, Gains::default());
     simulation.advance(free);

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, limitInForce, limitsOf, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
+import { answerInForce, controlPeriodLimit, doublingTime, energyName, factorOf, isFree, keepAnswer, limitInForce, motionHasChanged, noGains, periodText, question, scaled, verdict, whyText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -14,9 +14,10 @@ function arm(changed = {}) {
   const state = {
     connection: "open", links: 2, enabled: true, setpointKnown: true, setpoint: Float64Array.of(0.9, -1.3, 0),
     integrator: { method: "rk4", timestep: 0.001 }, params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
-    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false }, diagnostics: { state: "running" }, stability: VALUES, ...changed,
+    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, period: { period: 0, effective_period: 0.001, delay: false }, diagnostics: { state: "running" }, ...changed,
   };
-  return { ...state, stabilityAsked: changed.stabilityAsked ?? JSON.stringify(question(state)) };
+  const { answers = { [state.integrator.method]: changed.stability ?? VALUES }, motions = {} } = changed;
+  return { ...state, limits: { loop: JSON.stringify(question(state)), answers, motions } };
 }
 
 test("the question with the controller off is about the arm left to itself", () => {
@@ -66,7 +67,7 @@ test("who shakes beyond the limit, or has diverged, is fast because of that: the
 });
 
 test("the study is asked again once the motion has another limit", () => {
-  const changed = (then, now) => motionHasChanged({ stability: { timestep_limit_motion: then }, diagnostics: { timestep_limit_motion: now } });
+  const changed = (then, now) => motionHasChanged({ timestep_limit_motion: then }, { timestep_limit_motion: now });
   assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));
   assert.ok(!changed(0.004, 0.0041) && !changed(null, Infinity) && !changed(0.004, NaN) && !changed(undefined, 0.004));
 });
@@ -123,27 +124,42 @@ const FREE = {
 const swing = (method, timestep, changed = {}) => arm({ enabled: false, integrator: { method, timestep }, stability: FREE, ...changed });
 
 test("after a divergence the motion's limit from before counts, and the advice is never what diverged", () => {
-  const asked = swing("verlet", 0.1).stabilityAsked;
   const wild = { ...FREE, timestep_limit_motion: 1e-150, motion_speed: 1e150 };
   const diverged = { diagnostics: { state: "diverged", message: "" }, stability: wild };
-  const known = swing("verlet", 0.1, { ...diverged, motion: { asked, limit: 0.0488, speed: 16.4 } });
+  const known = swing("verlet", 0.1, { ...diverged, motions: { verlet: { limit: 0.0488, speed: 16.4 } } });
   assert.deepEqual([limitInForce(known).limit, verdict(known).kind], [0.0488, "diverged"]);
   assert.equal(verdict(known).advised, 0.8 * 0.0488);
   assert.match(verdict(known).sentence, /100 ms is above the limit 48\.8 ms, moving at 16\.4 rad\/s/);
-  const unknown = swing("verlet", 0.1, { ...diverged, motion: null });
+  const unknown = swing("verlet", 0.1, diverged);
   assert.equal(verdict(unknown).advised, 0.05);
 });
 
+test("the motion's limit is kept as first served, and none of an arm that has run away", () => {
+  const state = swing("verlet", 0.1, { answers: {} });
+  const { loop } = state.limits;
+  keepAnswer(state, loop, "verlet", FREE);
+  keepAnswer(state, loop, "verlet", { ...FREE, timestep_limit_motion: 0.01 });
+  assert.equal(state.limits.motions.verlet.limit, 0.0488);
+  state.diagnostics = { state: "diverged" };
+  keepAnswer(state, loop, "rk4", { ...FREE, timestep_limit_motion: 1e-150 });
+  assert.equal(state.limits.motions.rk4, undefined);
+  const shaking = arm({ integrator: { method: "rk4", timestep: 0.02 } });
+  keepAnswer(shaking, shaking.limits.loop, "rk4", VALUES);
+  assert.deepEqual(shaking.limits.motions, {});
+  keepAnswer(state, "another loop", "rk4", FREE);
+  assert.deepEqual(Object.keys(state.limits.answers), ["rk4"]);
+});
+
 test("a button's limit counts the motion, whatever the method", () => {
-  const limits = limitsOf(swing("verlet", 0.001), { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } });
-  assert.deepEqual(limits, { verlet: 0.0488, rk4: 0.0762 });
+  const state = swing("verlet", 0.001, { answers: { verlet: FREE, rk4: { ...FREE, timestep_limit_held: 0.393, timestep_limit: 0.393, timestep_limit_motion: 0.0762 } } });
+  assert.deepEqual(["verlet", "rk4", "euler"].map((method) => limitInForce(state, method).limit), [0.0488, 0.0762, NaN]);
 });
 
 test("Midpoint's free swing gains energy so slowly that the motion is the limit, Euler's does not", () => {
   const grows = { ...FREE, timestep_limit_held: 0, timestep_limit: 0 };
   assert.equal(limitInForce(swing("midpoint", 0.001, { stability: grows })).limit, 0.0488);
   assert.equal(limitInForce(swing("euler", 0.001, { stability: grows })).limit, 0);
-  assert.ok(Math.abs(doublingTime(swing("euler", 0.001), grows) - 13.5) < 0.1);
+  assert.ok(Math.abs(doublingTime("euler", 0.001, grows) - 13.5) < 0.1);
 });
 
 test("with a control period of its own the timestep has its own limit", () => {
@@ -161,33 +177,36 @@ const SERVED = {
 };
 const ALIKE = { euler: 0.004419, midpoint: 0.004316, verlet: 0.004316, rk4: 0.004316 };
 
+/** The reason with an answer of the study, and each method's limit. */
+const why = (answer, limits, changed = {}) => whyText(arm({ answers: Object.fromEntries(Object.entries(limits).map(([method, limit]) => [method, { ...answer, timestep_limit_held: limit }])), ...changed }));
+
 test("a deviation that flips at every step is named with its joint and its growth", () => {
-  const text = whyText(arm(), SERVED, ALIKE);
-  assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is kept longer overshoots: .* flips at every step and grows by 21 %/);
+  const text = why(SERVED, ALIKE);
+  assert.match(text, /^Why 4\.32 ms: joint 2 is the fastest\. A torque that is held longer overshoots: .* flips at every step and grows by 21 %/);
   assert.match(text, /A better method does not help/);
 });
 
 test("a swing is named by its frequency, and methods with a longer limit by their names", () => {
   const swing = { ...SERVED, critical: { growth_per_step: 1.01, frequency: 3.66, joint: 0 } };
-  const text = whyText(arm(), swing, { ...ALIKE, euler: 0.001 });
+  const text = why(swing, { ...ALIKE, euler: 0.001 });
   assert.match(text, /a swing of joint 1 at 3\.66 Hz/);
   assert.match(text, /Midpoint, Verlet, Runge–Kutta 4: stable up to 4\.32 ms/);
 });
 
 test("the free arm is damped by nothing, and Euler adds to every swing", () => {
-  const euler = arm({ enabled: false, integrator: { method: "euler", timestep: 0.001 } });
-  assert.match(whyText(euler, SERVED, { ...ALIKE, euler: 0 }), /Every step of Euler adds a little to each swing/);
+  const euler = { enabled: false, integrator: { method: "euler", timestep: 0.001 } };
+  assert.match(why(SERVED, { ...ALIKE, euler: 0 }, euler), /Every step of Euler adds a little to each swing/);
 });
 
 test("where the gains themselves are at fault no method is blamed", () => {
   const none = { euler: 0, midpoint: 0, verlet: 0, rk4: 0 };
-  assert.match(whyText(arm(), { ...SERVED, timestep_limit_continuous: 0 }, none), /any method and any timestep/);
-  assert.match(whyText(arm(), SERVED, none), /nothing damps the arm here/);
+  assert.match(why({ ...SERVED, timestep_limit_continuous: 0 }, none), /any method and any timestep/);
+  assert.match(why(SERVED, none), /nothing damps the arm here/);
 });
 
 test("nothing is said of a loop that is not known", () => {
-  assert.equal(whyText(arm(), null, ALIKE), "");
-  assert.equal(whyText(arm(), SERVED, {}), "");
+  assert.equal(why(SERVED, { rk4: 0.004316 }), "", "the other methods are asked about");
+  assert.equal(whyText({ ...arm(), gains: null }), "");
 });
 
 // Gains

@@ -94,9 +94,9 @@ fn a_stalled_process_catches_up_a_quarter_of_a_second_and_drops_the_rest() {
     });
 }
 
-/// At a timestep of 1e-8 s no machine keeps up. Were each call to bring 5 ms of steps of its own, these 5120 would take
-/// more than 25 s; while only wake-ups step, they take a second or two. Several callers, so that a wake-up has more
-/// than one call to answer where processors are busy and each goes to and fro slowly.
+/// At a timestep of 1e-8 s no machine keeps up. If each call caused 5 ms of steps, these 5120 calls would take more
+/// than 25 s. While only wake-ups step, they take a second or two. There are several callers: on a busy machine a
+/// wake-up then has more than one call to answer.
 #[test]
 fn calls_to_an_arm_that_cannot_keep_up_do_not_each_cost_a_wake_up() {
     let runtime = Runtime::start();

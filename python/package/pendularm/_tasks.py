@@ -126,7 +126,7 @@ class Reach(Task):
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
         drawn = np.array([one.uniform(0.0, 1.0, self.links + 2) for one in random])
-        # Every part of the disc that is not within a twentieth of its edge is as likely as any other of the same area.
+        # Uniform over the disc, but for the outer twentieth of its radius.
         distance = 0.95 * self.reach * np.sqrt(drawn[:, 0])
         bearing = 2 * np.pi * drawn[:, 1]
         self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)

@@ -1,7 +1,7 @@
 //! Many arms at once, with NumPy arrays in and out.
 //!
-//! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write.
-//! An array of doubles that is handed in is read where it lies, if they lie side by side and can be written.
+//! The arrays that show the arms are made once and written in place. Users have read-only views of them.
+//! A contiguous, writable array of doubles from the user is read without a copy.
 //!
 //! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
 
@@ -47,13 +47,13 @@ enum Either {
 
 /// Many arms, advanced in whole steps; each is a `Simulation`, to the bit, whatever the number of threads.
 ///
-/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and
-/// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
-/// handed in has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous doubles are read without a
-/// copy, if they can be written. `threads` share the work, as many as there are cores unless given, and fewer where the
-/// system has no more of them; with 1 the caller does it alone. Calls that change one batch from several threads wait
-/// for each other; all that shows the arms may be read meanwhile, and shows how far each of them is. A batch can be
-/// neither copied nor pickled, and a process that is forked while another thread steps it must not use it.
+/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
+/// made once and overwritten by every call that changes the arms. Copy values that you need later. An array argument
+/// has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read without a
+/// copy. `threads` share the work: by default as many as there are cores, and fewer if the system allows no more. With
+/// 1 the caller's thread does the work. Calls that change one batch from several threads wait for each other. The
+/// arrays can be read meanwhile, and show the present state of each arm. A batch can be neither copied nor pickled. A
+/// process that is forked while another thread steps the batch must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {

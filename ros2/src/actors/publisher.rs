@@ -1,7 +1,7 @@
 //! A topic of the arm's in the graph: JSON in, CDR out.
 //!
-//! **Invariant:** the arm is asked for a topic's messages only while somebody in the graph wants them, or if who comes
-//! late gets the last one.
+//! **Invariant:** the bridge subscribes to a topic of the arm only while the graph has a subscriber for it, or if late
+//! subscribers get the last message.
 
 use actix::prelude::*;
 use pendularm::protocol::catalog::Topic;

@@ -1,8 +1,8 @@
 //! Error against cost: the same scenes for every method, each against one reference.
 //!
 //! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration. A run
-//! takes any number of equal steps. Its error is the largest, over joints and over its steps (or [`MOST_LOOKS`] or so
-//! of them), of the angles' distances to the reference, which is known at any instant. Cost is counted in evaluations
+//! takes any number of equal steps. Its error is the largest distance of a joint to the reference, over all steps, or
+//! about [`MOST_LOOKS`] of them. The reference is known at any instant. Cost is counted in evaluations
 //! of the dynamics here. For seconds, time [`Scene::replay`], which takes the same steps and does no more.
 //!
 //! **Invariant:** nothing is chosen per method: same starts, same timesteps, same reference, same measure.

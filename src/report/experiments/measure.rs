@@ -2,9 +2,9 @@
 //!
 //! Held control runs through [`Simulation`], the live loop; control in every stage through [`ContinuousLoop`], where
 //! the method steps the arm and its law as one system. Stable means that the deviation decays. "Did it overflow?" would
-//! be the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. And decay is judged
-//! by energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose; single joints may well move
-//! further off for a while, as others come back.
+//! be the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. Decay is judged by
+//! energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose. A single joint may move further off
+//! for a while.
 //!
 //! **Invariant:** no prediction enters but the equilibrium and a timestep to start the search from.
 
@@ -44,8 +44,8 @@ const HALVINGS: u32 = 15;
 /// Widenings of the search interval before the search is given up.
 const WIDENINGS: u32 = 12;
 
-/// The largest timestep \[s\] at which a deviation of the loop decays, searched around `guess`; `None` if none within
-/// some thousandfold of it divides what decays from what does not.
+/// The largest timestep \[s\] at which a deviation of the loop decays, searched around `guess`. `None` if no timestep
+/// within a factor of about a thousand separates decay from growth.
 #[must_use]
 pub fn measured_limit<const N: usize>(
     control: &ControlLoop<N>,

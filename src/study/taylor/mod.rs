@@ -1,8 +1,8 @@
 //! An arm followed to rounding or within a tolerance: under constant efforts in doubles, and for the report's
 //! references under any drive and in more digits.
 //!
-//! Its motion is expanded in a power series (`series.rs`); a step is as long as the last terms of it are small, and
-//! the series as long as the step. Positions and velocities are summed with compensation.
+//! Its motion is a power series (`series.rs`). A step is so short that the last terms of the series are small.
+//! Positions and velocities are summed with compensation.
 //!
 //! **Invariant:** it computes the motion differently from every method under study, and the work of a span is bounded.
 
@@ -357,8 +357,8 @@ impl<const N: usize> TaylorReference<N> {
         self.taylor.begin(span);
     }
 
-    /// Goes on with the span until there have been so many `coefficients` in all, or some more; none while it is not
-    /// over, `false` if it could not be followed.
+    /// Continues the span until it has computed `coefficients` in all, or a few more. `None` while it is not over,
+    /// `false` if the motion could not be followed.
     pub(super) fn go_on(
         &mut self,
         arm: &Arm<N>,

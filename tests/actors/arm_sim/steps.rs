@@ -52,8 +52,8 @@ fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
     });
 }
 
-/// With a timestep that no machine can follow every wake-up works for its 5 ms of real time. The 12 ticks of 0.2 s
-/// would make that 0.06 s in all; a wake-up after every breather of a millisecond (two, by the timer's grain) 0.5 s or
+/// With a timestep that no machine can follow every wake-up works for its 5 ms of real time. With the 12 ticks of 0.2 s
+/// alone that is 0.06 s in all. With a wake-up after every pause of a millisecond (two, by the timer) it is 0.5 s or
 /// more.
 #[test]
 fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {

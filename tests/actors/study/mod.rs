@@ -1,7 +1,7 @@
 //! The node `study`: here what its tests are made of, a client, an arm with settings of its own and the pool's bench.
 //!
-//! The node is asked as another node asks it; a client's calls are here where it is meant what is made of their fields,
-//! and how an answer is written.
+//! Most tests ask the node as another node does. Tests of how fields are read and how an answer is written send a
+//! client's calls.
 
 mod arm;
 mod predictions;

@@ -95,8 +95,8 @@ proptest! {
             return Ok(());
         };
         let away = turn(now, forward(&lengths, &q).orientation).abs();
-        // The scan may step over arcs narrower than its grain, so that what it finds is an upper bound; that the answer
-        // is admissible at all is what the hand's place shows.
+        // The scan may miss arcs that are narrower than its step, so its distance is an upper bound. The place of the
+        // end effector shows that the answer is admissible.
         if let Some(scanned) = scanned {
             prop_assert!(away <= scanned + 1e-12, "{away} although {scanned} would do");
             if scanned == 0.0 {

@@ -18,9 +18,9 @@ use serde_json::Value;
 /// Error that contract and oracle allow in a round trip, as a share of the sum of the lengths.
 const ROUND_TRIP: f64 = 1e-9;
 
-/// Error of the closed form on targets that are not moved onto a boundary: a dozen roundings of the wrist, the
-/// angles and their sines, each 2⁻⁵³ of a quantity no larger than the sum of the lengths or than π, and 1e-15 that is
-/// lost before when an orientation is asked for a whole turn away.
+/// Error of the closed form on targets that are not moved onto a boundary. The wrist, the angles and their sines take a
+/// dozen roundings, each 2⁻⁵³ of at most the sum of the lengths or π. An orientation a whole turn away loses 1e-15
+/// more.
 const INTERIOR: f64 = 4e-15;
 
 fn oracle(kind: &str) -> Vec<Value> {

@@ -47,8 +47,8 @@ proptest! {
 #[test]
 fn targets_are_as_likely_everywhere_in_the_reachable_plane() {
     // Mean of the squared distance: half way between the squares of the edges, if area is what counts. Its standard
-    // error over n draws is (b² - a²) / √(12 n), the mean bearing's 2π / √(12 n); five of each never happen by chance,
-    // and would not happen at all with a fixed seed.
+    // error over n draws is (b² - a²) / √(12 n). That of the mean bearing is 2π / √(12 n). A deviation of five standard
+    // errors does not happen by chance, and the seed is fixed.
     const DRAWS: u32 = 40_000;
     let lengths = [1.0, 0.6];
     let (least, greatest) = (0.4 + 0.05 * 1.2, 1.6 - 0.05 * 1.2);

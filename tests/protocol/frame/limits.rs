@@ -15,9 +15,8 @@ fn a_frame_of_exactly_the_limit_is_taken() {
     assert!(read(stream.as_bytes().chunks(4093)) == [frame(&text), frame("{}")]);
 }
 
-/// Frames one byte and a lot beyond the limit, ended by their brackets or by a newline, whole and in pieces; also one
-/// with brackets and a newline's escape in the part that is skipped, and one in which something else goes wrong behind
-/// the limit.
+/// Frames one byte and a lot beyond the limit, whole and in pieces. Brackets or a newline end them. One has brackets
+/// and an escaped newline in the part that is skipped. Another has a second fault behind the limit.
 #[test]
 fn a_longer_frame_gets_one_error_and_is_skipped_to_where_it_would_have_ended() {
     let filler = |length: usize| "x".repeat(length);

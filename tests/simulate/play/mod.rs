@@ -1,5 +1,5 @@
-//! The course of one seed: clients come, do what they do while faults and hostile clients come between, then all of
-//! that ends and everything that is owed must come, then all leave and nothing must be left.
+//! The course of one seed. Clients connect and work, among faults and hostile clients. Then faults and hostile clients
+//! end, and every answer that is due must arrive. Then all clients leave, and nothing may remain.
 
 mod faults;
 mod looks;

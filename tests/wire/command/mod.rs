@@ -1,5 +1,5 @@
-//! The commands that ask a running one: what each prints, in YAML and in JSON, what it says where the runtime refuses,
-//! and how it ends where there is nobody to ask or where a server means harm.
+//! The commands that contact a running arm: their output in YAML and in JSON, and their errors when the runtime
+//! refuses. They end properly when no server listens, and when the server is hostile.
 
 mod calls;
 mod diagnostics;

@@ -1,10 +1,10 @@
 //! Reference motions: the same arm, another derivation, twice the digits, and a bound on their own error.
 //!
-//! An error, in the report, is a distance to one of these. A motion is expanded by the study's Taylor integrator in
-//! double-double arithmetic from the equation of motion ([`ReferenceMotion::of`]), twice with different order and
-//! tolerance; the distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant,
-//! or its effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of
-//! the methods in the same arithmetic: their truncation error without rounding.
+//! An error, in the report, is a distance to one of these. The study's Taylor integrator computes a motion from the
+//! equation of motion, in double-double arithmetic ([`ReferenceMotion::of`]). It does so twice, with different order
+//! and tolerance. The distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every
+//! instant, or its effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the
+//! steps of the methods in the same arithmetic: their truncation error without rounding.
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 

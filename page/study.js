@@ -1,0 +1,60 @@
+// Questions to the study that take several calls: the ladder of errors, a column of limits, a push.
+// Invariant: the live arm stays as it is; nothing is told that is no longer wanted.
+
+import { MOVE_TO, read, rungs } from "./ladder.js";
+import { rollout, stability } from "./runtime.js";
+import { state } from "./store.js";
+
+const SAMPLES = 101;
+const PUSH_SPEED = 1e-6; // rad/s
+/** At so many instants a push is looked at. */
+export const LOOKS = 14;
+
+/**
+ * Runs the ladder on the loop in force, a rung at a time; gives the refusal, if there is one.
+ * @param {number} length [s] @param {() => boolean} isWanted whether to go on @param {(rung: import("./ladder.js").Rung) => void} tell
+ */
+export async function climb(length, isWanted, tell) {
+  const n = state.links;
+  const common = {
+    q0: new Array(n).fill(0), qdot0: new Array(n).fill(0), duration: length, params: state.params, samples: SAMPLES, reference: true,
+    ...(state.enabled ? { gains: state.gains, setpoint: MOVE_TO[n], control_period: state.period?.period ?? 0 } : {}),
+  };
+  for (const rung of rungs()) {
+    const args = { ...common, integrator: rung.method, timestep: rung.timestep };
+    const answer = await rollout(args);
+    if (!isWanted()) return "";
+    if (!answer.result) return answer.status;
+    // The shorter of two times: other work of the machine in between has no part in it.
+    const again = await rollout({ ...args, reference: false });
+    const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
+    if (!isWanted()) return "";
+    tell(read(rung, { ...answer.values, wall_time: wall }, length));
+  }
+  return "";
+}
+
+/**
+ * Asks the study about `count` multiples of the gains, the lowest first, and tells each answer as it comes.
+ * @param {import("./scale.js").LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the loop at a multiple
+ * @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void} tell
+ */
+export async function climbRows(scale, count, ask, isWanted, tell) {
+  for (let row = 0; row < count && isWanted(); row += 1) {
+    const factor = scale.value(row / (count - 1));
+    const { result, values } = await stability({ ...ask(factor), control_period: 0 });
+    if (result && isWanted()) tell(factor, values);
+  }
+}
+
+/**
+ * A tiny push of the last joint at rest: its speed [rad/s] at each of the next looks, `every` [s] apart. It is the difference of two
+ * runs, with the push and without; null where they are refused.
+ * @param {any} loop with method and timestep @param {number[]} rest pose [rad] @param {number} every
+ */
+export async function deviation(loop, rest, every) {
+  const common = { ...loop, q0: rest, duration: LOOKS * every, samples: LOOKS + 1 };
+  const [still, pushed] = await Promise.all([rollout(common), rollout({ ...common, qdot0: rest.map(() => 0).with(-1, PUSH_SPEED) })]);
+  if (!still.result || !pushed.result) return null;
+  return pushed.values.velocities.slice(1).map((row, k) => row.at(-1) - (still.values.velocities[k + 1]?.at(-1) ?? 0));
+}
