@@ -24,4 +24,3 @@ mod papers;
 mod readme;
 mod style;
 mod tree;
-mod words;

@@ -1,12 +1,9 @@
-//! How the source is cut: short files, short lines, one style of modules, one name for one type.
+//! How the source is cut: short files, short lines, short paths.
 //!
 //! **Invariant:** no rule has an exception but those that stand here with their reason.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-use proc_macro2::{TokenStream, TokenTree};
 
 use crate::tree::{files_in, rust_files};
 
@@ -62,62 +59,8 @@ fn no_line_is_longer_than_a_screen_is_wide() {
 }
 
 #[test]
-fn a_folder_of_modules_is_opened_by_its_mod_rs() {
-    for path in rust_files("src") {
-        let folder = path.with_extension("");
-        assert!(
-            !folder.is_dir(),
-            "{} stands beside its folder",
-            path.display()
-        );
-    }
-}
-
-#[test]
 fn nobody_reaches_three_floors_up() {
     for (path, text) in source() {
         assert!(!text.contains("super::super::super"), "{path}");
     }
-}
-
-/// The types that a file defines, in the body of a macro too. A `type` within a trait or its implementation defines none.
-fn types(tokens: TokenStream, found: &mut Vec<String>) {
-    let tokens: Vec<TokenTree> = tokens.into_iter().collect();
-    for pair in tokens.windows(2) {
-        if let [TokenTree::Punct(mark), TokenTree::Group(body)] = pair
-            && mark.as_char() == '!'
-        {
-            types(body.stream(), found);
-        }
-    }
-    for pair in tokens.windows(2) {
-        if let [TokenTree::Ident(keyword), TokenTree::Ident(name)] = pair
-            && ["struct", "enum", "trait", "type"].contains(&keyword.to_string().as_str())
-        {
-            found.push(name.to_string());
-        }
-    }
-}
-
-#[test]
-fn types_are_found_in_the_bodies_of_macros_and_nowhere_else_within() {
-    let text = "struct A; table! { /// A row.\n pub enum B of Row { C = 1, } } impl A { type D = (); } mod e { enum F {} }";
-    let mut found = Vec::new();
-    types(text.parse().unwrap(), &mut found);
-    found.sort();
-    assert_eq!(found, ["A", "B"]);
-}
-
-#[test]
-fn no_two_types_have_one_name() {
-    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for (path, text) in source() {
-        let mut defined = Vec::new();
-        types(text.parse().unwrap(), &mut defined);
-        for name in defined {
-            files.entry(name).or_default().push(path.clone());
-        }
-    }
-    files.retain(|_, places| places.len() > 1);
-    assert!(files.is_empty(), "two things of one name: {files:#?}");
 }

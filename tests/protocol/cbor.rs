@@ -16,37 +16,9 @@ fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
     cbor::publish_raw(topic, type_name, tree.root(), usize::MAX)
 }
 
-/// The head of every frame of the topic `/t`: a map of three, whose last key is `msg`.
-fn head() -> Vec<u8> {
-    let mut head = vec![0xa3, 0x62];
-    head.extend(b"op");
-    head.push(0x67);
-    head.extend(b"publish");
-    head.push(0x65);
-    head.extend(b"topic");
-    head.push(0x62);
-    head.extend(b"/t");
-    head.push(0x63);
-    head.extend(b"msg");
-    head
-}
-
-/// The part of a frame behind its head.
-#[track_caller]
-fn behind_head(frame: &[u8]) -> Vec<u8> {
-    frame.strip_prefix(&head()[..]).expect("the head").to_vec()
-}
-
-/// A message of no known type.
-#[track_caller]
-fn untyped(msg: Value) -> Vec<u8> {
-    behind_head(&publish("/t", None, &msg))
-}
-
-#[track_caller]
-fn typed(type_name: &str, msg: Value) -> Vec<u8> {
-    behind_head(&publish("/t", Some(type_name), &msg))
-}
+/// A row: type, message, and the bytes of the message. They are hexadecimal; `"text"` stands for a CBOR text, `f(1.5)` for a CBOR
+/// double, `l(1.5)` for the 8 bytes of a little-endian double, and `..` for any rest. A type behind `raw ` is sent as `cbor-raw`.
+const ROWS: &str = include_str!("cbor.txt");
 
 /// Text of at most 23 bytes.
 fn text(text: &str) -> Vec<u8> {
@@ -57,199 +29,60 @@ fn text(text: &str) -> Vec<u8> {
     bytes
 }
 
-fn float(value: f64) -> Vec<u8> {
-    let mut bytes = vec![0xfb];
-    bytes.extend(value.to_be_bytes());
-    bytes
+/// The head of every frame of the topic `/t`: a map of three, whose last key is `msg`.
+fn head() -> Vec<u8> {
+    let texts = ["op", "publish", "topic", "/t", "msg"].map(text);
+    [&[0xa3], texts.concat().as_slice()].concat()
 }
 
-#[test]
-fn whole_numbers_take_as_few_bytes_as_may_be() {
-    // RFC 8949, appendix A, and the numbers at which one more byte is needed.
-    for (number, bytes) in [
-        (json!(0), &[0x00][..]),
-        (json!(23), &[0x17]),
-        (json!(24), &[0x18, 0x18]),
-        (json!(255), &[0x18, 0xff]),
-        (json!(256), &[0x19, 0x01, 0x00]),
-        (json!(65_535), &[0x19, 0xff, 0xff]),
-        (json!(65_536), &[0x1a, 0, 1, 0, 0]),
-        (json!(4_294_967_295_u64), &[0x1a, 0xff, 0xff, 0xff, 0xff]),
-        (json!(4_294_967_296_u64), &[0x1b, 0, 0, 0, 1, 0, 0, 0, 0]),
-        (
-            json!(u64::MAX),
-            &[0x1b, 255, 255, 255, 255, 255, 255, 255, 255],
-        ),
-        (json!(-1), &[0x20]),
-        (json!(-24), &[0x37]),
-        (json!(-25), &[0x38, 0x18]),
-        (json!(-1000), &[0x39, 0x03, 0xe7]),
-        (
-            json!(i64::MIN),
-            &[0x3b, 0x7f, 255, 255, 255, 255, 255, 255, 255],
-        ),
-    ] {
-        assert_eq!(untyped(number.clone()), bytes, "{number}");
+fn spelled_out(word: &str) -> Vec<u8> {
+    let inner = |start: &str, end: &str| word.strip_prefix(start)?.strip_suffix(end);
+    if let Some(found) = inner("\"", "\"") {
+        text(found)
+    } else if let Some(number) = inner("f(", ")") {
+        let number: f64 = number.parse().unwrap();
+        [&[0xfb][..], &number.to_be_bytes()].concat()
+    } else if let Some(number) = inner("l(", ")") {
+        number.parse::<f64>().unwrap().to_le_bytes().to_vec()
+    } else {
+        vec![u8::from_str_radix(word, 16).unwrap()]
     }
 }
 
 #[test]
-fn other_values_are_what_the_standard_calls_them() {
-    assert_eq!(untyped(json!(null)), [0xf6]);
-    assert_eq!(untyped(json!(false)), [0xf4]);
-    assert_eq!(untyped(json!(true)), [0xf5]);
-    assert_eq!(untyped(json!(1.1)), float(1.1));
-    assert_eq!(untyped(json!("")), [0x60]);
-    assert_eq!(untyped(json!("ü")), [0x62, 0xc3, 0xbc]);
-    assert_eq!(
-        untyped(json!([1, [2, 3], []])),
-        [0x83, 0x01, 0x82, 0x02, 0x03, 0x80]
-    );
-    let object = [&[0xa2][..], &text("a"), &[0x01], &text("b"), &[0xa0]].concat();
-    assert_eq!(untyped(json!({"a": 1, "b": {}})), object);
+fn every_message_has_the_bytes_of_its_row() {
+    for row in ROWS.lines().filter(|row| row.contains(" | ")) {
+        let [type_name, msg, bytes] = row.split(" | ").collect::<Vec<_>>()[..] else {
+            panic!("{row}");
+        };
+        let msg: Value = serde_json::from_str(msg).unwrap();
+        let frame = match type_name.strip_prefix("raw ") {
+            Some(type_name) => publish_raw("/t", type_name, &msg).expect("a known type"),
+            None => publish("/t", Some(type_name).filter(|name| *name != "-"), &msg),
+        };
+        let found = frame.strip_prefix(&head()[..]).expect("the head");
+        let (bytes, is_whole) = match bytes.strip_suffix(" ..") {
+            Some(start) => (start, false),
+            None => (bytes, true),
+        };
+        let expected: Vec<u8> = bytes.split(' ').flat_map(spelled_out).collect();
+        let found = if is_whole {
+            found
+        } else {
+            &found[..expected.len()]
+        };
+        assert_eq!(found, expected, "{row}");
+    }
 }
 
 #[test]
 fn long_text_and_long_lists_have_their_length_in_the_bytes_behind_the_first() {
+    let behind_head = |msg: Value| publish("/t", None, &msg).split_off(head().len());
     let long = "x".repeat(300);
     let expected = [&[0x79, 0x01, 0x2c], long.as_bytes()].concat();
-    assert_eq!(untyped(json!(long)), expected);
+    assert_eq!(behind_head(json!(long)), expected);
     let expected = [&[0x98, 24][..], &[0x00; 24]].concat();
-    assert_eq!(untyped(json!(vec![0; 24])), expected);
-}
-
-/// Tag 86, a string of 8 bytes per number, little-endian.
-#[test]
-fn an_array_of_float64_is_a_typed_array_in_which_null_is_nan() {
-    let point = json!({"positions": [1.5, null], "velocities": []});
-    let mut expected = vec![0xa2];
-    expected.extend(text("positions"));
-    expected.extend([0xd8, 86, 0x50]);
-    expected.extend(1.5_f64.to_le_bytes());
-    expected.extend(f64::NAN.to_le_bytes());
-    expected.extend(text("velocities"));
-    expected.extend([0xd8, 86, 0x40]);
-    assert_eq!(
-        typed("trajectory_msgs/msg/JointTrajectoryPoint", point),
-        expected
-    );
-}
-
-/// Tag 78, a string of 4 bytes per number, little-endian; a value that an `int32` can't hold is 0.
-#[test]
-fn an_array_of_int32_is_a_typed_array_too() {
-    let definition = json!({"fieldarraylen": [-1, 258, 3_000_000_000_u64, "x"]});
-    let mut expected = vec![0xa1];
-    expected.extend(text("fieldarraylen"));
-    expected.extend([0xd8, 78, 0x50]);
-    expected.extend([255, 255, 255, 255, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-    assert_eq!(typed("rosapi_msgs/TypeDef", definition), expected);
-}
-
-#[test]
-fn a_message_has_the_fields_of_its_type_in_the_types_order_and_no_others() {
-    let target = json!({"phi": null, "other": 1, "x": 2, "y": 0.5});
-    let mut expected = vec![0xa3];
-    expected.extend(text("x"));
-    // A float64 that JSON writes without a fraction is one all the same.
-    expected.extend(float(2.0));
-    expected.extend(text("y"));
-    expected.extend(float(0.5));
-    expected.extend(text("phi"));
-    expected.extend(float(f64::NAN));
-    assert_eq!(typed("pendularm_interfaces/msg/Target", target), expected);
-}
-
-#[test]
-fn messages_within_messages_are_written_by_their_own_types() {
-    let mut time = vec![0xa1];
-    time.extend(text("sec"));
-    time.push(0x07);
-    let mut header = vec![0xa1];
-    header.extend(text("stamp"));
-    header.extend(&time);
-    let mut expected = vec![0xa2];
-    expected.extend(text("header"));
-    expected.extend(&header);
-    expected.extend(text("status"));
-    expected.push(0x82);
-    for name in ["a", "b"] {
-        expected.push(0xa1);
-        expected.extend(text("name"));
-        expected.extend(text(name));
-    }
-    let array = json!({"status": [{"name": "a"}, {"name": "b"}], "header": {"stamp": {"sec": 7}}});
-    assert_eq!(typed("diagnostic_msgs/DiagnosticArray", array), expected);
-}
-
-#[test]
-fn what_does_not_fit_its_type_is_written_as_it_is() {
-    assert_eq!(typed("std_msgs/String", json!([1])), [0x81, 0x01]);
-    let mut expected = vec![0xa1];
-    expected.extend(text("data"));
-    expected.push(0x05);
-    assert_eq!(typed("std_msgs/String", json!({"data": 5})), expected);
-    let mut expected = vec![0xa1];
-    expected.extend(text("position"));
-    expected.extend(text("none"));
-    let state = json!({"position": "none"});
-    assert_eq!(typed("sensor_msgs/JointState", state), expected);
-    let mut expected = vec![0xa1];
-    expected.extend(text("x"));
-    expected.push(0xf5);
-    assert_eq!(typed("geometry_msgs/Vector3", json!({"x": true})), expected);
-    // A type that nobody here knows.
-    assert_eq!(
-        typed("demo/X", json!({"x": null})),
-        [0xa1, 0x61, b'x', 0xf6]
-    );
-}
-
-/// `cbor-raw`: the time in whole seconds and nanoseconds, then the message's CDR bytes.
-fn raw(secs: &[u8], nsecs: &[u8], cdr: &[u8]) -> Vec<u8> {
-    let mut expected = vec![0xa3];
-    expected.extend(text("secs"));
-    expected.extend(secs);
-    expected.extend(text("nsecs"));
-    expected.extend(nsecs);
-    expected.extend(text("bytes"));
-    expected.push(0x40 + u8::try_from(cdr.len()).unwrap());
-    expected.extend(cdr);
-    expected
-}
-
-#[test]
-fn cbor_raw_is_the_messages_time_and_its_cdr() {
-    let clock = json!({"clock": {"sec": 3, "nanosec": 256}});
-    let frame = publish_raw("/t", "rosgraph_msgs/Clock", &clock).expect("a known type");
-    let cdr = [0, 1, 0, 0, 3, 0, 0, 0, 0, 1, 0, 0];
-    assert_eq!(behind_head(&frame), raw(&[0x03], &[0x19, 0x01, 0x00], &cdr));
-}
-
-#[test]
-fn cbor_raw_of_a_message_without_a_time_says_0() {
-    let frame = publish_raw("/t", "std_msgs/String", &json!({"data": "hi"})).expect("a known type");
-    let cdr = [0, 1, 0, 0, 3, 0, 0, 0, b'h', b'i', 0];
-    assert_eq!(behind_head(&frame), raw(&[0x00], &[0x00], &cdr));
-}
-
-#[test]
-fn cbor_raw_finds_the_time_wherever_a_message_of_ours_has_it() {
-    let time = json!({"sec": 1, "nanosec": 2});
-    for (type_name, msg) in [
-        ("std_msgs/Header", json!({"stamp": time})),
-        ("sensor_msgs/JointState", json!({"header": {"stamp": time}})),
-        (
-            "tf2_msgs/TFMessage",
-            json!({"transforms": [{"header": {"stamp": time}}]}),
-        ),
-    ] {
-        let frame = publish_raw("/t", type_name, &msg).expect("a known type");
-        let start = raw(&[0x01], &[0x02], &[]);
-        // Up to the length of the bytes.
-        let start = start.split_last().unwrap().1;
-        assert!(behind_head(&frame).starts_with(start), "{type_name}");
-    }
+    assert_eq!(behind_head(json!(vec![0; 24])), expected);
 }
 
 /// A frame may wait for long, and only its bytes are counted.
@@ -324,8 +157,4 @@ fn stamps_and_durations_are_read_under_their_names_of_ros_1_too() {
     let both = json!({"sec": 1, "nanosec": 2, "secs": 3, "nsecs": 4});
     let raw = |msg: &Value| publish_raw("/t", "builtin_interfaces/msg/Time", msg);
     assert_eq!(raw(&both), raw(&json!({"sec": 1, "nanosec": 2})));
-    let parts = ["nanosec", "nsecs", "sec", "secs"].map(text);
-    let [nanosec, nsecs, sec, secs] = parts.each_ref().map(Vec::as_slice);
-    let expected = [&[0xa4], nanosec, &[2], nsecs, &[4], sec, &[1], secs, &[3]].concat();
-    assert_eq!(typed("builtin_interfaces/msg/Time", both), expected);
 }

@@ -5,8 +5,8 @@
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState, KeyValue,
-    Level, Stamp, call, failure, message_text, publish, publish_raw, respelled, response,
-    response_raw, status,
+    Level, Stamp, action_feedback, action_result, call, failure, message_text, publish,
+    publish_raw, respelled, response, response_raw, status,
 };
 use pendularm::protocol::wire::payload::Payload;
 use proptest::prelude::*;
@@ -186,6 +186,20 @@ fn an_id_that_never_came_is_left_out() {
     assert_eq!(
         line(&status(Level::Error, "no", None)),
         r#"{"op":"status","level":"error","msg":"no"}"#
+    );
+}
+
+#[test]
+fn progress_and_end_of_a_goal_carry_the_senders_id() {
+    let feedback = action_feedback("/ik_action", Some(&raw("[1]")), &json!({"a": 1}));
+    assert_eq!(
+        line(&feedback),
+        r#"{"op":"action_feedback","action":"/ik_action","id":[1],"values":{"a":1}}"#
+    );
+    let result = action_result("/ik_action", None, &json!("why"), 6, false);
+    assert_eq!(
+        line(&result),
+        r#"{"op":"action_result","action":"/ik_action","values":"why","status":6,"result":false}"#
     );
 }
 

@@ -1,5 +1,8 @@
 //! Shared by the rules: a connection to an arm in a known state, and requests to it.
 //!
+//! An error is the sentence that a rule fails with: the server rejected a call, did not answer in time, sent a message that is missing
+//! or malformed, or closed the connection.
+//!
 //! The known state: running, PID off, `rk4` at 1 ms, gravity 9.81, links of 1 m and 1 kg, no goal, no trial, just reset.
 
 use std::time::{Duration, Instant};
@@ -42,9 +45,6 @@ const ENDING: [&str; 2] = ["/ik_trial/stop", "/ik_action/cancel_goal"];
 
 impl Found {
     /// Asks the server at an address.
-    ///
-    /// # Errors
-    /// If it cannot be reached, or neither parameters nor joint states say how many links it has.
     pub fn at(address: &str) -> Result<Self, String> {
         let mut bench = Bench { peer: Peer::connect(address)?, links: 0, found: None };
         let params = bench.accepted("/arm_sim/set_params", &json!({}));
@@ -109,9 +109,6 @@ pub struct Joints {
 
 impl Joints {
     /// Reads a message.
-    ///
-    /// # Errors
-    /// With the member that is missing or wrong.
     pub fn read(msg: &Value) -> Result<Self, String> {
         let names = msg.pointer("/name").and_then(Value::as_array).ok_or("no array name in /joint_states")?;
         let name: Option<Vec<String>> = names.iter().map(|name| name.as_str().map(str::to_owned)).collect();
@@ -145,9 +142,6 @@ pub struct Bench {
 
 impl Bench {
     /// Connects and puts the arm into the known state.
-    ///
-    /// # Errors
-    /// If the server cannot be reached or does not answer.
     pub fn prepared(address: &str, found: &Found) -> Result<Self, String> {
         let links = found.links;
         let mut bench = Self { peer: Peer::connect(address)?, links, found: Some(found.clone()) };
@@ -169,26 +163,17 @@ impl Bench {
     }
 
     /// A second connection, to the same server; it changes nothing.
-    ///
-    /// # Errors
-    /// If the server cannot be reached.
     pub fn another(&self) -> Result<Self, String> {
         let address = self.peer.address()?;
         Ok(Self { peer: Peer::connect(&address)?, links: self.links, found: self.found.clone() })
     }
 
     /// The server's answers before anything was changed.
-    ///
-    /// # Errors
-    /// If the server was not asked.
     pub fn found(&self) -> Result<&Found, String> {
         self.found.as_ref().ok_or_else(|| "the server has not been asked".to_owned())
     }
 
     /// The values of an accepted call.
-    ///
-    /// # Errors
-    /// If it is rejected or not answered.
     pub fn accepted(&mut self, service: &str, args: &Value) -> Result<Value, String> {
         let Answer { values, result, status, .. } = self.peer.call(service, args)?;
         must(result, || format!("{service} {args} is rejected: {status}"))?;
@@ -196,9 +181,6 @@ impl Bench {
     }
 
     /// The answer to a call that must be rejected with a reason.
-    ///
-    /// # Errors
-    /// If it is accepted, rejected without a reason, or not answered.
     pub fn rejected(&mut self, service: &str, args: &Value) -> Result<Answer, String> {
         let answer = self.peer.call(service, args)?;
         must(!answer.result, || format!("{service} {args} is accepted"))?;
@@ -208,25 +190,16 @@ impl Bench {
     }
 
     /// Subscribes to a topic.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn watch(&mut self, topic: &str) -> Result<(), String> {
         self.peer.send(&json!({"op": "subscribe", "id": format!("watch {topic}"), "topic": topic}))
     }
 
     /// The next message on a topic.
-    ///
-    /// # Errors
-    /// If none comes in time.
     pub fn message(&mut self, topic: &str, within: Duration) -> Result<Value, String> {
         self.message_that(topic, within, "a message", |_| true)
     }
 
     /// The next message on a topic that is as it should be; others are left.
-    ///
-    /// # Errors
-    /// If none comes in time.
     pub fn message_that(&mut self, topic: &str, within: Duration, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
         let holds = |frame: &Value| is_message(frame, topic) && frame.get("msg").is_some_and(&is_it);
         match self.peer.find(Instant::now() + within, holds) {
@@ -237,9 +210,6 @@ impl Bench {
     }
 
     /// All messages on a topic that come in a time.
-    ///
-    /// # Errors
-    /// If the connection ends.
     pub fn messages_for(&mut self, topic: &str, time: Duration) -> Result<Vec<Value>, String> {
         let until = Instant::now() + time;
         let mut found = Vec::new();
@@ -258,9 +228,6 @@ impl Bench {
     }
 
     /// The next joint states, in order.
-    ///
-    /// # Errors
-    /// If none come in time or they are malformed.
     pub fn joints(&mut self) -> Result<Joints, String> {
         let msg = self.message("/joint_states", SOON)?;
         let joints = Joints::read(&msg)?;
@@ -270,9 +237,6 @@ impl Bench {
     }
 
     /// Joint states from after everything that this connection has sent; starts to listen where it does not yet.
-    ///
-    /// # Errors
-    /// As [`Bench::joints`].
     pub fn fresh(&mut self) -> Result<Joints, String> {
         self.watch("/joint_states")?;
         // A call that changes nothing. Messages before its answer may be older than this connection's requests.
@@ -283,9 +247,6 @@ impl Bench {
     }
 
     /// All joint states of a time.
-    ///
-    /// # Errors
-    /// As [`Bench::joints`].
     pub fn joints_for(&mut self, seconds: f64) -> Result<Vec<Joints>, String> {
         self.fresh()?;
         let until = Instant::now() + Duration::from_secs_f64(seconds);
@@ -297,9 +258,6 @@ impl Bench {
     }
 
     /// Joint states until the arm has been at rest for a while; the last ones.
-    ///
-    /// # Errors
-    /// If it is not at rest within some seconds.
     pub fn at_rest(&mut self) -> Result<Joints, String> {
         self.fresh()?;
         let end = Instant::now() + Duration::from_secs(8);
@@ -316,26 +274,17 @@ impl Bench {
     }
 
     /// Sets masses, lengths and gravity.
-    ///
-    /// # Errors
-    /// If they are rejected.
     pub fn set_arm(&mut self, arm: &Arm) -> Result<(), String> {
         let args = json!({"gravity": arm.gravity, "masses": arm.masses, "lengths": arm.lengths});
         self.accepted("/arm_sim/set_params", &args).map(drop)
     }
 
     /// Sets gravity alone.
-    ///
-    /// # Errors
-    /// If it is rejected.
     pub fn set_gravity(&mut self, gravity: f64) -> Result<(), String> {
         self.accepted("/arm_sim/set_params", &json!({"gravity": gravity})).map(drop)
     }
 
     /// The arm that the server says it has.
-    ///
-    /// # Errors
-    /// If it does not say so.
     pub fn arm(&mut self) -> Result<Arm, String> {
         let values = self.accepted("/arm_sim/set_params", &json!({}))?;
         Ok(Arm {
@@ -346,18 +295,12 @@ impl Bench {
     }
 
     /// Sets gains, the same for every joint.
-    ///
-    /// # Errors
-    /// If they are rejected.
     pub fn set_gains(&mut self, kp: f64, ki: f64, kd: f64) -> Result<(), String> {
         let args = json!({"kp": self.each(kp), "ki": self.each(ki), "kd": self.each(kd)});
         self.accepted("/pid_controller/set_gains", &args).map(drop)
     }
 
     /// Sets gains that hold the arm of 1 m and 1 kg links; `integral` says whether with the integral term.
-    ///
-    /// # Errors
-    /// If they are rejected.
     pub fn set_holding_gains(&mut self, integral: bool) -> Result<(), String> {
         let (kp, kd): (&[f64], &[f64]) =
             if self.links == 2 { (&[200.0, 60.0], &[50.0, 10.0]) } else { (&[400.0, 150.0, 40.0], &[90.0, 35.0, 7.0]) };
@@ -366,34 +309,22 @@ impl Bench {
     }
 
     /// Switches the controller.
-    ///
-    /// # Errors
-    /// If that is rejected.
     pub fn enable(&mut self, on: bool) -> Result<(), String> {
         self.accepted("/pid_controller/enable", &json!({"data": on})).map(drop)
     }
 
     /// Stops or continues the simulation.
-    ///
-    /// # Errors
-    /// If that is rejected.
     pub fn pause(&mut self, on: bool) -> Result<(), String> {
         self.accepted("/arm_sim/pause", &json!({"data": on})).map(drop)
     }
 
     /// Resets and returns the starting pose.
-    ///
-    /// # Errors
-    /// If there is none in the answer.
     pub fn reset(&mut self) -> Result<Vec<f64>, String> {
         let values = self.accepted("/arm_sim/reset", &json!({}))?;
         numbers_of(&values, "position", self.links)
     }
 
     /// Sends points of a trajectory.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn command(&mut self, points: &Value) -> Result<(), String> {
         let names: Vec<String> = (1..=self.links).map(|joint| format!("joint{joint}")).collect();
         let header = json!({"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""});
@@ -403,9 +334,6 @@ impl Bench {
     }
 
     /// Commands one position, at rest there.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn hold(&mut self, position: &[f64]) -> Result<(), String> {
         self.command(&json!([point(position, &self.each(0.0))]))
     }
@@ -417,9 +345,6 @@ impl Bench {
     }
 
     /// Without gravity, at rest in the starting pose, with the controller on: the pose.
-    ///
-    /// # Errors
-    /// If a call is rejected.
     pub fn float(&mut self, kp: f64, ki: f64, kd: f64) -> Result<Vec<f64>, String> {
         self.set_gravity(0.0)?;
         self.set_gains(kp, ki, kd)?;
@@ -429,9 +354,6 @@ impl Bench {
     }
 
     /// Pushes the arm by the controller for a moment, then leaves it to itself: it swings.
-    ///
-    /// # Errors
-    /// If a call is rejected.
     pub fn swing(&mut self) -> Result<(), String> {
         self.set_gains(20.0, 0.0, 0.0)?;
         let pose = self.reset()?;
@@ -443,9 +365,6 @@ impl Bench {
 
     /// Passes if the published states of the uncontrolled arm are those that this crate's own arm has after whole
     /// steps from the first one. Returns the number of steps followed.
-    ///
-    /// # Errors
-    /// With the first state that is none of them.
     pub fn follows(&mut self, arm: &Arm, method: &str, dt: f64) -> Result<usize, String> {
         let states = self.joints_for(0.4)?;
         let mut own = states.first().map(Joints::state).ok_or("no joint states")?;
@@ -467,9 +386,6 @@ impl Bench {
     }
 
     /// Calls `/arm_sim/integration_step`: times, positions and velocities.
-    ///
-    /// # Errors
-    /// If it is rejected, or an array is missing or of another length.
     pub fn integrate(&mut self, function: &str, [x0, xdot0, dt]: [f64; 3], steps: u32, method: &str) -> Result<[Vec<f64>; 3], String> {
         let args = json!({"function": function, "x0": x0, "xdot0": xdot0, "dt": dt, "steps": steps, "integrator": method});
         let values = self.accepted("/arm_sim/integration_step", &args)?;
@@ -479,17 +395,11 @@ impl Bench {
     }
 
     /// Whether the controller is on.
-    ///
-    /// # Errors
-    /// If the server does not say.
     pub fn is_enabled(&mut self) -> Result<bool, String> {
         boolean(&self.accepted("/pid_controller/enable", &json!({}))?, "data")
     }
 
     /// Sends a goal; its id.
-    ///
-    /// # Errors
-    /// If it is rejected or has no id.
     pub fn send_goal(&mut self, goal: &Value) -> Result<String, String> {
         let values = self.accepted("/ik_action/send_goal", goal)?;
         let id = text(&values, "goal_id")?;
@@ -511,9 +421,6 @@ pub fn shifted(pose: &[f64], by: f64) -> Vec<f64> {
 }
 
 /// Passes if two sets of values are the same numbers, texts and booleans.
-///
-/// # Errors
-/// With the first member that differs.
 pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), String> {
     for name in members {
         let (one, other) = (before.get(name), after.get(name));

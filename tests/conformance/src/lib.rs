@@ -94,6 +94,12 @@ impl Rule {
     }
 }
 
+/// A rule for any arm. `rules::all` gives it the category of its file.
+#[must_use]
+pub const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
+    Rule { id, category: Category::Integrators, links: Links::Any, says, expected, check }
+}
+
 /// A rule that has been tried.
 #[derive(Debug)]
 pub struct Row {

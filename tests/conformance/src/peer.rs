@@ -1,6 +1,7 @@
 //! One connection to the server: frames out, frames in, each with a deadline.
 //!
-//! Nothing here panics. A malformed answer becomes an error that quotes it.
+//! Nothing here panics. An error says that nothing listens at the address, that no answer came in time, or that the connection has
+//! ended. A malformed answer becomes an error that quotes it.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -49,9 +50,6 @@ pub struct Peer {
 
 impl Peer {
     /// Connects to `address`, for example `127.0.0.1:9095`.
-    ///
-    /// # Errors
-    /// If there is no such address or nothing accepts there.
     pub fn connect(address: &str) -> Result<Self, String> {
         let mut last = format!("{address} is no address");
         for one in address.to_socket_addrs().map_err(|error| format!("{address}: {error}"))? {
@@ -68,33 +66,21 @@ impl Peer {
     }
 
     /// The server's address.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn address(&self) -> Result<String, String> {
         self.stream.peer_addr().map(|address| address.to_string()).map_err(|error| format!("the connection has ended: {error}"))
     }
 
     /// Sends one frame and a newline.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn send(&mut self, frame: &Value) -> Result<(), String> {
         self.send_line(&frame.to_string())
     }
 
     /// Sends one line as it is.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn send_line(&mut self, line: &str) -> Result<(), String> {
         self.stream.write_all(format!("{line}\n").as_bytes()).map_err(|error| format!("the server closed the connection: {error}"))
     }
 
     /// Calls a service and returns its answer; other frames are kept.
-    ///
-    /// # Errors
-    /// If no answer comes in time.
     pub fn call(&mut self, service: &str, args: &Value) -> Result<Answer, String> {
         let id = self.ask(service, args)?;
         let until = Instant::now() + PATIENCE;
@@ -113,9 +99,6 @@ impl Peer {
     }
 
     /// Sends a call without waiting for its answer; returns its id.
-    ///
-    /// # Errors
-    /// If the connection has ended.
     pub fn ask(&mut self, service: &str, args: &Value) -> Result<String, String> {
         self.calls += 1;
         let id = format!("call-{}", self.calls);
@@ -124,9 +107,6 @@ impl Peer {
     }
 
     /// The first frame, kept or new, for which `is_it` holds; it is taken out, others are kept.
-    ///
-    /// # Errors
-    /// If none comes before `until`.
     pub fn find(&mut self, until: Instant, is_it: impl Fn(&Value) -> bool) -> Result<Value, Trouble> {
         if let Some(at) = self.kept.iter().position(&is_it) {
             return self.kept.remove(at).ok_or(Trouble::Silence);

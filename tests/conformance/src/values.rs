@@ -1,48 +1,34 @@
-//! Reading answers and comparing numbers; every failure is a sentence.
+//! Reading answers and comparing numbers. An error is a sentence: it names the member that is missing or of another type, or the
+//! first entry that differs.
 
 use serde_json::Value;
 
 use crate::peer::beginning;
 
 /// The member at a path such as `points/0/positions`.
-///
-/// # Errors
-/// If there is none.
 pub fn member<'a>(value: &'a Value, path: &str) -> Result<&'a Value, String> {
     value.pointer(&format!("/{path}")).ok_or_else(|| format!("no {path} in {}", beginning(&value.to_string())))
 }
 
 /// The finite number at a path.
-///
-/// # Errors
-/// If there is none.
 pub fn number(value: &Value, path: &str) -> Result<f64, String> {
     let found = member(value, path)?;
     found.as_f64().filter(|number| number.is_finite()).ok_or_else(|| format!("{path} is no number: {}", beginning(&found.to_string())))
 }
 
 /// The boolean at a path.
-///
-/// # Errors
-/// If there is none.
 pub fn boolean(value: &Value, path: &str) -> Result<bool, String> {
     let found = member(value, path)?;
     found.as_bool().ok_or_else(|| format!("{path} is no boolean: {}", beginning(&found.to_string())))
 }
 
 /// The text at a path.
-///
-/// # Errors
-/// If there is none.
 pub fn text<'a>(value: &'a Value, path: &str) -> Result<&'a str, String> {
     let found = member(value, path)?;
     found.as_str().ok_or_else(|| format!("{path} is no text: {}", beginning(&found.to_string())))
 }
 
 /// The array of finite numbers at a path.
-///
-/// # Errors
-/// If there is none.
 pub fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, String> {
     let found = member(value, path)?;
     let entries = found.as_array().ok_or_else(|| format!("{path} is no array: {}", beginning(&found.to_string())))?;
@@ -55,18 +41,12 @@ pub fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, String> {
 }
 
 /// The array of `count` finite numbers at a path.
-///
-/// # Errors
-/// If there is none, or one of another length.
 pub fn numbers_of(value: &Value, path: &str, count: usize) -> Result<Vec<f64>, String> {
     let found = numbers(value, path)?;
     if found.len() == count { Ok(found) } else { Err(format!("{path} has {} entries instead of {count}", found.len())) }
 }
 
 /// Passes if both have one length and no entry differs by more than `tolerance`, relative to 1 plus its size.
-///
-/// # Errors
-/// With the first entry that differs.
 pub fn near(name: &str, got: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
     if got.len() != expected.len() {
         return Err(format!("{name} has {} entries instead of {}", got.len(), expected.len()));
@@ -82,9 +62,6 @@ pub fn near(name: &str, got: &[f64], expected: &[f64], tolerance: f64) -> Result
 }
 
 /// Passes if the condition holds.
-///
-/// # Errors
-/// With the sentence if not.
 pub fn must(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(otherwise()) }
 }

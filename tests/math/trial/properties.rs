@@ -1,9 +1,10 @@
 //! Any events in any order.
 
+use pendularm::math::goal::Outcome;
 use pendularm::math::trial::{ActionStatus, Changes, Trial, TrialCommand};
 use proptest::prelude::*;
 
-use super::{assert_cleared, preempted, reached, target};
+use super::{assert_cleared, ended, target};
 
 #[derive(Debug, Clone)]
 enum Event {
@@ -55,8 +56,8 @@ proptest! {
                 Event::Tick(now) => trial.tick(now),
                 Event::Accepted(n) => trial.accepted(n, &id(n), next),
                 Event::Refused(n) => trial.refused(n, next),
-                Event::Reached(n) => trial.concluded(reached(&id(n)), next),
-                Event::Preempted(n) => trial.concluded(preempted(&id(n)), next),
+                Event::Reached(n) => trial.concluded(ended(&id(n), Outcome::Reached), next),
+                Event::Preempted(n) => trial.concluded(ended(&id(n), Outcome::Preempted), next),
                 Event::Feedback(n) => { trial.feedback(&id(n), 0.1, &[0.0]); Vec::new() }
             };
             let sent = commands.iter().filter(|a| matches!(a, TrialCommand::SendGoal { .. })).count();

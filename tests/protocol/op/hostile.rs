@@ -3,7 +3,7 @@
 use pendularm::protocol::op::{Op, read};
 use proptest::prelude::*;
 
-use super::{op, status};
+use super::{op, problem};
 
 #[test]
 fn client_text_in_a_message_is_short_and_without_control_characters() {
@@ -16,7 +16,7 @@ fn client_text_in_a_message_is_short_and_without_control_characters() {
         format!(r#""{long}""#),
         "{\"op\":\"publish\",\"topic\":\"/x\",\"msg\":\"\u{7f}\u{9b}\"}".to_owned(),
     ] {
-        let message = status(&frame);
+        let message = problem(&frame);
         assert!(message.chars().count() < 250, "{message}");
         assert!(!message.chars().any(char::is_control), "{message}");
     }

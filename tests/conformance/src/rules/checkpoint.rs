@@ -5,11 +5,7 @@ use serde_json::{Value, json};
 use crate::bench::{Bench, same};
 use crate::method::METHODS;
 use crate::values::{list, near};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Integrators, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[

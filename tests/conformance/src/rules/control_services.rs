@@ -8,11 +8,7 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, point, same, shifted};
 use crate::values::{boolean, fine, largest, list, must, near, number, numbers_of};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Dynamics, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[

@@ -8,11 +8,7 @@ use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, Joints, shifted};
 use crate::rules::control_services::uneven;
 use crate::values::{largest, list, minus, must, numbers_of};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Dynamics, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[

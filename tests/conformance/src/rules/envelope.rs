@@ -7,11 +7,7 @@ use serde_json::{Value, json};
 use crate::bench::Bench;
 use crate::peer::is_answer;
 use crate::values::{member, must, text};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Dynamics, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[

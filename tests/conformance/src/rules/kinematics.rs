@@ -7,11 +7,7 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{list, must, near, numbers_of};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Kinematics, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Links, Rule, rule};
 
 const fn only(links: Links, rule: Rule) -> Rule {
     Rule { links, ..rule }

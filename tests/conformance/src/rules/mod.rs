@@ -11,21 +11,21 @@ pub mod pid;
 pub mod topics;
 pub mod trials;
 
-use crate::Rule;
+use crate::{Category, Rule};
 
 /// All rules, in the order of the specification's sections.
 pub fn all() -> impl Iterator<Item = Rule> {
     let sections = [
-        envelope::RULES,
-        checkpoint::RULES,
-        topics::RULES,
-        control_services::RULES,
-        pid::RULES,
-        dynamics::RULES,
-        methods::RULES,
-        kinematics::RULES,
-        goals::RULES,
-        trials::RULES,
+        (Category::Dynamics, envelope::RULES),
+        (Category::Integrators, checkpoint::RULES),
+        (Category::Dynamics, topics::RULES),
+        (Category::Dynamics, control_services::RULES),
+        (Category::Pid, pid::RULES),
+        (Category::Dynamics, dynamics::RULES),
+        (Category::Integrators, methods::RULES),
+        (Category::Kinematics, kinematics::RULES),
+        (Category::Kinematics, goals::RULES),
+        (Category::Kinematics, trials::RULES),
     ];
-    sections.into_iter().flatten().copied()
+    sections.into_iter().flat_map(|(category, rules)| rules.iter().map(move |rule| Rule { category, ..*rule }))
 }

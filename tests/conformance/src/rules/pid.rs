@@ -10,11 +10,7 @@ use serde_json::{Value, json};
 use crate::bench::{Bench, point, shifted};
 use crate::rules::control_services::is_query;
 use crate::values::{fine, largest, list, minus, must, near};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Pid, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[

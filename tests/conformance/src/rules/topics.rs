@@ -9,11 +9,7 @@ use serde_json::json;
 
 use crate::bench::{Bench, Joints, point, shifted};
 use crate::values::{largest, list, must, near};
-use crate::{Category, Got, Links, Rule};
-
-const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {
-    Rule { id, category: Category::Dynamics, links: Links::Any, says, expected, check }
-}
+use crate::{Got, Rule, rule};
 
 /// The gain that makes a setpoint visible.
 const SMALL: f64 = 0.5;

@@ -1,0 +1,47 @@
+"""A bad value is refused by the name of its field, and changes nothing: the rows of refusals.txt."""
+
+import fractions
+import math
+import pathlib
+
+import numpy as np
+import pytest
+
+import pendularm
+
+HIDDEN = np.ma.array([1.0, 2.0], mask=[True, False])
+ROWS = (pathlib.Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8").splitlines()
+NAMES = {**vars(pendularm), "HIDDEN": HIDDEN, "fractions": fractions, "math": math, "np": np, "pathlib": pathlib}
+
+
+def among_objects(*values):
+    """The values as they are, in an array."""
+    array = np.empty(len(values), object)
+    array[:] = values
+    return array
+
+
+def state(arm, batch):
+    arrays = [arm.position, *arm.gains.values(), batch.position, batch.effort, batch.time]
+    return [arm.timestep, arm.method, arm.control_period, arm.enabled, *(array.tolist() for array in arrays)]
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row and not row.startswith("#")])
+def test_a_bad_value_is_refused_by_the_name_of_its_field(row):
+    wrong, said = row.split(" => ")
+    arm, batch = pendularm.Simulation(), pendularm.Batch(3)
+    before = state(arm, batch)
+    names = {**NAMES, "among_objects": among_objects, "arm": arm, "batch": batch}
+    with pytest.raises(ValueError) as refusal:
+        eval(wrong, names)
+    found = str(refusal.value)
+    assert found.startswith(said[:-1]) if said.endswith("…") else found == said
+    assert state(arm, batch) == before
+    batch.step()
+    assert batch.time.tolist() == [0.001] * 3
+
+
+def test_an_axis_may_be_longer_than_a_batch():
+    # The last of all is found, by its place in the axis; the other ones are taken.
+    with pytest.raises(ValueError, match=r"^gravity\[1000000\] must be finite and at least 0, got -1$"):
+        pendularm.sweep({"gravity": [9.81] * 1_000_000 + [-1.0]})
