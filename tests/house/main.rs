@@ -24,3 +24,4 @@ mod papers;
 mod readme;
 mod style;
 mod tree;
+mod words;
