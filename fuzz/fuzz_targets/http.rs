@@ -2,7 +2,7 @@
 //!
 //! Asserted: the answer is lines of JSON, or well-formed HTTP answers of known headers, as long as they say, and then
 //! the end. A file is never one from outside the report's folder. Without the token in the input, nobody gets the page, a
-//! WebSocket, or more than one line of JSON. `tests/protocol` and `tests/wire` hold the rules of admission.
+//! WebSocket, or more than one line of JSON. `tests/protocol` and `tests/actors` hold the rules of admission.
 //!
 //! Input: a byte of settings, a byte that says in which pieces the rest is sent, the rest.
 

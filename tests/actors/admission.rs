@@ -6,6 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::exchanges::admission;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::admission::{
@@ -14,7 +15,6 @@ use pendularm::actors::gateway::connection::admission::{
 use pendularm::actors::gateway::connection::{Connection, Ends};
 use pendularm::actors::gateway::limits::{HEAD_TIME, KEPT_PLACES};
 use pendularm::options::DEFAULT_CLIENTS;
-use pendularm::protocol::op::token::Token;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep, timeout};
 
@@ -31,22 +31,7 @@ struct Guarded {
 
 impl Guarded {
     async fn new() -> Self {
-        let token = Some(Token::new(TOKEN).unwrap());
-        #[cfg(feature = "web")]
-        let site = {
-            use pendularm::web::{Site, access::Access};
-            let access = Access {
-                token: token.clone(),
-                ..Access::default()
-            };
-            Site::new(access, "none".into())
-        };
-        let admission = Admission {
-            token,
-            #[cfg(feature = "web")]
-            site,
-            ..Admission::default()
-        };
+        let admission = admission(&format!("--token {TOKEN}")).unwrap();
         Self {
             gateway: Gateway::bare().await,
             admission: Arc::new(admission),

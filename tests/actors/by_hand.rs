@@ -139,7 +139,7 @@ fn what_a_client_sends_behind_its_steps_takes_effect_behind_them() {
             offline.set_arm(Arm::new([length, 1.0], [1.0; 2], 9.81).unwrap());
         }
         for _ in 0..8 {
-            assert_eq!(client.next().await["result"], true);
+            assert_eq!(client.receive().await["result"], true);
         }
         step(&mut client, &mut offline, 1, None).await;
     });

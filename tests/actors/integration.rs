@@ -7,9 +7,7 @@ use crate::askers::{PATIENCE, PoolBench};
 use crate::system::in_real_time;
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::node::Unserved;
-use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
-use pendularm::math::particle::Particle;
 use tokio::time::timeout;
 
 fn integration() -> PoolBench<Integration> {
@@ -39,43 +37,6 @@ fn request(function: &str, steps: u64) -> IntegrationStep {
 /// Seconds of work in an unoptimised build; no test waits for its end.
 fn heavy() -> IntegrationStep {
     request(&vec!["t"; 2001].join("+"), 100_000)
-}
-
-#[test]
-fn the_answer_is_the_particles_own() {
-    in_real_time(async {
-        let mut bench = integration();
-        let call = bench.ask_as(1, request("sin(5*t)*exp(-t)", 5000));
-        assert_eq!(bench.next().await, 1);
-        let answered = call.answer.await.unwrap().unwrap().unwrap();
-        let function = Expression::parse("sin(5*t)*exp(-t)").unwrap();
-        let mut particle = Particle::new(function, 1.0, -1.0, 0.001, 5000, Method::Rk4).unwrap();
-        particle.advance(5000);
-        assert!(answered.times().eq(particle.times()));
-        assert_eq!(answered.positions(), particle.positions());
-        assert_eq!(answered.velocities(), particle.velocities());
-    });
-}
-
-#[test]
-fn a_light_call_is_done_while_a_heavy_one_takes_turns_with_it() {
-    in_real_time(async {
-        let mut bench = integration();
-        let heavy = bench.ask_as(1, heavy());
-        for connection in 2..10 {
-            bench.ask_as(connection, request("t", 100));
-        }
-        let mut order = Vec::new();
-        for _ in 2..10 {
-            order.push(bench.next().await);
-        }
-        assert_eq!(
-            order,
-            [2, 3, 4, 5, 6, 7, 8, 9],
-            "in the order in which they came, and before the heavy one"
-        );
-        heavy.gone.store(true, Ordering::Relaxed);
-    });
 }
 
 #[test]

@@ -101,7 +101,7 @@ where
         self.hear();
         self.client.send(&frame).await;
         let is_answer = |frame: &Value| frame["op"] == "service_response" && frame["id"] == "one";
-        self.client.next_where(is_answer).await;
+        self.client.receive_where(is_answer).await;
         let of = |heard: &[Value]| -> Value {
             let told = heard.iter().filter(|frame| frame["op"] != "publish");
             told.cloned().map(without_times).collect()

@@ -53,14 +53,6 @@ fn accepted_clients_outlive_the_listening() {
     });
 }
 
-#[test]
-fn a_port_in_use_is_an_error() {
-    in_real_time(async {
-        let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
-        assert!(bind(socket.local_addr().unwrap()).is_err());
-    });
-}
-
 /// The kernel has set a timer to ask whether a silent client is there.
 #[cfg(target_os = "linux")]
 #[test]

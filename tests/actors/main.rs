@@ -18,7 +18,7 @@
 )]
 
 mod admission;
-mod arm_sim;
+mod arm_steps;
 mod arm_turns;
 #[path = "../support/askers.rs"]
 mod askers;
@@ -31,8 +31,6 @@ mod ik;
 mod ik_action;
 mod ik_trial;
 mod integration;
-#[path = "../support/json.rs"]
-mod json;
 mod kernel;
 mod listener;
 mod log_repeats;
@@ -40,7 +38,6 @@ mod memory;
 #[path = "../support/nodes.rs"]
 mod nodes;
 mod pacing;
-mod paths;
 #[cfg(feature = "record")]
 mod recorder;
 mod refusals;
@@ -55,7 +52,6 @@ mod stage;
 mod study;
 #[path = "../support/system.rs"]
 mod system;
-mod tf_web;
 #[path = "../support/virtual_time.rs"]
 mod virtual_time;
 mod web;

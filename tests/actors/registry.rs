@@ -27,34 +27,6 @@ const ORDINARY: usize = DEFAULT_CLIENTS - KEPT_PLACES;
 /// Shared by a test and its nodes.
 type Log<T> = Rc<RefCell<Vec<T>>>;
 
-#[test]
-fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        provider.provide("/s").await;
-        for (timeout, seconds) in [
-            (None, DEFAULT_TIMEOUT.as_secs_f64()),
-            (Some(2.5), 2.5),
-            (Some(600.0), 600.0),
-        ] {
-            let began = Instant::now();
-            let mut frame = json!({"op": "call_service", "service": "/s", "id": 1});
-            if let Some(timeout) = timeout {
-                frame["timeout"] = json!(timeout);
-            }
-            caller.send(frame).await;
-            let response = caller.receive().await;
-            assert_elapsed(began, Duration::from_secs_f64(seconds));
-            assert_eq!(response["result"], false);
-            assert!(
-                response["status"].as_str().unwrap().contains("timeout"),
-                "{response}"
-            );
-        }
-    });
-}
-
 /// Where the process has stood still, answer and timeout are heard of at the same moment, and the answer may be the first.
 #[test]
 fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_since() {
@@ -70,41 +42,6 @@ fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_s
         assert_eq!(response["result"], false, "{response}");
         assert!(response["status"].as_str().unwrap().contains("timeout"));
         assert_eq!(provider.receive().await["level"], "error");
-    });
-}
-
-#[test]
-fn an_answer_in_time_stops_the_clock() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        provider.provide("/s").await;
-        caller.call("/s", 1).await;
-        let call = provider.receive().await;
-        sleep(Duration::from_secs(9)).await;
-        provider.answer(&call, json!({})).await;
-        assert_eq!(caller.receive().await["result"], true);
-        assert!(caller.hears_nothing_for(Duration::from_secs(60)).await);
-    });
-}
-
-#[test]
-fn a_caller_that_goes_leaves_no_call_behind() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        provider.provide("/s").await;
-        caller.call("/s", 1).await;
-        let call = provider.receive().await;
-        drop(caller);
-        sleep(Duration::from_secs(60)).await;
-        assert_eq!(gateway.gauges.connections(), 1);
-        provider.answer(&call, json!({})).await;
-        assert_eq!(
-            provider.receive().await["level"],
-            "error",
-            "the call is stale"
-        );
     });
 }
 

@@ -50,7 +50,7 @@ fn a_path_is_followed_again_bit_for_bit() {
             )
             .await;
         let end = client
-            .next_where(|frame| frame["op"] == "action_result")
+            .receive_where(|frame| frame["op"] == "action_result")
             .await;
         assert_eq!(end["values"]["error_code"], 0, "{end}");
         sleep(ms(200)).await;

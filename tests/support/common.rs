@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pendularm_client::ending;
 
@@ -67,6 +67,28 @@ pub fn forwarded(provider: &mut Client) -> Value {
     let frame = provider.receive_where("forwarded call", |frame| frame["op"] == "call_service");
     assert!(frame["id"].is_string(), "{frame}");
     frame
+}
+
+/// The message to a client that is one too many, before its end.
+#[track_caller]
+pub fn refusal_of(client: &mut Client) -> String {
+    let status = client.receive();
+    assert_eq!(status["level"], "error", "{status}");
+    assert!(client.is_closed());
+    status["msg"].as_str().unwrap().to_owned()
+}
+
+/// Whether a new client has a place once the end of another has been noticed.
+pub fn is_served_at_last(address: SocketAddr) -> bool {
+    let began = Instant::now();
+    while began.elapsed() < PATIENCE {
+        let mut next = Client::to(address);
+        next.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
+        if next.receive()["op"] == "service_response" {
+            return true;
+        }
+    }
+    false
 }
 
 /// Answers a call that has reached a provider, or pretends to.
@@ -146,7 +168,8 @@ impl Runtime {
         Self::spawn(without_variables(env), "127.0.0.1:0", arguments)
     }
 
-    fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
+    /// The same, of a command with variables of its own.
+    pub fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
         let mut child = command
             .args(["--bind", bind])
             .args(arguments)
@@ -212,9 +235,14 @@ pub struct Logged {
 }
 
 impl Logged {
-    pub fn start(mut command: Command, stdout: impl Into<Stdio>) -> Self {
+    pub fn start(command: Command, stdout: impl Into<Stdio>) -> Self {
+        Self::at("info", command, stdout)
+    }
+
+    /// The same with another level of the log.
+    pub fn at(level: &str, mut command: Command, stdout: impl Into<Stdio>) -> Self {
         let mut child = command
-            .args(["--bind", "127.0.0.1:0", "--log", "info"])
+            .args(["--bind", "127.0.0.1:0", "--log", level])
             .stdin(Stdio::null())
             .stdout(stdout)
             .stderr(Stdio::piped())
@@ -223,19 +251,22 @@ impl Logged {
         let stderr = BufReader::new(child.stderr.take().unwrap());
         let (line_came, lines) = mpsc::channel();
         std::thread::spawn(move || {
-            for line in stderr.lines() {
-                let _ = line_came.send(line.unwrap());
+            for line in stderr.split(b'\n') {
+                let line = String::from_utf8(line.unwrap()).expect("the log is text");
+                // A test that has failed takes no more.
+                let _ = line_came.send(line);
             }
         });
         let mut started = Self {
             child,
-            address: SocketAddr::from(([0; 4], 0)),
+            address: SocketAddr::from(([127, 0, 0, 1], 0)),
             lines,
             log: Vec::new(),
         };
         let line = started.await_line("serving rosbridge clients");
-        let address = line.split_once("address=").unwrap().1;
-        started.address = address.parse().unwrap();
+        let port = line.split_once("127.0.0.1:").unwrap().1;
+        let digits: String = port.chars().take_while(char::is_ascii_digit).collect();
+        started.address.set_port(digits.parse().unwrap());
         started
     }
 

@@ -12,7 +12,7 @@ use pendularm::actors::arm::sim::{ArmPose, ArmSim};
 use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::registry::Registry;
+use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
@@ -24,10 +24,24 @@ use pendularm::math::pid::Gains;
 /// The nodes that tests ask without a client.
 pub struct Started<const N: usize> {
     pub arm: Addr<ArmSim<N>>,
-    pub action: Addr<IkAction<N>>,
-    pub trial: Addr<IkTrial<N>>,
     pub study: Addr<Study<N>>,
-    pub rosapi: Addr<RosapiNode<N>>,
+    pub pool: WorkerPool,
+}
+
+/// Starts all nodes and hands them to the registry. Computations wait for the turns of the pool.
+pub async fn start_whole<const N: usize>(
+    registry: &Addr<Registry>,
+    gauges: &Arc<Gauges>,
+    seed: u64,
+) -> Started<N>
+where
+    Gains<N>: Default,
+{
+    let mut nodes = Nodes::default();
+    let pool = WorkerPool::without_threads();
+    let started = start_nodes(registry, gauges, &pool, seed, &mut nodes);
+    registry.send(Attach(nodes)).await.unwrap();
+    started
 }
 
 /// Starts all nodes for this registry and attaches them to `nodes`. Computations wait for the turns of `pool`.
@@ -51,7 +65,7 @@ where
     let arm = arm.start();
     ArmSim::attach(&arm, nodes);
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(&arm));
-    let (action, trial) = start_goal_nodes(registry, pose, tracker, seed, nodes);
+    start_goal_nodes(registry, pose, tracker, seed, nodes);
     PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
     let study = Study::new(arm.clone().recipient(), pool.clone()).start();
     Study::attach(&study, nodes);
@@ -64,10 +78,8 @@ where
     TfRepublisher::attach(&frames, nodes);
     Started {
         arm,
-        action,
-        trial,
         study,
-        rosapi,
+        pool: pool.clone(),
     }
 }
 

@@ -1,29 +1,25 @@
-//! The nodes around a goal on one thread whose clock stands still until nobody has anything to do, and a client that
-//! speaks rosbridge through an in-memory pipe: tests in virtual time share them.
+//! All nodes on one thread whose clock stands still until nobody has anything to do, and a client that speaks rosbridge
+//! through an in-memory pipe: tests in virtual time share them.
 //!
-//! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and always in the same way, so that steps, messages and their order can be counted.
+//! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and
+//! always in the same way, so that steps, messages and their order can be counted.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::Duration;
 
-pub(crate) use crate::json::{number, numbers};
-use crate::nodes::{Started, start_nodes};
+use crate::nodes::{Started, start_whole};
 use actix::prelude::*;
-use pendularm::actors::arm::ik_action::{
-    CancelGoal, CancelRejected, GoalTracker, IkAction, SendGoal,
-};
-use pendularm::actors::arm::ik_trial::IkTrial;
+use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
-    AddBarrier, ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset,
-    SetParams, SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    AddBarrier, ArmPose, ArmSim, CommandGoal, EndGoal, GoalJudged, Pose, Reset, SetParams,
+    SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::registry::{Attach, Registry};
+use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::node::{Ask, Call, Publish, Reply};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::wire::Nodes;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
@@ -41,15 +37,13 @@ pub const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// All nodes that a goal concerns, joined as the runtime joins them.
+/// All nodes, joined as the runtime joins them.
 pub struct Stage<const N: usize> {
     pub registry: Addr<Registry>,
     pub arm: Addr<ArmSim<N>>,
-    pub action: Addr<IkAction<N>>,
-    pub trial: Addr<IkTrial<N>>,
     /// Computations, which nobody does unless a test has its turns.
     pub pool: WorkerPool,
-    gauges: Arc<Gauges>,
+    pub gauges: Arc<Gauges>,
 }
 
 impl<const N: usize> Stage<N>
@@ -63,18 +57,10 @@ where
     pub async fn with_seed(seed: u64) -> Self {
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();
-        let mut nodes = Nodes::default();
-        let pool = WorkerPool::without_threads();
-        let started = start_nodes(&registry, &gauges, &pool, seed, &mut nodes);
-        let Started {
-            arm, action, trial, ..
-        } = started;
-        registry.send(Attach(nodes)).await.unwrap();
+        let Started { arm, pool, .. } = start_whole(&registry, &gauges, seed).await;
         Self {
             registry,
             arm,
-            action,
-            trial,
             pool,
             gauges,
         }
@@ -107,31 +93,6 @@ where
         asked(&self.arm, Reset::default()).await;
     }
 
-    pub async fn pause(&self, paused: bool) {
-        let pause = Pause {
-            paused: Some(paused),
-            ..Pause::default()
-        };
-        asked(&self.arm, pause).await;
-    }
-
-    /// Switches the controller on.
-    pub async fn enable(&self) {
-        let enable = Enable {
-            enabled: Some(true),
-            ..Enable::default()
-        };
-        asked(&self.arm, enable).await;
-    }
-
-    pub async fn set_lengths(&self, lengths: [f64; N]) {
-        let params = SetParams {
-            lengths: Some(lengths),
-            ..SetParams::default()
-        };
-        asked(&self.arm, params).await;
-    }
-
     /// Has the controller hold `position` from the next step on, as the registry does for a message on
     /// `/joint_trajectory`.
     pub async fn hold(&self, position: [f64; N]) {
@@ -141,16 +102,6 @@ where
             done: None,
         };
         self.arm.send(held).await.unwrap();
-    }
-
-    /// Sends a goal that must be accepted and gives its id.
-    pub async fn send_goal(&self, goal: SendGoal<N>) -> String {
-        asked(&self.action, goal).await.expect("an accepted goal")
-    }
-
-    /// Cancels the active goal, whichever it is.
-    pub async fn cancel(&self) -> Result<(), CancelRejected> {
-        asked(&self.action, CancelGoal::default()).await
     }
 }
 
@@ -197,18 +148,10 @@ impl DerefMut for Client {
 }
 
 impl Client {
-    pub async fn next(&mut self) -> Value {
-        self.receive().await
-    }
-
     /// Hears all messages until now; its own questions for that are not remembered.
     pub async fn settle(&mut self) {
         self.0.settle().await;
         self.heard.pop();
-    }
-
-    pub async fn next_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
-        self.receive_where(wanted).await
     }
 
     pub async fn unsubscribe(&mut self, topic: &str) {
@@ -244,7 +187,7 @@ impl Client {
         let before = self.heard.len();
         let listen = async {
             loop {
-                self.next().await;
+                self.receive().await;
             }
         };
         let _: Result<(), _> = timeout(time, listen).await;
@@ -254,22 +197,6 @@ impl Client {
     /// The messages on `topic` so far.
     pub fn messages(&self, topic: &str) -> Vec<Value> {
         messages(&self.heard, topic)
-    }
-
-    /// All that was heard so far in few words: topics, services and, of results, the outcome. Statuses are left out.
-    pub fn story(&self) -> Vec<String> {
-        let words = |frame: &Value| match frame["op"].as_str() {
-            Some("publish") => {
-                let topic = frame["topic"].as_str().unwrap();
-                let msg = &frame["msg"];
-                let goal = msg["goal_id"].as_str().unwrap_or_default();
-                let outcome = msg["outcome"].as_str().unwrap_or_default();
-                Some(format!("{topic} {goal} {outcome}").trim_end().to_owned())
-            }
-            Some("service_response") => Some(frame["service"].as_str().unwrap().to_owned()),
-            _ => None,
-        };
-        self.heard.iter().filter_map(words).collect()
     }
 }
 

@@ -27,23 +27,6 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Takes apart the answers that came before the end of the stream, each as long as it says.
-    pub fn parse_all(mut bytes: &[u8]) -> Vec<Self> {
-        let mut answers = Vec::new();
-        while !bytes.is_empty() {
-            let text = String::from_utf8_lossy(bytes).to_ascii_lowercase();
-            let (head, _) = text.split_once("\r\n\r\n").expect("a head");
-            let length = head
-                .split("\r\n")
-                .find_map(|line| line.strip_prefix("content-length: "));
-            let length: usize = length.expect("a length").parse().unwrap();
-            let (answer, rest) = bytes.split_at(head.len() + 4 + length);
-            answers.push(Self::parse(answer));
-            bytes = rest;
-        }
-        answers
-    }
-
     /// Takes an answer apart, which is all that came before the end of the stream.
     pub fn parse(bytes: &[u8]) -> Self {
         let end = bytes
@@ -103,15 +86,10 @@ pub fn rest(stream: &mut TcpStream) -> Vec<u8> {
     bytes
 }
 
-/// Sends a request with these header lines, each with its line end.
-pub fn request(address: SocketAddr, path: &str, headers: &str) -> Answer {
-    let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
-    Answer::parse(&exchange(address, request.as_bytes()))
-}
-
-/// The same with our own host.
+/// Asks for a path with our own host.
 pub fn get(address: SocketAddr, path: &str) -> Answer {
-    request(address, path, &format!("Host: {address}\r\n"))
+    let request = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n");
+    Answer::parse(&exchange(address, request.as_bytes()))
 }
 
 /// The header lines of a handshake that is as it has to be.
@@ -161,10 +139,6 @@ impl DerefMut for Socket {
 impl Socket {
     pub fn open(address: SocketAddr) -> Self {
         Self(Client::web(address))
-    }
-
-    pub fn open_with(address: SocketAddr, target: &str, headers: &str) -> Self {
-        Self(Client::web_with(address, target, headers))
     }
 
     /// Calls a service and returns its response, which must be the very next frame.

@@ -4,8 +4,7 @@
 
 use std::time::Instant;
 
-use crate::common::{Client, PATIENCE, Runtime, stat};
-use serde_json::json;
+use crate::common::{Client, Runtime, is_served_at_last, refusal_of, stat};
 
 /// Sets the program's soft limit of open files, under a hard one of 40.
 fn set_soft_limit(runtime: &Runtime, files: usize) {
@@ -24,27 +23,6 @@ fn processor_seconds(runtime: &Runtime) -> f64 {
     (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
 }
 
-/// A client that is one too many: its message, and the end.
-fn is_refused(client: &mut Client) -> String {
-    let status = client.receive();
-    assert_eq!(status["level"], "error", "{status}");
-    assert!(client.is_closed());
-    status["msg"].as_str().unwrap().to_owned()
-}
-
-/// Whether a new client has a place once the end of another has been noticed.
-fn is_served_at_last(runtime: &Runtime) -> bool {
-    let began = Instant::now();
-    while began.elapsed() < PATIENCE {
-        let mut next = runtime.connect();
-        next.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
-        if next.receive()["op"] == "service_response" {
-            return true;
-        }
-    }
-    false
-}
-
 /// Clients that the program is asked to serve, all but the kept places.
 const CLIENTS: usize = 1024 - 16;
 
@@ -60,11 +38,11 @@ fn a_thousand_clients_are_served_and_the_next_is_told_so() {
         client.settle();
     }
     for _ in 0..3 {
-        let told = is_refused(&mut runtime.connect());
+        let told = refusal_of(&mut runtime.connect());
         assert!(told.contains("1024"), "{told}");
     }
     clients.pop();
-    assert!(is_served_at_last(&runtime));
+    assert!(is_served_at_last(runtime.address));
 }
 
 #[test]
@@ -77,7 +55,7 @@ fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told(
     // More than there are files: those that find none wait in the system's queue until others have been told.
     let mut late: Vec<Client> = (0..60).map(|_| runtime.connect()).collect();
     for client in &mut late {
-        assert!(is_refused(client).contains("serves 8 clients"));
+        assert!(refusal_of(client).contains("serves 8 clients"));
     }
     for client in &mut served {
         client.settle();
@@ -107,8 +85,8 @@ fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for()
     assert!(used < 0.5 * took.as_secs_f64(), "{used} s in {took:?}");
     set_soft_limit(&runtime, 40);
     for client in &mut waiting {
-        assert!(is_refused(client).contains("serves 8 clients"));
+        assert!(refusal_of(client).contains("serves 8 clients"));
     }
     served.pop();
-    assert!(is_served_at_last(&runtime));
+    assert!(is_served_at_last(runtime.address));
 }

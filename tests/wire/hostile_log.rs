@@ -3,16 +3,15 @@
 //!
 //! **Invariant:** the program logs into a pipe that is read to its end, so no line is missed.
 
-#[cfg(feature = "web")]
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::thread;
 
-use crate::common::{Client, PATIENCE, end, signal};
+use crate::common::{Client, Logged, end, program, signal};
+use crate::web_client::folder;
 use pendularm::logging::{LINE_BYTES, QUEUE_LINES};
 use serde_json::{Value, json};
 
@@ -34,90 +33,17 @@ const HOSTILE: [&str; 14] = [
     "\\u001b[2J\\n\\x1b\\",
 ];
 
-/// The program, logging everything, in a folder of its own.
-struct Talkative {
-    child: Child,
-    address: SocketAddr,
-    /// Lines of the log as they are read, and those that have been taken.
-    lines: mpsc::Receiver<Vec<u8>>,
-    log: Vec<u8>,
-    folder: PathBuf,
+/// The program, logging everything in this format, and its folder.
+fn talkative(name: &str, format: &str) -> (Logged, PathBuf) {
+    let folder = folder(name);
+    let mut command = program();
+    command.current_dir(&folder).args(["--log-format", format]);
+    (Logged::at("trace", command, Stdio::null()), folder)
 }
 
-impl Talkative {
-    fn start(name: &str) -> Self {
-        Self::with(name, "text")
-    }
-
-    /// The same, with another format of the log.
-    fn with(name: &str, format: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).unwrap();
-        let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-            .args([
-                "--bind",
-                "127.0.0.1:0",
-                "--log",
-                "trace",
-                "--log-format",
-                format,
-            ])
-            .current_dir(&folder)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let mut line = String::new();
-        let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        stdout.read_line(&mut line).unwrap();
-        let address = line.trim().strip_prefix("listening on ").unwrap().parse();
-        let stderr = BufReader::new(child.stderr.take().unwrap());
-        let (line_came, lines) = mpsc::channel();
-        thread::spawn(move || {
-            for line in stderr.split(b'\n') {
-                let mut line = line.expect("standard error is read");
-                line.push(b'\n');
-                // A test that has failed takes no more.
-                let _ = line_came.send(line);
-            }
-        });
-        Self {
-            child,
-            address: address.unwrap(),
-            lines,
-            log: Vec::new(),
-            folder,
-        }
-    }
-
-    /// Waits for a line of the log with this text.
-    fn await_line(&mut self, text: &str) {
-        loop {
-            let line = self.lines.recv_timeout(PATIENCE).expect(text);
-            self.log.extend(&line);
-            if String::from_utf8_lossy(&line).contains(text) {
-                return;
-            }
-        }
-    }
-
-    /// Ends the program in order, and gives its log.
-    fn end(mut self) -> String {
-        signal(self.child.id(), "TERM");
-        let mut log = std::mem::take(&mut self.log);
-        log.extend(self.lines.iter().flatten());
-        assert!(self.child.wait().unwrap().success());
-        String::from_utf8(log).expect("the log is text")
-    }
-}
-
-impl Drop for Talkative {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+/// Ends the program in order, and gives its log.
+fn end_of(runtime: Logged) -> String {
+    runtime.end().join("\n") + "\n"
 }
 
 /// Whether a character does something on a terminal.
@@ -225,7 +151,7 @@ fn ops(text: &str) -> Vec<Value> {
 
 #[test]
 fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it_was() {
-    let runtime = Talkative::start("hostile_log_tcp");
+    let (runtime, folder) = talkative("hostile_log_tcp", "text");
     for text in HOSTILE {
         let mut client = Client::to(runtime.address);
         for op in ops(text) {
@@ -249,9 +175,9 @@ fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it
         client.settle();
         Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
     }
-    let entries: Vec<_> = fs::read_dir(&runtime.folder).unwrap().collect();
+    let entries: Vec<_> = fs::read_dir(&folder).unwrap().collect();
     assert!(entries.is_empty(), "{entries:?}");
-    assert_records(&runtime.end());
+    assert_records(&end_of(runtime));
 }
 
 /// The pipe takes 64 KiB, and the queue its lines. Each client that comes is a line.
@@ -312,7 +238,7 @@ fn a_log_that_nobody_reads_blocks_nobody_and_the_lines_that_are_lost_are_counted
 fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
     use crate::web_client::{Socket, exchange, handshake};
 
-    let mut runtime = Talkative::start("hostile_log_web");
+    let (mut runtime, _) = talkative("hostile_log_web", "text");
     let address = runtime.address;
     for text in HOSTILE {
         for head in [
@@ -343,7 +269,7 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
     // The end gives the log little time: lines that a busy machine has not written by then are
     // missing.
     runtime.await_line("caf\u{e9}.");
-    let log = runtime.end();
+    let log = end_of(runtime);
     assert_records(&log);
     assert!(
         log.contains("request refused") && log.contains("caf\u{e9}."),
@@ -354,7 +280,7 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
 /// A message on the runtime's own topics that carries a client's text is JSON like any other.
 #[test]
 fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
-    let runtime = Talkative::start("hostile_log_topics");
+    let (runtime, _) = talkative("hostile_log_topics", "text");
     let mut listener = Client::to(runtime.address);
     for topic in ["/rosout", "/diagnostics"] {
         listener.subscribe(topic);
@@ -372,12 +298,12 @@ fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
     for frame in listener.kept.iter().chain([&status]) {
         assert!(!frame.to_string().contains("forged"), "{frame}");
     }
-    assert_records(&runtime.end());
+    assert_records(&end_of(runtime));
 }
 
 #[test]
 fn as_json_each_line_of_the_log_is_one_object_whatever_is_sent() {
-    let runtime = Talkative::with("hostile_log_json", "json");
+    let (runtime, _) = talkative("hostile_log_json", "json");
     for text in HOSTILE {
         let mut client = Client::to(runtime.address);
         for op in ops(text) {
@@ -389,7 +315,7 @@ fn as_json_each_line_of_the_log_is_one_object_whatever_is_sent() {
     let mut client = Client::to(runtime.address);
     client.send(&json!({"op": long, "topic": long}));
     client.settle();
-    let log = runtime.end();
+    let log = end_of(runtime);
     assert_objects(&log);
     assert!(
         log.contains("\"level\":\"DEBUG\"") && log.contains("\"connection\":"),

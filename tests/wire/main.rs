@@ -34,7 +34,6 @@ mod faults_files;
 mod faults_slow;
 mod faults_threads;
 mod hostile_log;
-mod hostile_pages;
 mod http;
 mod launch;
 mod mishaps;

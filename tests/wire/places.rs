@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use crate::common::{Client, Logged, PATIENCE, program};
+use crate::common::{Client, Logged, PATIENCE, is_served_at_last, program, refusal_of};
 
 fn serving(clients: &str) -> Logged {
     let mut command = program();
@@ -30,23 +30,7 @@ fn refused(address: SocketAddr, speaks: bool) -> String {
     if speaks {
         client.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
     }
-    let status = client.receive();
-    assert_eq!(status["level"], "error", "{status}");
-    assert!(client.is_closed());
-    status["msg"].as_str().unwrap().to_owned()
-}
-
-/// Waits until a client over TCP is served.
-fn is_served_at_last(address: SocketAddr) -> bool {
-    let began = Instant::now();
-    while began.elapsed() < PATIENCE {
-        let mut next = Client::to(address);
-        next.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
-        if next.receive()["op"] == "service_response" {
-            return true;
-        }
-    }
-    false
+    refusal_of(&mut client)
 }
 
 #[cfg(feature = "cli")]

@@ -13,13 +13,11 @@ use pendularm::record::{
 use serde_json::{Value, json};
 
 use crate::common::{PATIENCE, Runtime, signal};
+use crate::web_client;
 
 /// An empty folder of this test's own.
 pub(super) fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("record-{name}"));
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
+    web_client::folder(&format!("record-{name}"))
 }
 
 pub(super) fn passages(file: &Path) -> (Vec<RecordedMessage>, RecordEnding) {

@@ -4,12 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::nodes::{start_nodes, work_in_this_thread};
+use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
-use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::registry::Attach;
-use pendularm::actors::wire::Nodes;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
@@ -79,11 +76,8 @@ where
     Gains<N>: Default,
 {
     let gateway = Gateway::bare().await;
-    let pool = WorkerPool::without_threads();
-    let mut nodes = Nodes::default();
-    start_nodes::<N>(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
-    gateway.registry.send(Attach(nodes)).await.unwrap();
-    work_in_this_thread(pool);
+    let (registry, gauges) = (&gateway.registry, &gateway.gauges);
+    work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.pool);
     let mut client = gateway.connect(WIDE);
     call(&mut client, "/arm_sim/pause", "{\"data\":true}").await;
     call(&mut client, "/arm_sim/reset", "{}").await;

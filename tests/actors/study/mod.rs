@@ -19,7 +19,6 @@ use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, Consult, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
-    TakeSnapshot,
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{

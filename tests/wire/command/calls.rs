@@ -1,39 +1,9 @@
-//! `service call` and `action send_goal`.
+//! `action send_goal`.
 
 use serde_json::{Value, json};
 
 use super::{Going, json_of, refusal, said};
 use crate::common::Runtime;
-
-#[test]
-fn a_service_is_called_with_yaml_or_json_and_its_refusal_is_the_runtimes() {
-    let runtime = Runtime::start();
-    let call = |args: &[&str]| said(&runtime, &[&["service", "call"], args].concat());
-    assert_eq!(
-        call(&["/pid_controller/enable", "{data: true}"]),
-        "data: true\n"
-    );
-    let gravity = ["/arm_sim/set_params", "gravity: 1.62\nmasses: [1, 0.5]"];
-    let params = call(&gravity);
-    assert_eq!(
-        params,
-        "gravity: 1.62\nmasses:\n- 1.0\n- 0.5\nlengths:\n- 1.0\n- 1.0\n"
-    );
-    let type_name = "pendularm_interfaces/srv/SetIntegrator";
-    let set = ["service", "call", "/arm_sim/set_integrator", type_name];
-    assert_eq!(json_of(&runtime, &set)["method"], "rk4");
-    let set = [&set[..], &["{\"method\": \"verlet\", \"timestep\": 2e-3}"]].concat();
-    assert_eq!(
-        json_of(&runtime, &set),
-        json!({"method": "verlet", "timestep": 0.002})
-    );
-    let refused = |args: &[&str]| refusal(&runtime, &[&["service", "call"], args].concat(), 1);
-    let negative = refused(&["/arm_sim/set_integrator", "{timestep: -1}"]);
-    assert!(negative.starts_with("timestep must be"), "{negative}");
-    assert_eq!(refused(&["/nothing"]), "no provider for service /nothing");
-    let other = refused(&["/arm_sim/reset", "std_srvs/srv/SetBool", "{}"]);
-    assert!(other.contains("not std_srvs/srv/SetBool"), "{other}");
-}
 
 #[test]
 fn a_goal_is_followed_to_its_end_and_a_signal_cancels_it() {

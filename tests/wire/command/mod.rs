@@ -5,9 +5,8 @@ mod calls;
 mod diagnostics;
 mod ending;
 mod hostile;
-mod lists;
 mod naive;
-mod parameters;
+mod table;
 mod topics;
 mod yaml;
 

@@ -2,52 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::{Going, ask, json_of, refusal, said};
+use super::{Going, ask, said};
 use crate::common::{self, Client, Runtime};
-
-#[test]
-fn a_message_is_echoed_in_yaml_as_ros2_does_or_on_a_line_of_json() {
-    let runtime = Runtime::start();
-    let yaml = said(&runtime, &["topic", "echo", "/joint_states", "--once"]);
-    assert!(yaml.starts_with("header:\n  stamp:\n    sec: "), "{yaml}");
-    assert!(
-        yaml.contains("\nname:\n- joint1\n- joint2\nposition:\n- "),
-        "{yaml}"
-    );
-    assert!(yaml.ends_with("---\n"), "{yaml}");
-    let json = json_of(&runtime, &["topic", "echo", "joint_states", "--once"]);
-    assert_eq!(json["name"], json!(["joint1", "joint2"]));
-    let unknown = refusal(&runtime, &["topic", "echo", "/nothing"], 1);
-    assert!(unknown.contains("/nothing is no topic yet"), "{unknown}");
-    let typed = ["topic", "echo", "/clock", "std_msgs/msg/String"];
-    assert_eq!(
-        refusal(&runtime, &typed, 1),
-        "/clock is of type rosgraph_msgs/msg/Clock, not std_msgs/msg/String"
-    );
-    json_of(
-        &runtime,
-        &["topic", "echo", "/clock", "rosgraph_msgs/Clock", "--once"],
-    );
-}
-
-#[test]
-fn a_part_of_a_message_is_echoed_so_many_times() {
-    let runtime = Runtime::start();
-    let echo = |field, more: &[&'static str]| {
-        [&["topic", "echo", "/joint_states", "--field", field], more].concat()
-    };
-    let names = said(&runtime, &echo("name[1]", &["-n", "2"]));
-    assert_eq!(names, "joint2\n---\njoint2\n---\n");
-    let stamp = json_of(&runtime, &echo("header.stamp", &["--times", "1"]));
-    assert!(
-        stamp["sec"].is_u64() && stamp["nanosec"].is_u64(),
-        "{stamp}"
-    );
-    let unknown = refusal(&runtime, &echo("name[2]", &["--once"]), 1);
-    assert_eq!(unknown, "the message has no name[2]");
-    let wrong = echo("name", &["--once", "-n", "2"]);
-    assert_eq!(ask(&runtime, &wrong).status.code(), Some(2), "{wrong:?}");
-}
 
 #[test]
 fn what_another_client_says_acts_on_no_terminal_and_loses_nothing() {

@@ -1,10 +1,8 @@
-//! HTTP on the port: the page, the report, who may ask, bytes that mean harm; and the crates that all of that needs.
-//!
-//! **Invariant:** whatever is sent over HTTP, the arm's parameters stay as they were.
+//! HTTP on the port: the page, the report, long heads; and the crates that all of that needs. `tests/actors/exchanges/http.txt` has the
+//! hosts, origins and tokens that are admitted.
 
 #![cfg(feature = "web")]
 mod dependencies;
-mod hosts;
 mod page;
 mod report;
 mod requests;

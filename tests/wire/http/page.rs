@@ -1,12 +1,12 @@
 //! The page and its files: their types, their policy, one connection for all of them, and where they are.
 
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use crate::common::{PATIENCE, Runtime};
+use crate::common::{Logged, PATIENCE, Runtime, program};
 use crate::web_client::{Answer, folder, get, rest};
 use pendularm::web::page::ASSETS;
 
@@ -70,43 +70,6 @@ fn all_files_of_the_page_come_over_one_connection() {
 }
 
 #[test]
-fn the_page_may_run_its_own_files_speak_to_its_own_port_and_nothing_else() {
-    let runtime = Runtime::start();
-    let page = get(runtime.address, "/");
-    let policy = page.header("content-security-policy").unwrap();
-    let own = format!("connect-src 'self' ws://{}", runtime.address);
-    for rule in [
-        "default-src 'none'",
-        "script-src 'self'",
-        "style-src 'self'",
-        &own,
-        "frame-ancestors 'none'",
-        "base-uri 'none'",
-        "form-action 'none'",
-        // No markup is made of a text.
-        "require-trusted-types-for 'script'",
-        "trusted-types 'none'",
-    ] {
-        assert!(
-            policy.split("; ").any(|one| one == rule),
-            "{rule} in {policy}"
-        );
-    }
-    assert!(
-        !policy.contains("unsafe") && !policy.contains('*'),
-        "{policy}"
-    );
-    assert_eq!(page.header("x-content-type-options"), Some("nosniff"));
-    assert_eq!(page.header("referrer-policy"), Some("no-referrer"));
-    let elsewhere = ["http://", "https://", "//"];
-    for quote in ["src=\"", "href=\""] {
-        for start in elsewhere {
-            assert!(!page.text().contains(&format!("{quote}{start}")));
-        }
-    }
-}
-
-#[test]
 fn pages_of_the_named_origins_may_frame_the_page_and_its_report_and_no_others() {
     let folder = folder("framed");
     std::fs::write(folder.join("index.html"), "report").unwrap();
@@ -132,53 +95,10 @@ fn pages_of_the_named_origins_may_frame_the_page_and_its_report_and_no_others() 
 }
 
 #[test]
-fn what_is_not_there_is_a_404_that_says_what_is() {
-    let runtime = Runtime::start();
-    for path in [
-        "/nothing",
-        "/index.htm",
-        "//",
-        "/../Cargo.toml",
-        "/%2e%2e/Cargo.toml",
-        "/style.css/",
-    ] {
-        let answer = get(runtime.address, path);
-        assert_eq!(answer.status, 404, "{path}");
-        assert!(answer.text().contains("the page is at /"), "{path}");
-        assert_eq!(
-            answer.header("content-type"),
-            Some("text/plain; charset=utf-8")
-        );
-    }
-}
-
-#[test]
 fn the_log_names_the_pages_address_at_the_start() {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-        .args(["--bind", "127.0.0.1:0", "--log", "info"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    let mut stdout = BufReader::new(child.stdout.take().unwrap());
-    stdout.read_line(&mut line).unwrap();
-    let address = line.trim().strip_prefix("listening on ").unwrap();
-    let page = format!("page: http://{address}/");
-    let log = BufReader::new(child.stderr.take().unwrap());
-    let found = log
-        .lines()
-        .map_while(Result::ok)
-        .any(|line| line.contains(&page));
-    let _ = child.kill();
-    let _ = child.wait();
-    let mut more = String::new();
-    stdout.read_to_string(&mut more).unwrap();
-    assert!(
-        found && more.is_empty(),
-        "{page} in the log, nothing else on stdout"
-    );
+    let mut runtime = Logged::start(program(), Stdio::null());
+    let page = format!("page: http://{}/", runtime.address);
+    runtime.await_line(&page);
 }
 
 #[test]

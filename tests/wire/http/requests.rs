@@ -1,86 +1,11 @@
-//! Requests as bytes: heads that are too long, too slow or none, and bodies that nobody executes.
+//! Requests as bytes on a real socket: heads that are too long, slow or cut.
 
 use std::io::Write;
 use std::net::{Shutdown, TcpStream};
 
-use crate::common::{PATIENCE, Runtime, SET_GRAVITY};
-use crate::web_client::{Answer, exchange, get, request, rest};
+use crate::common::{PATIENCE, Runtime};
+use crate::web_client::{Answer, exchange, get, rest};
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
-
-/// A request behind another is one of its own only where nobody can read it as the body of the first.
-#[test]
-fn no_second_request_is_smuggled_behind_the_first() {
-    let runtime = Runtime::start();
-    let address = runtime.address;
-    let second = format!("GET /nothing HTTP/1.1\r\nHost: {address}\r\n\r\n");
-    for (lengths, statuses) in [
-        ("", &[200, 404][..]),
-        ("Connection: keep-alive\r\n", &[200, 404]),
-        ("Content-Length: 0\r\n", &[200, 404]),
-        ("Connection: close\r\n", &[200]),
-        ("Content-Length: 5\r\nContent-Length: 0\r\n", &[400]),
-        ("Content-Length: 5\r\n", &[400]),
-        ("Transfer-Encoding: chunked\r\n", &[400]),
-        (
-            "Transfer-Encoding: chunked\r\nContent-Length: 4\r\n",
-            &[400],
-        ),
-        (
-            "Transfer-Encoding: xchunked\r\nContent-Length: -1\r\n",
-            &[400],
-        ),
-    ] {
-        let bodies = if statuses == [400] {
-            &["", "0\r\n\r\n"][..]
-        } else {
-            &[""]
-        };
-        for body in bodies {
-            let request =
-                format!("GET / HTTP/1.1\r\nHost: {address}\r\n{lengths}\r\n{body}{second}");
-            let answers = Answer::parse_all(&exchange(address, request.as_bytes()));
-            let came: Vec<u16> = answers.iter().map(|one| one.status).collect();
-            assert_eq!(came, statuses, "{lengths}");
-        }
-    }
-}
-
-/// The opening is a GET, so another method can come behind it only.
-#[test]
-fn another_method_behind_a_request_is_a_405_and_the_last() {
-    let runtime = Runtime::start();
-    let address = runtime.address;
-    let host = format!("Host: {address}\r\n");
-    for method in ["POST", "PUT", "OPTIONS", "X"] {
-        let request = format!(
-            "GET / HTTP/1.1\r\n{host}\r\n{method} / HTTP/1.1\r\n{host}\r\nGET / HTTP/1.1\r\n{host}\r\n"
-        );
-        let answers = Answer::parse_all(&exchange(address, request.as_bytes()));
-        let came: Vec<u16> = answers.iter().map(|one| one.status).collect();
-        assert_eq!(came, [200, 405], "{method}");
-        assert_eq!(answers[1].header("allow"), Some("GET, HEAD"));
-        assert_eq!(answers[1].header("connection"), Some("close"));
-    }
-}
-
-#[test]
-fn what_is_no_request_is_a_400_that_says_why() {
-    let runtime = Runtime::start();
-    for head in [
-        "GET /\r\n\r\n",
-        "GET / HTTP/1.2\r\n\r\n",
-        "GET / HTTP/1.1\r\nHost\r\n\r\n",
-        "GET / HTTP/1.1\r\nHo st: a\r\n\r\n",
-        "GET / HTTP/1.1\r\nHost: a\x01b\r\n\r\n",
-        "GET / HTTP/1.1\r\n Host: folded\r\n\r\n",
-        "GET http://127.0.0.1/ HTTP/1.1\r\n\r\n",
-        "GET \t HTTP/1.1\r\n\r\n",
-    ] {
-        let answer = Answer::parse(&exchange(runtime.address, head.as_bytes()));
-        assert_eq!(answer.status, 400, "{head:?}");
-        assert!(answer.text().contains("not a well-formed HTTP request"));
-    }
-}
 
 #[test]
 fn a_huge_head_is_refused_and_what_follows_is_swallowed() {
@@ -119,55 +44,6 @@ fn a_request_that_comes_byte_by_byte_is_answered() {
     }
     stream.shutdown(Shutdown::Write).unwrap();
     assert_eq!(Answer::parse(&rest(&mut stream)).status, 200);
-}
-
-#[test]
-fn json_behind_a_request_is_not_executed_however_it_is_hidden() {
-    let runtime = Runtime::start();
-    let own = format!("Host: {}\r\n", runtime.address);
-    for head in [
-        format!("GET / HTTP/1.1\r\n{own}\r\n"),
-        format!("GET / HTTP/1.1\r\n{own}Content-Length: 100\r\n\r\n"),
-        format!("GET / HTTP/1.1\r\n{own}Transfer-Encoding: chunked\r\n\r\n"),
-        "GET / HTTP/1.1\r\n\r\n".to_owned(),
-        "GET \r\n".to_owned(),
-        "GET /\r\n\r\nGET / HTTP/1.1\r\n\r\n".to_owned(),
-    ] {
-        // Two line ends: a head that has not ended does so here.
-        let bytes = format!("{head}{SET_GRAVITY}\r\n\r\n{SET_GRAVITY}");
-        let answers = Answer::parse_all(&exchange(runtime.address, bytes.as_bytes()));
-        let (first, others) = answers.split_first().unwrap();
-        assert!(others.iter().all(|one| one.status == 400), "{head:?}");
-        assert!([200, 400].contains(&first.status), "{head:?}");
-    }
-    runtime.assert_nothing_was_executed();
-}
-
-#[test]
-fn nothing_of_a_request_becomes_a_header_of_the_answer() {
-    let runtime = Runtime::start();
-    let port = runtime.address.port();
-    let paths = [
-        "/%0d%0aSet-Cookie:%20a=b",
-        "/report/%0d%0aSet-Cookie:%20a=b.svg",
-        "/?token=%0d%0aSet-Cookie:%20a=b",
-    ];
-    for path in paths {
-        let answer = get(runtime.address, path);
-        assert_eq!(answer.header("set-cookie"), None, "{path}");
-    }
-    let hosts = [
-        format!("localhost:{port}; script-src *"),
-        format!("localhost:{port} evil"),
-        format!("localhost:{port}\t'unsafe-inline'"),
-    ];
-    for host in hosts {
-        let answer = request(runtime.address, "/", &format!("Host: {host}\r\n"));
-        assert_eq!(answer.status, 403, "{host}");
-    }
-    let origin = format!("Host: localhost:{port}\r\nOrigin: http://evil.example\r\n");
-    let answer = request(runtime.address, "/", &origin);
-    assert_eq!(answer.header("access-control-allow-origin"), None);
 }
 
 #[test]

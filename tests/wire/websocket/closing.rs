@@ -1,6 +1,6 @@
-//! Closes: for messages that are too long, for frames against the protocol, at the client's wish, at the runtime's end.
+//! Closes: for messages that are too long, for frames against the protocol, at the client's wish.
 
-use crate::common::{Runtime, signal};
+use crate::common::Runtime;
 use crate::web_client::Socket;
 use pendularm_client::websocket::{LAST, opcode};
 use serde_json::json;
@@ -43,18 +43,6 @@ fn a_close_is_answered_with_the_same_code_and_the_stream_ends() {
     socket.close(1000, "done");
     assert_eq!(socket.close_code(), Some(1000));
     assert!(socket.is_closed());
-}
-
-#[cfg(unix)]
-#[test]
-fn the_runtimes_end_closes_with_1001_and_in_time() {
-    let mut runtime = Runtime::start();
-    let mut socket = Socket::open(runtime.address);
-    socket.settle();
-    signal(runtime.pid(), "TERM");
-    assert_eq!(socket.close_code(), Some(1001));
-    let status = runtime.end().0;
-    assert_eq!(status.code(), Some(0));
 }
 
 /// Frames as no client of the protocol sends them, and the code with which each is answered. Of the lengths, nothing may

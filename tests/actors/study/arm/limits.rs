@@ -5,13 +5,13 @@ use super::*;
 #[test]
 fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
-        arm.want(Topic::JointStates, true).await;
+        let mut arm = Consulting::new(0.004).await;
+        arm.client.subscribe(Topic::JointStates.name()).await;
         for timestep in [0.01, 0.02, 0.03] {
             arm.ask(integrator(Some(timestep), Some(Method::Verlet)))
                 .await;
             arm.ask(enable(true)).await;
-            arm.hold([timestep, 1.0], [0.0; 2]).await;
+            arm.hold([timestep, 1.0]).await;
             sleep(Duration::from_secs(2)).await;
         }
         assert_eq!(arm.questions().await, []);
@@ -22,8 +22,8 @@ fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
 #[test]
 fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
-        arm.want(Topic::Diagnostics, true).await;
+        let mut arm = Consulting::new(0.004).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         let first = arm.questions().await;
         let free = ControlLoop::free(Arm::default());
         assert_eq!(first, [free]);
@@ -37,7 +37,7 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
             ..SetGains::default()
         })
         .await;
-        arm.hold([1.0, -1.0], [0.0; 2]).await;
+        arm.hold([1.0, -1.0]).await;
         arm.ask(pause(true)).await;
         arm.ask(pause(false)).await;
         assert_eq!(arm.questions().await, []);
@@ -70,14 +70,14 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
         .await;
         control.gains.ki = [0.0; 2];
         assert_eq!(arm.questions().await, [control]);
-        arm.hold([0.5, 0.5], [0.0; 2]).await;
+        arm.hold([0.5, 0.5]).await;
         control.setpoint.position = [0.5; 2];
         assert_eq!(arm.questions().await, [control]);
         arm.ask(Reset::default()).await;
         control.setpoint.position = [0.0; 2];
         assert_eq!(arm.questions().await, [control]);
-        arm.want(Topic::Diagnostics, false).await;
-        arm.hold([0.5, 0.5], [0.0; 2]).await;
+        arm.client.unsubscribe(Topic::Diagnostics.name()).await;
+        arm.hold([0.5, 0.5]).await;
         assert_eq!(arm.questions().await, []);
     });
 }
@@ -86,11 +86,11 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
 #[test]
 fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
+        let mut arm = Consulting::new(0.004).await;
         arm.ask(enable(true)).await;
-        arm.want(Topic::Diagnostics, true).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         for k in 0..2000 {
-            arm.hold([1e-4 * f64::from(k), 0.0], [0.0; 2]).await;
+            arm.hold([1e-4 * f64::from(k), 0.0]).await;
             sleep(Duration::from_millis(1)).await;
         }
         let questions = arm.questions().await;
@@ -104,16 +104,16 @@ fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
 #[test]
 fn a_limit_of_another_loop_is_never_held_against_the_arm() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.0).await;
-        arm.want(Topic::Diagnostics, true).await;
+        let mut arm = Consulting::new(0.0).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         // Between two ticks, so that none comes between the change and the message.
         sleep(Duration::from_millis(508)).await;
-        arm.heard.messages(Topic::Diagnostics);
+        arm.told(Topic::Diagnostics.name()).await;
         arm.oracle.limit.set(0.004);
         arm.ask(enable(true)).await;
         arm.ask(pause(true)).await;
         sleep(Duration::from_millis(100)).await;
-        let told = arm.heard.messages(Topic::Diagnostics);
+        let told = arm.told(Topic::Diagnostics.name()).await;
         let told: Vec<_> = told
             .iter()
             .map(|one| {

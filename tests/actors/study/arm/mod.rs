@@ -6,7 +6,10 @@ mod warnings;
 use std::ops::Deref;
 
 use super::*;
-use crate::arm_sim::{ArmBench, enable, pause};
+use crate::arm_steps::{enable, pause};
+use crate::stage::{Client, Stage, asked};
+use pendularm::actors::arm::sim::ArmSim;
+use pendularm::actors::node::{Ask, Call};
 
 /// Stands in for the study: keeps what it is asked, and always gives the same answer.
 #[derive(Clone)]
@@ -36,17 +39,18 @@ impl Handler<HeldLimit<2>> for Oracle {
     }
 }
 
-/// An arm that asks the study's stand-in.
+/// An arm that asks the study's stand-in, and a client that hears what it publishes.
 struct Consulting {
-    bench: ArmBench<2>,
+    stage: Stage<2>,
+    client: Client,
     oracle: Oracle,
 }
 
 impl Deref for Consulting {
-    type Target = ArmBench<2>;
+    type Target = Stage<2>;
 
-    fn deref(&self) -> &ArmBench<2> {
-        &self.bench
+    fn deref(&self) -> &Stage<2> {
+        &self.stage
     }
 }
 
@@ -57,16 +61,35 @@ impl Consulting {
             period_limit: Rc::new(Cell::new(f64::INFINITY)),
             limit: Rc::new(Cell::new(limit)),
         };
-        let bench = ArmBench::new(Arm::default());
+        let stage = Stage::start().await;
         let study = oracle.clone().start().recipient();
-        bench.arm.send(Consult(study)).await.unwrap();
-        Self { bench, oracle }
+        stage.arm.send(Consult(study)).await.unwrap();
+        Self {
+            client: stage.connect(),
+            stage,
+            oracle,
+        }
+    }
+
+    async fn ask<A: Ask>(&self, ask: A) -> A::Answer
+    where
+        ArmSim<2>: Handler<Call<A>>,
+    {
+        asked(&self.stage.arm, ask).await
     }
 
     /// Questions to the study since the last look, once there has been time to ask.
     async fn questions(&self) -> Vec<ControlLoop<2>> {
         sleep(Duration::from_millis(150)).await;
         std::mem::take(&mut self.oracle.asked.borrow_mut())
+    }
+
+    /// Messages on a topic since the last look at any.
+    async fn told(&mut self, topic: &str) -> Vec<Value> {
+        self.client.settle().await;
+        let told = self.client.messages(topic);
+        self.client.heard.clear();
+        told
     }
 }
 

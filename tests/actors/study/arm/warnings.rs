@@ -5,11 +5,11 @@ use super::*;
 #[test]
 fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
+        let mut arm = Consulting::new(0.004).await;
         arm.ask(enable(true)).await;
-        arm.want(Topic::Diagnostics, true).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         sleep(Duration::from_millis(2100)).await;
-        for message in arm.heard.messages(Topic::Diagnostics) {
+        for message in arm.told(Topic::Diagnostics.name()).await {
             assert_eq!(message["status"][0]["level"], 0);
             assert_eq!(
                 (
@@ -25,10 +25,10 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
             for (timestep, level) in [(0.005, 1), (0.004, 0)] {
                 // Within a tick of the change, not a second later.
                 sleep(Duration::from_millis(5)).await;
-                arm.heard.messages(Topic::Diagnostics);
+                arm.told(Topic::Diagnostics.name()).await;
                 arm.ask(integrator(Some(timestep), None)).await;
                 sleep(Duration::from_millis(20)).await;
-                let told = arm.heard.messages(Topic::Diagnostics);
+                let told = arm.told(Topic::Diagnostics.name()).await;
                 let status = &told[0]["status"][0];
                 assert_eq!(
                     (&status["level"], &status["message"]),
@@ -48,7 +48,7 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
         arm.oracle.limit.set(0.0);
         arm.ask(enable(false)).await;
         sleep(Duration::from_millis(300)).await;
-        let told = arm.heard.messages(Topic::Diagnostics);
+        let told = arm.told(Topic::Diagnostics.name()).await;
         assert_eq!(
             value(told.last().unwrap(), "warning"),
             "rk4 is predicted to be unstable at every timestep with the controller off"
@@ -60,10 +60,10 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
 #[test]
 fn a_warning_names_the_clock_that_is_too_slow() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
+        let mut arm = Consulting::new(0.004).await;
         arm.oracle.period_limit.set(0.008);
         arm.ask(enable(true)).await;
-        arm.want(Topic::Diagnostics, true).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         let period = |period: f64| SetPeriod {
             period: Some(period),
             ..SetPeriod::default()
@@ -93,9 +93,9 @@ fn a_warning_names_the_clock_that_is_too_slow() {
             arm.ask(period(time)).await;
             arm.ask(integrator(Some(timestep), None)).await;
             sleep(Duration::from_millis(300)).await;
-            arm.heard.messages(Topic::Diagnostics);
+            arm.told(Topic::Diagnostics.name()).await;
             sleep(Duration::from_millis(1100)).await;
-            let told = arm.heard.messages(Topic::Diagnostics);
+            let told = arm.told(Topic::Diagnostics.name()).await;
             assert_eq!(value(&told[0], "warning"), warning, "{time} and {timestep}");
             assert_eq!(value(&told[0], "control_period_limit"), "0.008");
         }
@@ -105,15 +105,15 @@ fn a_warning_names_the_clock_that_is_too_slow() {
 #[test]
 fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
     in_virtual_time(async {
-        let arm = Consulting::new(f64::INFINITY).await;
-        arm.want(Topic::Diagnostics, true).await;
+        let mut arm = Consulting::new(f64::INFINITY).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         arm.ask(pause(true)).await;
         // At rest without gravity, so that nothing moves either.
         arm.ask(gravity(0.0)).await;
         arm.ask(Reset::default()).await;
         arm.ask(integrator(Some(1e6), None)).await;
         sleep(Duration::from_secs(2)).await;
-        let told = arm.heard.messages(Topic::Diagnostics);
+        let told = arm.told(Topic::Diagnostics.name()).await;
         let message = told.last().unwrap();
         assert_eq!(
             (value(message, "timestep_limit"), value(message, "warning")),
@@ -127,13 +127,13 @@ fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
 #[test]
 fn a_motion_too_fast_for_the_timestep_is_warned_of() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.2).await;
-        arm.want(Topic::Diagnostics, true).await;
+        let mut arm = Consulting::new(0.2).await;
+        arm.client.subscribe(Topic::Diagnostics.name()).await;
         arm.ask(pause(true)).await;
         for (timestep, warned) in [(0.05, false), (0.15, true)] {
             arm.ask(integrator(Some(timestep), None)).await;
             sleep(Duration::from_secs(2)).await;
-            let told = arm.heard.messages(Topic::Diagnostics);
+            let told = arm.told(Topic::Diagnostics.name()).await;
             let message = told.last().unwrap();
             let limit: f64 = value(message, "timestep_limit_motion").parse().unwrap();
             assert!((0.05..0.15).contains(&limit), "{limit}");
@@ -145,7 +145,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
         // Beyond both limits the smaller one is told.
         arm.ask(integrator(Some(0.3), None)).await;
         sleep(Duration::from_secs(2)).await;
-        let told = arm.heard.messages(Topic::Diagnostics);
+        let told = arm.told(Topic::Diagnostics.name()).await;
         let warning = value(told.last().unwrap(), "warning").to_owned();
         assert!(warning.contains("16.403 rad/s"), "{warning}");
     });
@@ -154,24 +154,24 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
 #[test]
 fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
     in_virtual_time(async {
-        let arm = Consulting::new(0.004).await;
+        let mut arm = Consulting::new(0.004).await;
         arm.ask(integrator(None, Some(Method::Midpoint))).await;
-        arm.want(Topic::ErrorEstimate, true).await;
+        arm.client.subscribe(Topic::ErrorEstimate.name()).await;
         sleep(Duration::from_secs(3)).await;
-        let told = arm.heard.messages(Topic::ErrorEstimate);
+        let told = arm.told(Topic::ErrorEstimate.name()).await;
         assert!((29..=31).contains(&told.len()), "{}", told.len());
         assert_eq!(arm.gauges.error_estimates(), told.len() as u64);
         arm.ask(pause(true)).await;
         sleep(Duration::from_millis(200)).await;
-        let simulation = arm.bench.arm.send(TakeSnapshot::<2>).await.unwrap().0;
+        let simulation = arm.simulation().await;
         let expected = estimate(&simulation).unwrap();
         assert!(expected.local_error > 0.0);
         assert_eq!(
-            *arm.heard.messages(Topic::ErrorEstimate).last().unwrap(),
+            *arm.told(Topic::ErrorEstimate.name()).await.last().unwrap(),
             json!({"method": "midpoint", "timestep": 0.001, "local_error": expected.local_error,
                 "velocity_error": expected.velocity_error, "error_per_second": expected.error_per_second, "predicted_limit": 0.004})
         );
-        arm.want(Topic::ErrorEstimate, false).await;
+        arm.client.unsubscribe(Topic::ErrorEstimate.name()).await;
         let before = arm.gauges.error_estimates();
         sleep(Duration::from_secs(3)).await;
         assert_eq!(arm.gauges.error_estimates(), before);
@@ -181,18 +181,18 @@ fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
 #[test]
 fn an_arm_that_has_diverged_has_no_local_error() {
     in_virtual_time(async {
-        let arm = Consulting::new(f64::INFINITY).await;
-        arm.want(Topic::ErrorEstimate, true).await;
+        let mut arm = Consulting::new(f64::INFINITY).await;
+        arm.client.subscribe(Topic::ErrorEstimate.name()).await;
         arm.ask(SetGains {
             kp: Some([1e200; 2]),
             ..SetGains::default()
         })
         .await;
-        arm.hold([1.0, 1.0], [0.0; 2]).await;
+        arm.hold([1.0, 1.0]).await;
         arm.ask(integrator(Some(0.01), Some(Method::Euler))).await;
         arm.ask(enable(true)).await;
         sleep(Duration::from_secs(1)).await;
-        let told = arm.heard.messages(Topic::ErrorEstimate);
+        let told = arm.told(Topic::ErrorEstimate.name()).await;
         assert_eq!(
             *told.last().unwrap(),
             json!({"method": "euler", "timestep": 0.01, "local_error": null, "velocity_error": null, "error_per_second": null, "predicted_limit": null})

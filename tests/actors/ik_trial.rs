@@ -1,0 +1,292 @@
+//! A trial between an arm and an `ik_action` that do what a test needs, so that messages cross; and silence where nobody listens.
+//! `exchanges/trials.txt` has what clients see.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
+
+use crate::ik_action::elsewhere;
+use crate::stage::{Client, Published, SilentArm, asked, connect, ms, pass};
+use crate::system::{counting_wake_ups, in_virtual_time};
+use actix::prelude::*;
+use pendularm::actors::arm::ik::{Ik, SolveError};
+use pendularm::actors::arm::ik_action::{
+    CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, IkAction, SendGoal,
+};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, StartTrial, StopTrial};
+use pendularm::actors::arm::sim::{ArmPose, Barrier, Pose};
+use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::node::{Call, Interest, Publish};
+use pendularm::math::goal::Outcome;
+use pendularm::math::kinematics::{Target, Unreachable};
+use pendularm::math::trial::Changes;
+use pendularm::protocol::catalog::Topic;
+use serde_json::{Value, json};
+use tokio::sync::mpsc::unbounded_channel;
+use tokio::time::Instant;
+
+const STATUS: &str = "/ik_trial/status";
+
+fn start(duration: f64, epsilon: f64, success_hold: f64) -> StartTrial {
+    let changes = Changes {
+        duration: Some(duration),
+        epsilon: Some(epsilon),
+        success_hold: Some(success_hold),
+    };
+    StartTrial {
+        changes,
+        ..StartTrial::default()
+    }
+}
+
+/// Starts a trial that must start.
+async fn begin(trial: &Addr<IkTrial<2>>, question: StartTrial) {
+    assert_eq!(asked(trial, question).await.outcome, Ok(()));
+}
+
+/// The latest status, once all that is under way has arrived.
+async fn status(client: &mut Client) -> Value {
+    client.messages_for(ms(101), STATUS).await.pop().unwrap()
+}
+
+/// The part of the stand-ins, shared with the test.
+#[derive(Default)]
+struct Script {
+    lengths: [f64; 2],
+    /// Goals to be refused before one is accepted.
+    refusals: usize,
+    sent: Vec<Target>,
+    /// Told to the latest goal's owner when the trial asks for news, and not before.
+    news: Vec<GoalNews<2>>,
+    owner: Option<Recipient<GoalNews<2>>>,
+}
+
+struct StandIn {
+    script: Rc<RefCell<Script>>,
+    born: Instant,
+}
+
+impl StandIn {
+    fn pose(&self) -> Pose<2> {
+        Pose {
+            lengths: self.script.borrow().lengths,
+            positions: [0.0, 0.0],
+            time: self.born.elapsed().as_secs_f64(),
+            resets: 0,
+            simulated: self.born.elapsed().as_secs_f64(),
+            obstacle: None,
+        }
+    }
+}
+
+impl Actor for StandIn {
+    type Context = Context<Self>;
+}
+
+impl Handler<ArmPose<2>> for StandIn {
+    type Result = Pose<2>;
+
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
+        self.pose()
+    }
+}
+
+impl Handler<Call<SendGoal<2>>> for StandIn {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SendGoal<2>>, _: &mut Context<Self>) {
+        let mut script = self.script.borrow_mut();
+        script.sent.push(call.ask.target);
+        if script.refusals > 0 {
+            script.refusals -= 1;
+            let why = SolveError::Unreachable(Unreachable::NotFinite("x"));
+            return call.reply.conclude(Err(GoalRejected::Unsolved(why)));
+        }
+        script.owner = match call.ask.owner {
+            Some(GoalOwner::Node(owner)) => Some(owner),
+            _ => None,
+        };
+        let id = format!("goal-{}", script.sent.len());
+        call.reply.conclude(Ok(id));
+    }
+}
+
+impl Handler<Call<CancelGoal>> for StandIn {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<CancelGoal>, _: &mut Context<Self>) {
+        call.reply.conclude(Err(CancelRejected::NotActive));
+    }
+}
+
+impl Handler<Barrier> for StandIn {
+    type Result = ();
+
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {
+        let mut script = self.script.borrow_mut();
+        for news in std::mem::take(&mut script.news) {
+            script.owner.as_ref().unwrap().do_send(news);
+        }
+    }
+}
+
+/// The news that the first goal was reached at this time.
+fn reached_at(time: f64) -> GoalNews<2> {
+    GoalNews {
+        goal_id: "goal-1".to_owned(),
+        distance: 0.0,
+        positions: [0.0, 0.0],
+        pose: Pose {
+            lengths: [1.0, 1.0],
+            positions: [0.0, 0.0],
+            time,
+            resets: 0,
+            simulated: time,
+            obstacle: None,
+        },
+        outcome: Some(Outcome::Reached),
+    }
+}
+
+/// A trial between stand-ins, and a client that watches it.
+async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, Client, Instant) {
+    let gauges = std::sync::Arc::default();
+    let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
+    let born = Instant::now();
+    let stand_in = StandIn {
+        script: Rc::clone(script),
+        born,
+    }
+    .start();
+    let goals = GoalClient {
+        send: stand_in.clone().recipient(),
+        cancel: stand_in.clone().recipient(),
+        barrier: stand_in.clone().recipient(),
+    };
+    let publish = registry.clone().recipient();
+    let rng = fastrand::Rng::with_seed(1);
+    let trial = IkTrial::<2>::new(stand_in.recipient(), goals, publish, rng).start();
+    let mut nodes = Nodes::default();
+    IkTrial::attach(&trial, &mut nodes);
+    registry.send(Attach(nodes)).await.unwrap();
+    let mut client = connect(&registry, &gauges);
+    client.subscribe(STATUS).await;
+    (trial, client, born)
+}
+
+/// The arm says that the goal was reached at 0.101 s, then that it is 0.11 s. The word about the goal goes by way of
+/// `ik_action` and may be slower; it counts all the same.
+#[test]
+fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
+    in_virtual_time(async {
+        let script = Rc::new(RefCell::new(Script {
+            lengths: [1.0, 1.0],
+            ..Script::default()
+        }));
+        let (trial, mut client, _) = between_stand_ins(&script).await;
+        begin(&trial, start(0.11, 1e6, 0.1)).await;
+        script.borrow_mut().news.push(reached_at(0.101));
+        client.messages_for(ms(300), STATUS).await;
+        let end = client.messages(STATUS).pop().unwrap();
+        assert_eq!(end["running"], false);
+        assert_eq!(end["targets_reached"], 1);
+    });
+}
+
+/// A goal is refused because the lengths are others by now: the next target is one for these.
+#[test]
+fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
+    in_virtual_time(async {
+        let script = Rc::new(RefCell::new(Script {
+            lengths: [1.0, 1.0],
+            refusals: 0,
+            ..Script::default()
+        }));
+        let (trial, mut client, born) = between_stand_ins(&script).await;
+        begin(&trial, start(60.0, 1e-9, 0.0)).await;
+        script.borrow_mut().lengths = [1e-3, 1e-3];
+        script.borrow_mut().refusals = 3;
+        // The goal was reached while the lengths were the old ones.
+        let reached = reached_at(born.elapsed().as_secs_f64());
+        script.borrow().owner.as_ref().unwrap().do_send(reached);
+        let after = status(&mut client).await;
+        assert_eq!(after["action_status"], "active");
+        assert_eq!(after["targets_reached"], 1);
+        let sent = script.borrow().sent.clone();
+        assert_eq!(sent.len(), 5, "one, and after three refusals another");
+        assert!(sent[1].position.length() > 2e-3, "the old lengths");
+        for target in &sent[2..] {
+            assert!(target.position.length() <= 2e-3, "the new ones");
+        }
+    });
+}
+
+/// The node's own messages, before the registry could drop them.
+#[test]
+fn no_status_is_encoded_while_nobody_wants_it() {
+    in_virtual_time(async {
+        let arm = SilentArm.start();
+        let (sender, mut published) = unbounded_channel();
+        let publish: Recipient<Publish> = Published(sender).start().recipient();
+        let ik = Ik::<2>::new(arm.clone().recipient()).start();
+        let action =
+            IkAction::new(ik.recipient(), SilentArm::tracker(&arm), publish.clone()).start();
+        let goals = GoalClient {
+            send: action.clone().recipient(),
+            cancel: action.clone().recipient(),
+            barrier: action.recipient(),
+        };
+        let rng = fastrand::Rng::with_seed(1);
+        let trial = IkTrial::new(arm.recipient(), goals, publish, rng).start();
+        for (wanted, expected) in [(false, 0), (true, 2), (false, 0)] {
+            let topic = Topic::TrialStatus;
+            trial.send(Interest { topic, wanted }).await.unwrap();
+            begin(&trial, StartTrial::default()).await;
+            // The accepted goal, and one message of the 10 Hz.
+            pass(ms(150)).await;
+            let mut statuses = 0;
+            while let Ok(topic) = published.try_recv() {
+                statuses += usize::from(topic == Topic::TrialStatus);
+            }
+            assert_eq!(statuses, expected);
+        }
+    });
+}
+
+/// In an hour the machinery of virtual time itself wakes the thread a few times; a status at 10 Hz wakes it 36,000 times.
+#[test]
+fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
+    counting_wake_ups(|sleeps| async move {
+        let gauges = std::sync::Arc::default();
+        let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
+        let mut nodes = Nodes::default();
+        let arm = SilentArm.start();
+        let tracker = SilentArm::tracker(&arm);
+        let (action, trial) =
+            crate::nodes::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
+        registry.send(Attach(nodes)).await.unwrap();
+        let mut client = connect(&registry, &gauges);
+        client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;
+        let an_hour = || async {
+            let before = sleeps.load(Ordering::Relaxed);
+            pass(ms(3_600_000)).await;
+            sleeps.load(Ordering::Relaxed) - before
+        };
+        let quiet = 0..100;
+
+        assert!(quiet.contains(&an_hour().await), "at first");
+        asked(&action, elsewhere()).await.unwrap();
+        assert!(quiet.contains(&an_hour().await), "the arm is silent");
+        begin(&trial, start(1e9, 1e-9, 0.0)).await;
+        assert!(quiet.contains(&an_hour().await), "a trial, unwatched");
+        asked(&trial, StopTrial).await.unwrap();
+        assert!(quiet.contains(&an_hour().await), "after the trial");
+        client.subscribe(STATUS).await;
+        let listening = async { client.messages_for(ms(3_600_000), STATUS).await.len() };
+        let (awake, heard) = tokio::join!(an_hour(), listening);
+        assert!(awake >= 36_000 && heard >= 35_999, "{awake}, {heard}");
+        drop(client);
+        pass(ms(1000)).await;
+        assert!(quiet.contains(&an_hour().await), "the watcher is gone");
+    });
+}

@@ -1,0 +1,80 @@
+//! Commands and their outcome, a row each: `rows.txt`.
+//!
+//! A paragraph begins with `# ` and its statement, and asks a runtime of its own. A row is an exit status, the arguments as a shell reads them,
+//! ` = ` and a part of the output. With ` == ` it is the whole output. Both may have the escapes of JSON. A command that succeeds says nothing on
+//! standard error. One that fails has one line there and no other output. `%3*x%` is `xxx`. A row that begins with `!` has no address of the
+//! runtime.
+
+use super::ask;
+use crate::common::{self, Runtime};
+
+/// The words of a line, with quoted ones as they are.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut is_quoted = false;
+    for one in line.chars() {
+        match one {
+            '\'' => is_quoted = !is_quoted,
+            ' ' if !is_quoted => words.push(String::new()),
+            _ => words.last_mut().unwrap().push(one),
+        }
+    }
+    words
+}
+
+/// A word with its line ends and its repetition written out.
+fn expand(word: &str) -> String {
+    let word = word.replace("\\n", "\n");
+    let parts: Vec<&str> = word.split('%').collect();
+    let [before, repeated, after] = parts[..] else {
+        return word.clone();
+    };
+    let (count, part) = repeated.split_once('*').unwrap();
+    format!("{before}{}{after}", part.repeat(count.parse().unwrap()))
+}
+
+/// The fault of a row, if it has one.
+fn fault(runtime: &Runtime, row: &str) -> Option<String> {
+    let (status, rest) = row.split_once(' ').unwrap();
+    let (arguments, part) = rest.split_once(" =").expect(row);
+    let is_whole = part.starts_with('=');
+    let part = part.trim_start_matches('=').trim_start_matches(' ');
+    let arguments: Vec<String> = words(arguments).iter().map(|word| expand(word)).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let part: String = serde_json::from_str(&format!("\"{part}\"")).expect(row);
+    let output = match status.strip_prefix('!') {
+        Some(_) => common::program().args(arguments).output().unwrap(),
+        None => ask(runtime, &arguments),
+    };
+    let status = status.trim_start_matches('!');
+    let [said, complaint] =
+        [output.stdout, output.stderr].map(|one| String::from_utf8(one).unwrap());
+    let (text, other) = if status == "0" {
+        (&said, &complaint)
+    } else {
+        (&complaint, &said)
+    };
+    let is_right = output.status.code().map(|code| code.to_string()).as_deref() == Some(status)
+        && other.is_empty()
+        && (status == "0" || text.lines().count() == 1 && text.starts_with("pendularm: "))
+        && if is_whole {
+            *text == part
+        } else {
+            text.contains(&part)
+        };
+    (!is_right).then(|| format!("{row}: {}: {said:?}, {complaint:?}", output.status))
+}
+
+#[test]
+fn every_command_has_the_outcome_of_its_row() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/wire/command/rows.txt");
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut faults = Vec::new();
+    for paragraph in text.trim_end().split("\n\n") {
+        let (title, rows) = paragraph.split_once('\n').unwrap();
+        assert!(title.starts_with("# "), "{title}");
+        let runtime = Runtime::start();
+        faults.extend(rows.lines().filter_map(|row| fault(&runtime, row)));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
