@@ -202,6 +202,27 @@ impl Peer {
         self.kept.drain(..).map(|frame| frame.1).collect()
     }
 
+    /// Takes the frames of a time, and checks how many match.
+    async fn count(
+        &mut self,
+        given: &str,
+        wanted: &str,
+        bound: &mut BTreeMap<String, Value>,
+    ) -> Result<(), String> {
+        let (time, pattern) = given.split_once(' ').ok_or("no pattern")?;
+        let time = time.parse().map_err(|_| "no time")?;
+        let came = self.take_for(Duration::from_millis(time)).await;
+        let is_one = |frame: &&Value| check(pattern, frame, &mut bound.clone()).is_ok();
+        let count = came.iter().filter(is_one).count();
+        let range = wanted.split_once("..").unwrap_or((wanted, wanted));
+        let is_bound =
+            wanted.starts_with('$') && matches(&json!(wanted), Some(&json!(count)), bound);
+        if is_bound || is_within(range, count as f64) {
+            return Ok(());
+        }
+        Err(format!("{count} came of {}", came.len()))
+    }
+
     /// The frames that have come and were not received, without those of periodic topics.
     async fn rest(&mut self) -> Vec<Value> {
         let mut rest = self.take_for(SOON).await;
@@ -306,35 +327,34 @@ impl World {
 
     async fn step(&mut self, line: &str) -> Result<(), String> {
         let (name, rest) = line.split_once(' ').unwrap_or((line, ""));
-        if name == "options" {
-            self.admission = Arc::new(admission(rest)?);
-            return Ok(());
-        }
-        #[cfg(feature = "web")]
-        if name == "request" {
-            let (text, wanted) = rest.split_once(" = ").ok_or("no status")?;
-            return self.request(text, wanted).await;
-        }
-        if line == "floating" {
-            let none = json!(vec![0; self.links]);
-            for call in [
-                "/arm_sim/set_params {\"gravity\":0}",
-                &format!("/pid_controller/set_gains {{\"kp\":{none},\"ki\":{none},\"kd\":{none}}}"),
-                "/pid_controller/enable {\"data\":true}",
-            ] {
-                Box::pin(self.step(&format!("first call {call}"))).await?;
+        let time = || rest.parse().map(Duration::from_millis);
+        match name {
+            "options" => self.admission = Arc::new(admission(rest)?),
+            #[cfg(feature = "web")]
+            "request" => {
+                let (text, wanted) = rest.split_once(" = ").ok_or("no status")?;
+                self.request(text, wanted).await?;
             }
-            return Ok(());
-        }
-        if ["pass", "stall"].contains(&name) {
-            let time = Duration::from_millis(rest.parse().map_err(|_| "no time")?);
-            if name == "pass" {
-                sleep(time).await;
-            } else {
-                advance(time).await;
+            "floating" => {
+                let none = json!(vec![0; self.links]);
+                let gains = json!({"kp": none, "ki": none, "kd": none});
+                for call in [
+                    "call /arm_sim/set_params {\"gravity\":0}",
+                    &format!("call /pid_controller/set_gains {gains}"),
+                    "call /pid_controller/enable {\"data\":true}",
+                ] {
+                    self.step_of("first", call).await?;
+                }
             }
-            return Ok(());
+            "pass" => sleep(time().map_err(|_| "no time")?).await,
+            "stall" => advance(time().map_err(|_| "no time")?).await,
+            _ => self.step_of(name, rest).await?,
         }
+        Ok(())
+    }
+
+    /// A step of a client, which is connected with its first one.
+    async fn step_of(&mut self, name: &str, rest: &str) -> Result<(), String> {
         if !self.peers.contains_key(name) {
             let peer = self.connect(name).await;
             self.peers.insert(name.to_owned(), peer);
@@ -350,9 +370,8 @@ impl World {
                 settle().await;
             }
             "bytes" => {
-                peer.stream
-                    .send_bytes(expand(rest, &self.bound).as_bytes())
-                    .await
+                let text = expand(rest, &self.bound);
+                peer.stream.send_bytes(text.as_bytes()).await;
             }
             "<" => {
                 let got = peer.next().await?;
@@ -390,20 +409,7 @@ impl World {
                 }
             }
             "forget" => drop(peer.take_for(SOON).await),
-            "count" => {
-                let time = service.parse().map_err(|_| "no time")?;
-                let came = peer.take_for(Duration::from_millis(time)).await;
-                let (_, pattern) = given.split_once(' ').ok_or("no pattern")?;
-                let is_one =
-                    |frame: &&Value| check(pattern, frame, &mut self.bound.clone()).is_ok();
-                let count = came.iter().filter(is_one).count();
-                let range = wanted.split_once("..").unwrap_or((wanted, wanted));
-                let is_bound = wanted.starts_with('$')
-                    && matches(&json!(wanted), Some(&json!(count)), &mut self.bound);
-                if !is_bound && !is_within(range, count as f64) {
-                    return Err(format!("{count} came of {}", came.len()));
-                }
-            }
+            "count" => peer.count(given, wanted, &mut self.bound).await?,
             "leave" => {
                 self.peers.remove(name);
                 settle().await;
