@@ -26,7 +26,7 @@
 //! | `stall ms` | virtual time passes, and no actor runs in it |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
-//! | `for x in 0..9` | the same for each number, without the last |
+//! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
 //! | `for x in` | the same for each row of the lines below it, which begin with `\| ` |
 //!
 //! A file may begin with lines `let name = text`: `@name` stands for that text in each step.
@@ -50,7 +50,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::ros::tf_web::MAX_FRAMES;
+use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
 use pendularm::math::pid::Gains;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
@@ -71,14 +71,15 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Virtual time in which all that is under way arrives.
 const SOON: Duration = Duration::from_millis(10);
 
-/// Limits that a repetition may have as its count.
-const LIMITS: [(&str, usize); 6] = [
+/// Limits that a repetition or a loop may have as its count.
+const LIMITS: [(&str, usize); 7] = [
     ("MAX_ARGS", MAX_ARGS),
     ("MAX_FRAME", MAX_FRAME),
     ("MAX_FRAMES", MAX_FRAMES),
     ("MAX_NAME", MAX_NAME),
     ("MAX_NAMED", MAX_NAMED),
     ("MAX_POINTS", MAX_POINTS),
+    ("MAX_WISHES", MAX_WISHES),
 ];
 
 /// Topics that are published periodically.
@@ -466,6 +467,12 @@ async fn ask(
     Ok(())
 }
 
+/// A number, or the limit of that name.
+fn number(text: &str) -> Option<usize> {
+    let limit = LIMITS.iter().find(|(name, _)| *name == text);
+    limit.map_or_else(|| text.parse().ok(), |(_, limit)| Some(*limit))
+}
+
 /// A text as it is sent.
 fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
     let mut text = text.to_owned();
@@ -479,8 +486,7 @@ fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
             "lf" => ("1", "\n"),
             _ => repeated.split_once('*').expect("a count"),
         };
-        let limit = LIMITS.iter().find(|(name, _)| *name == count);
-        let count = limit.map_or_else(|| count.parse().expect("a count"), |(_, limit)| *limit);
+        let count = number(count).expect("a count");
         text = format!("{before}{}{after}", part.repeat(count));
     }
     text
@@ -551,10 +557,9 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
         let (names, rows) = header.split_once(" in").expect("a loop has values");
         let count = steps.iter().take_while(|(_, line)| line.starts_with("| "));
         let (below, rest) = steps.split_at(count.count());
-        let range = rows.split_once("..").and_then(|(first, end)| {
-            let first = first.trim().parse::<u32>().ok()?;
-            Some(first..end.parse().ok()?)
-        });
+        let range = rows
+            .split_once("..")
+            .and_then(|(first, end)| Some(number(first.trim())?..number(end)?));
         let rows: Vec<String> = match range {
             Some(range) => range.map(|number| number.to_string()).collect(),
             None if rows.is_empty() => below.iter().map(|(_, line)| line[2..].to_owned()).collect(),
