@@ -26,7 +26,7 @@
 //! | `stall ms` | virtual time passes, and no actor runs in it |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
-//! | `for x in 0..9` | the same for each number, without the last |
+//! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
 //! | `for x in` | the same for each row of the lines below it, which begin with `\| ` |
 //!
 //! A file may begin with lines `let name = text`: `@name` stands for that text in each step.
@@ -50,7 +50,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::ros::tf_web::MAX_FRAMES;
+use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
 use pendularm::math::pid::Gains;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
@@ -71,14 +71,15 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Virtual time in which all that is under way arrives.
 const SOON: Duration = Duration::from_millis(10);
 
-/// Limits that a repetition may have as its count.
-const LIMITS: [(&str, usize); 6] = [
+/// Limits that a repetition or a loop may have as its count.
+const LIMITS: [(&str, usize); 7] = [
     ("MAX_ARGS", MAX_ARGS),
     ("MAX_FRAME", MAX_FRAME),
     ("MAX_FRAMES", MAX_FRAMES),
     ("MAX_NAME", MAX_NAME),
     ("MAX_NAMED", MAX_NAMED),
     ("MAX_POINTS", MAX_POINTS),
+    ("MAX_WISHES", MAX_WISHES),
 ];
 
 /// Topics that are published periodically.
@@ -202,6 +203,27 @@ impl Peer {
         self.kept.drain(..).map(|frame| frame.1).collect()
     }
 
+    /// Takes the frames of a time, and checks how many match.
+    async fn count(
+        &mut self,
+        given: &str,
+        wanted: &str,
+        bound: &mut BTreeMap<String, Value>,
+    ) -> Result<(), String> {
+        let (time, pattern) = given.split_once(' ').ok_or("no pattern")?;
+        let time = time.parse().map_err(|_| "no time")?;
+        let came = self.take_for(Duration::from_millis(time)).await;
+        let is_one = |frame: &&Value| check(pattern, frame, &mut bound.clone()).is_ok();
+        let count = came.iter().filter(is_one).count();
+        let range = wanted.split_once("..").unwrap_or((wanted, wanted));
+        let is_bound =
+            wanted.starts_with('$') && matches(&json!(wanted), Some(&json!(count)), bound);
+        if is_bound || is_within(range, count as f64) {
+            return Ok(());
+        }
+        Err(format!("{count} came of {}", came.len()))
+    }
+
     /// The frames that have come and were not received, without those of periodic topics.
     async fn rest(&mut self) -> Vec<Value> {
         let mut rest = self.take_for(SOON).await;
@@ -306,35 +328,34 @@ impl World {
 
     async fn step(&mut self, line: &str) -> Result<(), String> {
         let (name, rest) = line.split_once(' ').unwrap_or((line, ""));
-        if name == "options" {
-            self.admission = Arc::new(admission(rest)?);
-            return Ok(());
-        }
-        #[cfg(feature = "web")]
-        if name == "request" {
-            let (text, wanted) = rest.split_once(" = ").ok_or("no status")?;
-            return self.request(text, wanted).await;
-        }
-        if line == "floating" {
-            let none = json!(vec![0; self.links]);
-            for call in [
-                "/arm_sim/set_params {\"gravity\":0}",
-                &format!("/pid_controller/set_gains {{\"kp\":{none},\"ki\":{none},\"kd\":{none}}}"),
-                "/pid_controller/enable {\"data\":true}",
-            ] {
-                Box::pin(self.step(&format!("first call {call}"))).await?;
+        let time = || rest.parse().map(Duration::from_millis);
+        match name {
+            "options" => self.admission = Arc::new(admission(rest)?),
+            #[cfg(feature = "web")]
+            "request" => {
+                let (text, wanted) = rest.split_once(" = ").ok_or("no status")?;
+                self.request(text, wanted).await?;
             }
-            return Ok(());
-        }
-        if ["pass", "stall"].contains(&name) {
-            let time = Duration::from_millis(rest.parse().map_err(|_| "no time")?);
-            if name == "pass" {
-                sleep(time).await;
-            } else {
-                advance(time).await;
+            "floating" => {
+                let none = json!(vec![0; self.links]);
+                let gains = json!({"kp": none, "ki": none, "kd": none});
+                for call in [
+                    "call /arm_sim/set_params {\"gravity\":0}",
+                    &format!("call /pid_controller/set_gains {gains}"),
+                    "call /pid_controller/enable {\"data\":true}",
+                ] {
+                    self.step_of("first", call).await?;
+                }
             }
-            return Ok(());
+            "pass" => sleep(time().map_err(|_| "no time")?).await,
+            "stall" => advance(time().map_err(|_| "no time")?).await,
+            _ => self.step_of(name, rest).await?,
         }
+        Ok(())
+    }
+
+    /// A step of a client, which is connected with its first one.
+    async fn step_of(&mut self, name: &str, rest: &str) -> Result<(), String> {
         if !self.peers.contains_key(name) {
             let peer = self.connect(name).await;
             self.peers.insert(name.to_owned(), peer);
@@ -350,9 +371,8 @@ impl World {
                 settle().await;
             }
             "bytes" => {
-                peer.stream
-                    .send_bytes(expand(rest, &self.bound).as_bytes())
-                    .await
+                let text = expand(rest, &self.bound);
+                peer.stream.send_bytes(text.as_bytes()).await;
             }
             "<" => {
                 let got = peer.next().await?;
@@ -390,20 +410,7 @@ impl World {
                 }
             }
             "forget" => drop(peer.take_for(SOON).await),
-            "count" => {
-                let time = service.parse().map_err(|_| "no time")?;
-                let came = peer.take_for(Duration::from_millis(time)).await;
-                let (_, pattern) = given.split_once(' ').ok_or("no pattern")?;
-                let is_one =
-                    |frame: &&Value| check(pattern, frame, &mut self.bound.clone()).is_ok();
-                let count = came.iter().filter(is_one).count();
-                let range = wanted.split_once("..").unwrap_or((wanted, wanted));
-                let is_bound = wanted.starts_with('$')
-                    && matches(&json!(wanted), Some(&json!(count)), &mut self.bound);
-                if !is_bound && !is_within(range, count as f64) {
-                    return Err(format!("{count} came of {}", came.len()));
-                }
-            }
+            "count" => peer.count(given, wanted, &mut self.bound).await?,
             "leave" => {
                 self.peers.remove(name);
                 settle().await;
@@ -460,6 +467,12 @@ async fn ask(
     Ok(())
 }
 
+/// A number, or the limit of that name.
+fn number(text: &str) -> Option<usize> {
+    let limit = LIMITS.iter().find(|(name, _)| *name == text);
+    limit.map_or_else(|| text.parse().ok(), |(_, limit)| Some(*limit))
+}
+
 /// A text as it is sent.
 fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
     let mut text = text.to_owned();
@@ -473,8 +486,7 @@ fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
             "lf" => ("1", "\n"),
             _ => repeated.split_once('*').expect("a count"),
         };
-        let limit = LIMITS.iter().find(|(name, _)| *name == count);
-        let count = limit.map_or_else(|| count.parse().expect("a count"), |(_, limit)| *limit);
+        let count = number(count).expect("a count");
         text = format!("{before}{}{after}", part.repeat(count));
     }
     text
@@ -545,10 +557,9 @@ fn unroll(mut steps: &[Step]) -> Vec<Step> {
         let (names, rows) = header.split_once(" in").expect("a loop has values");
         let count = steps.iter().take_while(|(_, line)| line.starts_with("| "));
         let (below, rest) = steps.split_at(count.count());
-        let range = rows.split_once("..").and_then(|(first, end)| {
-            let first = first.trim().parse::<u32>().ok()?;
-            Some(first..end.parse().ok()?)
-        });
+        let range = rows
+            .split_once("..")
+            .and_then(|(first, end)| Some(number(first.trim())?..number(end)?));
         let rows: Vec<String> = match range {
             Some(range) => range.map(|number| number.to_string()).collect(),
             None if rows.is_empty() => below.iter().map(|(_, line)| line[2..].to_owned()).collect(),
