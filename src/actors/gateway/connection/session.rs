@@ -14,7 +14,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::Admission;
+use super::admission::{Admission, WRONG_TOKEN_TIME};
 use super::admission::authentication::{AuthError, authenticate, opens_as_command};
 use super::admission::slots::HeldSlot;
 use super::plain::{CHUNK, discard};
@@ -290,21 +290,17 @@ impl ClientSession {
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        if !is_wrong_token || self.delay_wrong_token().await {
-            self.refuse(stream, why).await;
+        if is_wrong_token {
+            self.delay_wrong_token().await;
         }
+        self.refuse(stream, why).await;
     }
 
-    /// Waits after a wrong token: longer with each one from its address. Returns whether it is answered.
-    pub(super) async fn delay_wrong_token(&self) -> bool {
-        let attempts = &self.admission.newcomers.failed_attempts;
+    /// Waits before a wrong token is answered. The right one is admitted at once.
+    pub(super) async fn delay_wrong_token(&self) {
         let from = self.ends.peer.ip();
-        if let Some(wrong) = attempts.due_warning(from) {
-            tracing::warn!(%from, wrong, "wrong tokens were shown");
-        }
-        let wait = attempts.wait(from);
-        sleep(wait.unwrap_or(HEAD_TIME)).await;
-        wait.is_some()
+        tracing::warn!(%from, "a wrong token was shown");
+        sleep(WRONG_TOKEN_TIME).await;
     }
 
     /// Makes the client known.
