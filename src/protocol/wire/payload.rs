@@ -51,10 +51,12 @@ impl Payload {
 impl From<Box<RawValue>> for Payload {
     fn from(raw: Box<RawValue>) -> Self {
         let strict = json::strict(raw.get());
-        // Valid JSON has a carriage return between tokens only. Some readers take one for the end of a line: then what
-        // another client has put between two of them would be a frame to them.
+        // Valid JSON has line ends between tokens only. Some readers take a carriage return for one: then what another
+        // client has put between two of them would be a frame to them.
         let line = match strict {
-            text if text.contains('\r') => Some(text.replace('\r', " ")),
+            text if text.contains('\r') || text.contains('\n') => {
+                Some(text.replace(['\r', '\n'], " "))
+            }
             Cow::Owned(text) => Some(text),
             Cow::Borrowed(_) => None,
         };
