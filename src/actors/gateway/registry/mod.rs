@@ -459,7 +459,7 @@ impl Registry {
                     status,
                     result,
                 } => self.complete(origin, Served::Action, &action, |name, id| {
-                    messages::action_result_raw(name, id, &values, status, result)
+                    messages::action_result(name, id, &values, status, result)
                 }),
             },
             Op::ServiceResponse {
@@ -470,7 +470,7 @@ impl Registry {
             } => {
                 let status = status.unwrap_or_default();
                 self.complete(origin, Served::Service, &service, |service, id| {
-                    messages::response_raw(service, id, &values, result, &status)
+                    messages::response(service, id, &values, result, &status)
                 })
             }
             Op::BadAnswer {

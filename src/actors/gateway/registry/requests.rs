@@ -348,7 +348,7 @@ impl Registry {
         let is_wanted =
             matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
         if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
-            let frame = messages::action_feedback_raw(&goal.name, goal.id.as_ref(), values);
+            let frame = messages::action_feedback(&goal.name, goal.id.as_ref(), values);
             sender.outlets.deliver.do_send(Deliver {
                 topic: None,
                 frame: cover_message(self.permit.as_ref(), frame),
