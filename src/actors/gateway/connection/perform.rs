@@ -218,9 +218,8 @@ impl Performer {
         }
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(whole) => whole.ok_or(OpOutcome::Done)?,
-            Err(why) => {
-                let refused = op::read_start(&self.fragments.take_refused(), &why);
-                return Ok((under_id(refused, id), 0));
+            Err((why, start)) => {
+                return Ok((under_id(op::read_start(&start, &why), id), 0));
             }
         };
         let length = whole.bytes();
