@@ -136,7 +136,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
         } => {
             check_name(json, "service", service);
             let status = status.as_deref().unwrap_or_default();
-            let line = check_line(&messages::response_raw(
+            let line = check_line(&messages::response(
                 service, id, values, *result, status,
             ));
             check_passed_on(json.get("values"), line.get("values"));
@@ -169,7 +169,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             match op {
                 ActionServerOp::Advertise { .. } | ActionServerOp::Unadvertise => {}
                 ActionServerOp::Feedback { values } => {
-                    let line = check_line(&messages::action_feedback_raw(action, id, values));
+                    let line = check_line(&messages::action_feedback(action, id, values));
                     check_passed_on(json.get("values"), line.get("values"));
                 }
                 ActionServerOp::End {
@@ -178,7 +178,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
                     result,
                 } => {
                     assert!(*status <= 6, "a status of a goal");
-                    let line = messages::action_result_raw(action, id, values, *status, *result);
+                    let line = messages::action_result(action, id, values, *status, *result);
                     check_line(&line);
                 }
             }

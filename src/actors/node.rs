@@ -6,8 +6,6 @@
 //! **Invariant:** every [`Call`] is answered exactly once, even if the node that has it fails: a [`Reply`] that
 //! is dropped unanswered answers with an error.
 
-use std::sync::Arc;
-
 use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
@@ -356,8 +354,6 @@ impl Respond {
 pub struct Feedback {
     /// The client.
     pub connection: ConnectionId,
-    /// The action, as the client spells it.
-    pub action: Arc<str>,
     /// The whole frame.
     pub frame: FrameOut,
 }

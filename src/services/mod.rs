@@ -51,12 +51,19 @@ pub trait Answered: Callable {
 
 /// A question whose answer may be long: the thread that computes it writes the response, a piece at a time.
 pub trait Streamed: Callable {
-    /// A response that is being written.
-    type Writer: Send + 'static;
-
     /// Begins to write the response.
-    fn begin(answer: Self::Answer, to: &Address) -> Self::Writer;
+    fn begin(answer: Self::Answer, to: &Address) -> Box<dyn ResponseWriter>;
+}
 
+/// A response that is being written.
+pub trait ResponseWriter: Send {
     /// Writes some more of it; the whole response, once that was the last.
-    fn advance(writer: &mut Self::Writer) -> Option<Bytes>;
+    fn advance(&mut self) -> Option<Bytes>;
+}
+
+/// A response that has been written.
+impl ResponseWriter for Option<Bytes> {
+    fn advance(&mut self) -> Option<Bytes> {
+        self.take()
+    }
 }

@@ -9,7 +9,6 @@
 //! | [`response`] | answers, with the headers that keep a browser strict |
 //! | [`serve`] | the requests of one connection, and their answers |
 //! | [`stream`] | the connection's stream, with its deadlines |
-//! | [`message`] | a WebSocket message into a frame |
 //!
 //! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. The connection over an upgraded
 //! stream is the same as over a plain one.
@@ -19,7 +18,6 @@
 pub mod access;
 pub mod authority;
 pub mod head;
-pub mod message;
 pub mod page;
 pub mod report;
 pub mod response;

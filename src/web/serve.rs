@@ -36,8 +36,8 @@ pub trait Gate {
     /// Admits the client. It is asked before each request is answered. The sentence says why it may not in.
     fn admit(&self) -> impl Future<Output = Result<(), String>>;
 
-    /// Waits as long as the answer to a wrong token has to. Returns whether there is one.
-    fn delay(&self) -> impl Future<Output = bool>;
+    /// Waits as long as the answer to a wrong token has to.
+    fn delay(&self) -> impl Future<Output = ()>;
 }
 
 /// Answers the requests that come on `stream`, of which `first` has been read already. The first head has time until
@@ -179,8 +179,8 @@ impl<G: Gate> Responder<'_, G> {
                 } else {
                     tracing::debug!(%why, "request refused");
                 }
-                if why == AccessError::WrongToken && !self.gate.delay().await {
-                    return Err(io::ErrorKind::PermissionDenied.into());
+                if why == AccessError::WrongToken {
+                    self.gate.delay().await;
                 }
                 why.response()
             }

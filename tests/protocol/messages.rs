@@ -5,8 +5,12 @@
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState, KeyValue,
+<<<<<<< HEAD
     Level, Stamp, action_feedback, action_result, call, failure, message_text, publish,
     publish_raw, respelled, response, response_raw, status,
+=======
+    Level, Stamp, call, failure, message_text, publish, publish_raw, respelled, response, status,
+>>>>>>> runtime
 };
 use pendularm::protocol::wire::payload::Payload;
 use proptest::prelude::*;
@@ -105,7 +109,7 @@ fn what_passes_through_is_untouched_but_for_numbers_that_overflow() {
         r#"{"op":"call_service","service":"/s","id":"call:7","args":{"a":null}}"#
     );
     assert_eq!(
-        line(&response_raw(
+        line(&response(
             "/s",
             Some(&raw("1e999")),
             &raw("[1e999]"),
@@ -148,7 +152,7 @@ fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_t
     for passed in [raw("{}"), raw(&format!("[\"{}\"]", "x".repeat(10_000)))] {
         for frame in [
             call("/x", "1", &passed),
-            response_raw("/x", None, &passed, true, ""),
+            response("/x", None, &passed, true, ""),
         ] {
             let text = frame.len();
             assert_eq!(memory(frame), text);

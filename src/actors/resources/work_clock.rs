@@ -1,6 +1,4 @@
-//! The clocks on which the cost of work is measured: the slices of computations, the arm's wake-ups. How long work may
-//! take is elapsed time. A client is charged the processor time of the thread that did its work: time that other
-//! programs take is charged to nobody.
+//! The clock on which the cost of work is measured: the slices of computations, the arm's wake-ups.
 //!
 //! It is the machine's own, unless a simulation counts instead. There each look costs the same, so that the work done
 //! between two looks, and all that follows from it, is the same in every run.
@@ -12,11 +10,8 @@ use std::cell::Cell;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-#[cfg(unix)]
-use rustix::time::{ClockId, clock_gettime};
-
 thread_local! {
-    /// How looks are counted on this thread; none where the machine's clocks count.
+    /// How looks are counted on this thread; none where the machine's clock counts.
     static COUNTED: Cell<Option<Counted>> = const { Cell::new(None) };
 }
 
@@ -58,29 +53,6 @@ pub fn reading() -> Duration {
     }
 }
 
-/// Processor time that this thread has had. Only differences on one thread mean something.
-#[must_use]
-pub fn spent() -> Duration {
-    match COUNTED.get() {
-        Some(counted) => counted.look().spent,
-        None => processor_time(),
-    }
-}
-
-/// Nothing is charged on a machine whose clock would run backwards.
-#[cfg(unix)]
-fn processor_time() -> Duration {
-    let spent = clock_gettime(ClockId::ThreadCPUTime);
-    spent.try_into().unwrap_or_default()
-}
-
-/// Windows says only in sixtieths of a second, so elapsed time is charged there.
-#[cfg(windows)]
-fn processor_time() -> Duration {
-    static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-    BEGAN.elapsed()
-}
-
 /// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
 /// pass.
 pub fn count(cost: Duration) {
@@ -101,25 +73,6 @@ pub fn is_counted() -> bool {
 mod tests {
     use super::*;
 
-    fn work(time: Duration) {
-        let before = spent();
-        while spent() - before < time {
-            std::hint::spin_loop();
-        }
-    }
-
-    /// Each thread waits for its own time, so it takes as long as the machine lets it. A tenth is far more than it
-    /// costs to start a thread and to end it.
-    #[test]
-    fn who_works_is_charged_and_who_waits_for_another_is_not() {
-        let (began, before) = (Instant::now(), spent());
-        let other = std::thread::spawn(|| work(Duration::from_millis(20)));
-        other.join().unwrap();
-        let waited = spent() - before;
-        assert!(waited < began.elapsed() / 10, "{waited:?}");
-        work(Duration::from_millis(5));
-    }
-
     #[test]
     fn each_look_costs_the_same_where_looks_are_counted() {
         assert!(!is_counted());
@@ -128,8 +81,8 @@ mod tests {
         for looks in 1..=50 {
             assert_eq!(now() - began, looks * Duration::from_micros(100));
         }
-        let before = spent();
-        assert_eq!(spent() - before, Duration::from_micros(100));
+        let before = reading();
+        assert_eq!(reading() - before, Duration::from_micros(100));
         let elsewhere = std::thread::spawn(is_counted).join();
         assert!(
             !elsewhere.unwrap(),

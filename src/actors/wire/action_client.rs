@@ -106,7 +106,6 @@ impl ActionClient {
             let write = move || messages::action_feedback(&action, id.as_ref(), &values);
             self.feedback.do_send(Feedback {
                 connection: self.connection,
-                action: Arc::clone(&self.action),
                 frame: FrameOut::unwritten(write),
             });
         }

@@ -16,4 +16,4 @@ mod served;
 pub use self::caller::{Caller, ServiceCall, TopicMessage};
 pub(in crate::actors) use self::routes::read_arguments;
 pub use self::routes::{Nodes, Route};
-pub use crate::services::{Address, Answered, Callable, Streamed};
+pub use crate::services::{Address, Answered, Callable, ResponseWriter, Streamed};

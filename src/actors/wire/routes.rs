@@ -7,9 +7,9 @@ use std::collections::HashMap;
 use actix::prelude::*;
 
 use super::action_client::ActionRequest;
-use super::caller::{Caller, ServiceCall, TopicMessage};
-use super::served::{ClientAsker, PatientAsker};
-use crate::actors::node::{Asker, Call, Interest, Reply};
+use super::caller::{ServiceCall, TopicMessage};
+use super::served::{AnswerForm, ClientAsker};
+use crate::actors::node::{Call, Interest, Reply};
 use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::services::{Answered, Callable, Streamed};
@@ -37,7 +37,7 @@ pub struct Nodes {
 impl Nodes {
     /// A row of a node's table: calls of `service` are this question.
     pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
-        self.route(service, node.into(), ClientAsker::<A>::new);
+        self.route(service, node.into(), || AnswerForm::Short(A::write));
     }
 
     /// The same where the answer may be long.
@@ -46,15 +46,15 @@ impl Nodes {
         service: Service,
         node: impl Into<Recipient<Call<A>>>,
     ) {
-        self.route(service, node.into(), PatientAsker::<A>::new);
+        self.route(service, node.into(), || AnswerForm::Long(A::begin));
     }
 
     /// Reads the question, or returns its rejected fields.
-    fn route<A: Callable, C: Asker<A::Answer> + 'static>(
+    fn route<A: Callable>(
         &mut self,
         service: Service,
         node: Recipient<Call<A>>,
-        asker: fn(Caller) -> C,
+        form: fn() -> AnswerForm<A::Answer>,
     ) {
         let take = move |call: ServiceCall| {
             let node = node.clone();
@@ -64,7 +64,8 @@ impl Nodes {
                 match A::read(call.service, &call.arguments) {
                     Ok(ask) => {
                         let done = caller.done.take();
-                        let reply = Reply::new(asker(caller), done);
+                        let form = form();
+                        let reply = Reply::new(ClientAsker { caller, form }, done);
                         node.do_send(Call { ask, reply });
                     }
                     Err(rejections) => caller.refuse(&rejections.status()),

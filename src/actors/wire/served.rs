@@ -1,8 +1,6 @@
-//! Clients that have asked: each waits for an answer, which is written for it.
+//! A client that has asked: it waits for an answer, which is written for it.
 //!
 //! **Invariant:** errors are reported by the thread that would have written the answer.
-
-use std::marker::PhantomData;
 
 use bytes::Bytes;
 
@@ -10,36 +8,51 @@ use super::caller::Caller;
 use crate::actors::ConnectionId;
 use crate::actors::node::{Asker, Done, Pieces, Unserved};
 use crate::actors::resources::memory::NoRoom;
-use crate::services::{Address, Answered, Streamed};
+use crate::services::{Address, ResponseWriter};
 
-/// A client that has asked `A`.
-pub(super) struct ClientAsker<A> {
-    caller: Caller,
-    question: PhantomData<fn(A)>,
+/// A client that has asked for a `T`.
+pub(super) struct ClientAsker<T> {
+    pub(super) caller: Caller,
+    pub(super) form: AnswerForm<T>,
 }
 
-impl<A> ClientAsker<A> {
-    pub(super) fn new(caller: Caller) -> Self {
-        let question = PhantomData;
-        Self { caller, question }
-    }
+/// How an answer is written.
+pub(super) enum AnswerForm<T> {
+    /// At once, by the registry.
+    Short(fn(T, &Address) -> Bytes),
+    /// A piece at a time.
+    Long(fn(T, &Address) -> Box<dyn ResponseWriter>),
+}
 
-    fn answer<T: Send + 'static>(
-        self,
-        answer: Result<T, Unserved>,
-        done: Option<Done>,
-        write: impl FnOnce(T, &Address) -> Bytes + Send + 'static,
-    ) {
-        self.caller.conclude(done, move |address| match answer {
-            Ok(answer) => write(answer, address),
+impl<T> AnswerForm<T> {
+    fn begin(&self, answer: T, to: &Address) -> Box<dyn ResponseWriter> {
+        match self {
+            Self::Short(write) => Box::new(Some(write(answer, to))),
+            Self::Long(begin) => begin(answer, to),
+        }
+    }
+}
+
+impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>) {
+        let Self { caller, form } = *self;
+        caller.conclude(done, move |address| match answer {
+            Ok(answer) => {
+                let mut writer = form.begin(answer, address);
+                loop {
+                    if let Some(frame) = writer.advance() {
+                        return frame;
+                    }
+                }
+            }
             Err(why) => address.failure(&why.to_string()),
         });
     }
-}
 
-impl<A: Answered> Asker<A::Answer> for ClientAsker<A> {
-    fn answer(self: Box<Self>, answer: Result<A::Answer, Unserved>, done: Option<Done>) {
-        ClientAsker::answer(*self, answer, done, A::write);
+    fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
+        let Self { caller, form } = *self;
+        let writer = caller.address.as_ref().map(|to| form.begin(answer, to));
+        Box::new(Writing { caller, writer })
     }
 
     fn client(&self) -> Option<ConnectionId> {
@@ -59,57 +72,17 @@ impl<A: Answered> Asker<A::Answer> for ClientAsker<A> {
     }
 }
 
-/// The same where the answer may be long.
-pub(super) struct PatientAsker<A>(ClientAsker<A>);
-
-impl<A> PatientAsker<A> {
-    pub(super) fn new(caller: Caller) -> Self {
-        Self(ClientAsker::new(caller))
-    }
-}
-
-impl<A: Streamed> Asker<A::Answer> for PatientAsker<A> {
-    fn answer(self: Box<Self>, answer: Result<A::Answer, Unserved>, done: Option<Done>) {
-        self.0.answer(answer, done, |answer, to| {
-            let mut writer = A::begin(answer, to);
-            loop {
-                if let Some(frame) = A::advance(&mut writer) {
-                    return frame;
-                }
-            }
-        });
-    }
-
-    fn answer_in_pieces(self: Box<Self>, answer: A::Answer) -> Box<dyn Pieces> {
-        let caller = self.0.caller;
-        let writer = caller.address.as_ref().map(|to| A::begin(answer, to));
-        Box::new(Writing::<A> { caller, writer })
-    }
-
-    fn client(&self) -> Option<ConnectionId> {
-        Some(self.0.caller.connection())
-    }
-
-    fn is_gone(&self) -> bool {
-        self.0.caller.is_gone()
-    }
-
-    fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        self.0.caller.reserve(bytes)
-    }
-}
-
 /// A response that is being written.
-struct Writing<A: Streamed> {
+struct Writing {
     caller: Caller,
     /// None once the response is on its way.
-    writer: Option<A::Writer>,
+    writer: Option<Box<dyn ResponseWriter>>,
 }
 
-impl<A: Streamed> Pieces for Writing<A> {
+impl Pieces for Writing {
     fn advance(&mut self) -> bool {
         if let Some(writer) = &mut self.writer {
-            let Some(frame) = A::advance(writer) else {
+            let Some(frame) = writer.advance() else {
                 return false;
             };
             self.writer = None;

@@ -90,7 +90,7 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
     let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
     Encoder::with_room("publish", head + topic.len() + msg.line().len())
         .text("topic", topic)
-        .raw("msg", msg)
+        .value("msg", msg)
         .end()
 }
 
@@ -122,7 +122,8 @@ pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
     msg.unwrap_or(b"null")
 }
 
-/// The answer to a service call; `values` is an object, `status` empty on success.
+/// The answer to a service call; `values` is an object, `status` empty on success. Another client's `values` only pass
+/// through.
 #[must_use]
 pub fn response(
     service: &str,
@@ -133,26 +134,8 @@ pub fn response(
 ) -> Bytes {
     Encoder::op("service_response")
         .text("service", service)
-        .optional_raw("id", id)
+        .optional("id", id)
         .value("values", values)
-        .value("result", &result)
-        .text("status", status)
-        .end()
-}
-
-/// The answer of an external provider, whose `values` only pass through.
-#[must_use]
-pub fn response_raw(
-    service: &str,
-    id: Option<&Payload>,
-    values: &Payload,
-    result: bool,
-    status: &str,
-) -> Bytes {
-    Encoder::with_room("service_response", values.line().len() + USUAL_FRAME)
-        .text("service", service)
-        .optional_raw("id", id)
-        .raw("values", values)
         .value("result", &result)
         .text("status", status)
         .end()
@@ -172,7 +155,7 @@ pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorFor
 pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Serialize) -> Bytes {
     Encoder::op("action_feedback")
         .text("action", action)
-        .optional_raw("id", id)
+        .optional("id", id)
         .value("values", values)
         .end()
 }
@@ -188,36 +171,8 @@ pub fn action_result(
 ) -> Bytes {
     Encoder::op("action_result")
         .text("action", action)
-        .optional_raw("id", id)
+        .optional("id", id)
         .value("values", values)
-        .value("status", &status)
-        .value("result", &result)
-        .end()
-}
-
-/// Feedback of a goal, from an action server that is a client; `values` only pass through.
-#[must_use]
-pub fn action_feedback_raw(action: &str, id: Option<&Payload>, values: &Payload) -> Bytes {
-    Encoder::with_room("action_feedback", values.line().len() + USUAL_FRAME)
-        .text("action", action)
-        .optional_raw("id", id)
-        .raw("values", values)
-        .end()
-}
-
-/// The result of a goal, from an action server that is a client; `values` only pass through.
-#[must_use]
-pub fn action_result_raw(
-    action: &str,
-    id: Option<&Payload>,
-    values: &Payload,
-    status: u8,
-    result: bool,
-) -> Bytes {
-    Encoder::with_room("action_result", values.line().len() + USUAL_FRAME)
-        .text("action", action)
-        .optional_raw("id", id)
-        .raw("values", values)
         .value("status", &status)
         .value("result", &result)
         .end()
@@ -232,14 +187,13 @@ pub fn action_goal(
     args: &Payload,
     feedback: bool,
 ) -> Bytes {
-    let frame = Encoder::with_room("send_action_goal", args.line().len() + USUAL_FRAME)
+    Encoder::with_room("send_action_goal", args.line().len() + USUAL_FRAME)
         .text("action", action)
-        .text("id", id);
-    let frame = match type_name {
-        Some(name) => frame.text("action_type", name),
-        None => frame,
-    };
-    frame.raw("args", args).value("feedback", &feedback).end()
+        .text("id", id)
+        .optional("action_type", type_name)
+        .value("args", args)
+        .value("feedback", &feedback)
+        .end()
 }
 
 /// Asks the action server of a client to cancel a goal.
@@ -257,7 +211,7 @@ pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
     Encoder::op("status")
         .text("level", level.name())
         .text("msg", msg)
-        .optional_raw("id", id)
+        .optional("id", id)
         .end()
 }
 
@@ -267,7 +221,7 @@ pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
     Encoder::with_room("call_service", args.line().len() + USUAL_FRAME)
         .text("service", service)
         .text("id", id)
-        .raw("args", args)
+        .value("args", args)
         .end()
 }
 
@@ -319,15 +273,9 @@ impl Encoder {
         self
     }
 
-    fn raw(mut self, key: &str, raw: &Payload) -> Self {
-        self.key(key);
-        self.text.extend_from_slice(raw.line().as_bytes());
-        self
-    }
-
-    fn optional_raw(self, key: &str, raw: Option<&Payload>) -> Self {
-        match raw {
-            Some(raw) => self.raw(key, raw),
+    fn optional<T: Serialize + ?Sized>(self, key: &str, value: Option<&T>) -> Self {
+        match value {
+            Some(value) => self.value(key, value),
             None => self,
         }
     }

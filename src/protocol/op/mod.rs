@@ -48,15 +48,6 @@ pub struct Incoming {
     pub op: Result<Op, OpError>,
 }
 
-impl Incoming {
-    /// Bytes of its payloads.
-    #[must_use]
-    pub fn allocated(&self) -> usize {
-        let op = self.op.as_ref().map_or(0, Op::allocated);
-        op + self.id.as_ref().map_or(0, Payload::allocated)
-    }
-}
-
 /// An operation.
 #[derive(Debug, Clone)]
 pub enum Op {
@@ -154,26 +145,6 @@ pub enum Op {
         /// The fault.
         problem: Problem,
     },
-}
-
-impl Op {
-    fn allocated(&self) -> usize {
-        match self {
-            Self::Publish { msg, heard, .. } => {
-                msg.allocated() + heard.as_ref().map_or(0, |heard| heard.msg.allocated())
-            }
-            Self::PublishLines(lines) => lines.frames.len(),
-            Self::CallService(CallService { args, .. })
-            | Self::SendActionGoal(ActionGoal { args, .. }) => args.payload().allocated(),
-            Self::ServiceResponse { values, .. }
-            | Self::ServeAction {
-                op: ActionServerOp::Feedback { values } | ActionServerOp::End { values, .. },
-                ..
-            } => values.allocated(),
-            // Names, which are short.
-            _ => 0,
-        }
-    }
 }
 
 /// The least serious status that a client wants; `None` for no status at all.

@@ -71,10 +71,6 @@ pub enum FragmentError {
 #[derive(Debug, Default)]
 pub struct Fragments {
     messages: HashMap<String, Incomplete>,
-    /// Bytes of all pieces.
-    bytes: usize,
-    /// The first bytes of the message that was refused last.
-    refused: Vec<u8>,
 }
 
 #[derive(Debug)]
@@ -82,12 +78,8 @@ struct Incomplete {
     began: Instant,
     total: usize,
     pieces: BTreeMap<usize, String>,
-}
-
-impl Incomplete {
-    fn bytes(&self) -> usize {
-        self.pieces.values().map(String::len).sum()
-    }
+    /// Bytes of these.
+    bytes: usize,
 }
 
 /// A message all of whose pieces have come. To put megabytes of them together takes milliseconds.
@@ -117,52 +109,49 @@ impl Fragments {
     /// Takes a piece. Returns the message with the last missing one. A piece that comes twice counts once.
     ///
     /// # Errors
-    /// [`FragmentError`] where the piece breaks a bound.
-    pub fn take(&mut self, piece: Piece, now: Instant) -> Result<Option<Complete>, FragmentError> {
+    /// [`FragmentError`] where the piece breaks a bound; with the first bytes of the message, if its first piece has
+    /// come.
+    pub fn take(
+        &mut self,
+        piece: Piece,
+        now: Instant,
+    ) -> Result<Option<Complete>, (FragmentError, Vec<u8>)> {
         self.forget_old(now);
+        let checked = self.check(&piece);
         let Piece {
             id,
             data,
             num,
             total,
         } = piece;
-        let checked = self.check(&id, data.len(), num, total);
         if let Err(why) = checked {
-            let first = self.forget(&id).and_then(|mut one| one.pieces.remove(&0));
+            let before = self.messages.remove(&id);
+            let first = before.and_then(|mut one| one.pieces.remove(&0));
             let first = first.or_else(|| Some(data).filter(|_| num == 0));
-            self.refused = start_of(first.unwrap_or_default().as_bytes());
-            return Err(why);
+            return Err((why, start_of(first.unwrap_or_default().as_bytes())));
         }
-        let unfinished = self
-            .messages
-            .entry(id.clone())
-            .or_insert_with(|| Incomplete {
-                began: now,
-                total,
-                pieces: BTreeMap::new(),
-            });
-        self.bytes += data.len();
+        let begin = || Incomplete {
+            began: now,
+            total,
+            pieces: BTreeMap::new(),
+            bytes: 0,
+        };
+        let unfinished = self.messages.entry(id.clone()).or_insert_with(begin);
+        unfinished.bytes += data.len();
         if let Some(before) = unfinished.pieces.insert(num, data) {
-            self.bytes -= before.len();
+            unfinished.bytes -= before.len();
         }
         if unfinished.pieces.len() < total {
             return Ok(None);
         }
-        Ok(self.forget(&id).map(|whole| Complete {
-            bytes: whole.bytes(),
+        Ok(self.messages.remove(&id).map(|whole| Complete {
+            bytes: whole.bytes,
             pieces: whole.pieces,
         }))
     }
 
-    /// The first bytes of the message that was refused last, if its first piece had come.
-    pub fn take_refused(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.refused)
-    }
-
-    /// Bytes of the pieces that are kept.
-    #[must_use]
-    pub const fn bytes(&self) -> usize {
-        self.bytes
+    fn bytes(&self) -> usize {
+        self.messages.values().map(|one| one.bytes).sum()
     }
 
     /// Bytes of memory that this takes: pieces without text take some too, and so do ids.
@@ -170,7 +159,7 @@ impl Fragments {
     pub fn allocated(&self) -> usize {
         let beside = self.messages.iter();
         let beside = beside.map(|(id, one)| id.len() + PIECE_BYTES * (1 + one.pieces.len()));
-        self.bytes + beside.sum::<usize>()
+        self.bytes() + beside.sum::<usize>()
     }
 
     /// When the oldest unfinished message began.
@@ -179,14 +168,16 @@ impl Fragments {
         self.messages.values().map(|one| one.began).min()
     }
 
-    fn check(&self, id: &str, bytes: usize, num: usize, total: usize) -> Result<(), FragmentError> {
+    fn check(&self, piece: &Piece) -> Result<(), FragmentError> {
+        let &Piece { num, total, .. } = piece;
         if num >= total {
             return Err(FragmentError::NoSuchPiece { num, total });
         }
         if total > MAX_PIECES {
             return Err(FragmentError::TooMany(total));
         }
-        match self.messages.get(id).map(|one| one.total) {
+        let message = self.messages.get(&piece.id);
+        match message.map(|one| one.total) {
             Some(before) if before != total => {
                 return Err(FragmentError::Changed { before, now: total });
             }
@@ -195,30 +186,18 @@ impl Fragments {
             }
             _ => {}
         }
-        let replaced = self.messages.get(id).and_then(|one| one.pieces.get(&num));
+        let replaced = message.and_then(|one| one.pieces.get(&num));
         let replaced = replaced.map_or(0, String::len);
-        if self.bytes - replaced + bytes > MAX_FRAME {
+        if self.bytes() - replaced + piece.data.len() > MAX_FRAME {
             return Err(FragmentError::TooLong);
         }
         Ok(())
     }
 
-    fn forget(&mut self, id: &str) -> Option<Incomplete> {
-        let gone = self.messages.remove(id)?;
-        self.bytes -= gone.bytes();
-        Some(gone)
-    }
-
     /// Forgets messages that take longer than [`MAX_AGE`].
     pub fn forget_old(&mut self, now: Instant) {
-        let bytes = &mut self.bytes;
-        self.messages.retain(|_, one| {
-            let kept = now.saturating_duration_since(one.began) <= MAX_AGE;
-            if !kept {
-                *bytes -= one.bytes();
-            }
-            kept
-        });
+        self.messages
+            .retain(|_, one| now.saturating_duration_since(one.began) <= MAX_AGE);
     }
 }
 
@@ -327,7 +306,7 @@ mod tests {
         assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
         let whole = fragments.take(piece("a", 1, 3, "y"), now).unwrap();
         assert_eq!(whole.map(Complete::text), Some("xyz".to_owned()));
-        assert_eq!(fragments.bytes, "other".len());
+        assert_eq!(fragments.bytes(), "other".len());
     }
 
     #[test]
@@ -354,22 +333,23 @@ mod tests {
                 FragmentError::TooMany(MAX_PIECES + 1),
             ),
         ] {
-            assert_eq!(fragments.take(bad, now), Err(why));
+            let refused = fragments.take(bad, now).map_err(|(error, _)| error);
+            assert_eq!(refused, Err(why));
             assert!(fragments.messages.is_empty());
-            assert_eq!(fragments.bytes, 0);
+            assert_eq!(fragments.bytes(), 0);
             fragments.take(piece("a", 0, 2, "x"), now).unwrap();
         }
         fragments.take(piece("b", 0, 3, &half), now).unwrap();
         let long = fragments.take(piece("b", 1, 3, &half), now);
-        assert_eq!(long, Err(FragmentError::TooLong));
-        assert_eq!(fragments.bytes, 1);
+        assert_eq!(long.unwrap_err().0, FragmentError::TooLong);
+        assert_eq!(fragments.bytes(), 1);
         for number in 1..MAX_UNFINISHED {
             fragments
                 .take(piece(&number.to_string(), 0, 2, "x"), now)
                 .unwrap();
         }
         let more = fragments.take(piece("more", 0, 2, "x"), now);
-        assert_eq!(more, Err(FragmentError::TooManyMessages));
+        assert_eq!(more.unwrap_err().0, FragmentError::TooManyMessages);
         let later = now + MAX_AGE + Duration::from_secs(1);
         assert_eq!(fragments.take(piece("more", 0, 2, "x"), later), Ok(None));
         assert_eq!(fragments.messages.len(), 1, "old ones are forgotten");
@@ -391,19 +371,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_and_since_when_can_be_asked() {
-        let now = Instant::now();
-        let later = now + Duration::from_secs(1);
-        let mut fragments = Fragments::default();
-        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
-        fragments.take(piece("a", 0, 2, "abc"), now).unwrap();
-        fragments.take(piece("b", 0, 2, "de"), later).unwrap();
-        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(now)));
-        fragments.take(piece("a", 1, 2, "f"), later).unwrap();
-        assert_eq!((fragments.bytes(), fragments.oldest()), (2, Some(later)));
-    }
-
-    #[test]
     fn what_is_forgotten_makes_room() {
         let now = Instant::now();
         let much = "x".repeat(MAX_FRAME / 2 + 1);
@@ -411,10 +378,10 @@ mod tests {
         fragments.take(piece("old", 0, 2, &much), now).unwrap();
         let at_last = now + MAX_AGE;
         let more = fragments.take(piece("new", 0, 2, &much), at_last);
-        assert_eq!(more, Err(FragmentError::TooLong));
+        assert_eq!(more.unwrap_err().0, FragmentError::TooLong);
         let later = at_last + Duration::from_nanos(1);
         assert_eq!(fragments.take(piece("new", 0, 2, &much), later), Ok(None));
-        assert_eq!(fragments.bytes, much.len());
+        assert_eq!(fragments.bytes(), much.len());
     }
 
     #[test]

@@ -30,8 +30,6 @@ enum Within {
     Object,
     /// In an object that has been reported already, and is skipped to where it would have ended.
     SkippedObject,
-    /// Behind the object of a message, which has not ended.
-    Behind,
     /// In a line that is no object; its beginning is being collected.
     Line,
     /// In a line that has been reported already, and is skipped to the newline.
@@ -53,10 +51,6 @@ pub struct FrameReader {
     nesting: Nesting,
     /// Longest frame.
     limit: usize,
-    /// Whether every line is a message, which holds one object.
-    of_messages: bool,
-    /// The object of a message that has not ended.
-    held: Option<RawFrame>,
     /// The first bytes of the object that was refused last; a line that is no object has none.
     refused: Vec<u8>,
 }
@@ -84,25 +78,8 @@ impl FrameReader {
             state: Within::Between,
             nesting: Nesting::new(),
             limit,
-            of_messages: false,
-            held: None,
             refused: Vec::new(),
         }
-    }
-
-    /// A reader for streams whose every line is a message. Only white space may stand behind its object; a message that
-    /// holds anything else is refused as a whole.
-    #[must_use]
-    pub const fn of_messages() -> Self {
-        let mut reader = Self::new();
-        reader.of_messages = true;
-        reader
-    }
-
-    /// Whether every line is a message.
-    #[must_use]
-    pub const fn is_of_messages(&self) -> bool {
-        self.of_messages
     }
 
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
@@ -150,9 +127,8 @@ impl FrameReader {
 
     /// How much memory the reader holds, in bytes.
     #[must_use]
-    pub fn buffered(&self) -> usize {
-        let held = self.held.as_ref().map_or(0, |frame| frame.bytes.capacity());
-        self.buffer.capacity() + held
+    pub const fn buffered(&self) -> usize {
+        self.buffer.capacity()
     }
 
     /// Whether a frame has begun and not ended, one that is being skipped included.
@@ -164,14 +140,11 @@ impl FrameReader {
     /// Ends the stream, after the last frame was taken. An unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
-            Within::Object | Within::Behind => Some(FrameError::StreamEnded),
-            Within::Line => Some(self.not_an_object()),
+            Within::Object => Some(FrameError::StreamEnded),
+            Within::Line => Some(self.line_error()),
             Within::Between | Within::SkippedObject | Within::SkippedLine => None,
         };
-        *self = Self {
-            of_messages: self.of_messages,
-            ..Self::with_limit(self.limit)
-        };
+        *self = Self::with_limit(self.limit);
         error
     }
 
@@ -237,18 +210,14 @@ impl FrameReader {
         if newline.is_none() && length < wanted {
             return None;
         }
-        let error = self.not_an_object();
+        let error = self.line_error();
         self.state = Within::SkippedLine;
         self.start = self.at;
         Some(error)
     }
 
-    fn not_an_object(&self) -> FrameError {
-        let prefix = self.buffer.get(self.start..self.at).unwrap_or_default();
-        let cut = prefix.len() == MAX_PREFIX;
-        let text = String::from_utf8_lossy(prefix.trim_ascii_end());
-        let excerpt = text::excerpt(&text);
-        FrameError::NotAnObject(if cut { excerpt + "…" } else { excerpt })
+    fn line_error(&self) -> FrameError {
+        not_an_object(self.buffer.get(self.start..self.at).unwrap_or_default())
     }
 
     /// Goes on in an object. `None` if it has not ended yet, or ended after it had been reported.
@@ -264,24 +233,19 @@ impl FrameReader {
         // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
         let limit = self.limit;
         let too_long = self.at - self.start > limit;
-        let (on, behind) = if self.of_messages {
-            (Within::SkippedLine, Within::SkippedLine)
-        } else {
-            (Within::SkippedObject, Within::Between)
-        };
         let (state, error) = match event {
             None if !too_long => return None,
-            None => (on, FrameError::TooLong(limit)),
-            Some(Event::Balanced) if kept && !too_long => return self.take_frame().map(Ok),
-            Some(Event::Balanced) => (behind, FrameError::TooLong(limit)),
-            Some(Event::Newline { in_string: true }) => {
-                (Within::Between, FrameError::LineEndedInString)
+            Some(Event::Balanced) if kept && !too_long => return Some(Ok(self.take_frame())),
+            Some(Event::Balanced) => (Within::Between, FrameError::TooLong(limit)),
+            None => (Within::SkippedObject, FrameError::TooLong(limit)),
+            Some(Event::Fault(error)) => {
+                let state = match error {
+                    FrameError::Mismatch { .. } => Within::SkippedLine,
+                    FrameError::TooDeep => Within::SkippedObject,
+                    _ => Within::Between,
+                };
+                (state, error)
             }
-            Some(Event::Newline { in_string: false }) => (Within::Between, FrameError::LineEnded),
-            Some(Event::Mismatch { opener, found }) => {
-                (Within::SkippedLine, FrameError::Mismatch { opener, found })
-            }
-            Some(Event::TooDeep) => (on, FrameError::TooDeep),
         };
         if kept {
             self.refused = start_of(self.buffer.get(self.start..self.at).unwrap_or_default());
@@ -295,8 +259,8 @@ impl FrameReader {
         }))
     }
 
-    /// The frame that has just balanced; a message's comes only when the message has ended.
-    fn take_frame(&mut self) -> Option<RawFrame> {
+    /// The frame that has just balanced.
+    fn take_frame(&mut self) -> RawFrame {
         let rest = self.rest();
         let behind = rest
             .iter()
@@ -317,38 +281,12 @@ impl FrameReader {
             frame.unwrap_or_default().to_vec()
         };
         self.start = self.at;
-        let frame = RawFrame {
+        self.state = Within::Between;
+        RawFrame {
             bytes,
             has_literals: self.nesting.has_literals,
             newline,
-        };
-        if self.of_messages {
-            self.state = Within::Behind;
-            self.held = Some(frame);
-            return None;
         }
-        self.state = Within::Between;
-        Some(frame)
-    }
-
-    /// Goes on behind the object of a message. `None` if that has not ended yet.
-    fn scan_behind(&mut self) -> Option<Result<RawFrame, FrameError>> {
-        let rest = self.rest();
-        let behind = rest
-            .iter()
-            .position(|byte| *byte == b'\n' || !is_space(*byte));
-        let newline = behind.and_then(|at| rest.get(at)) == Some(&b'\n');
-        self.at += behind.unwrap_or(rest.len());
-        self.start = self.at;
-        behind?;
-        let frame = self.held.take();
-        if newline {
-            self.state = Within::Between;
-            return frame.map(|frame| Ok(RawFrame { newline, ..frame }));
-        }
-        self.refused = frame.map_or_else(Vec::new, |frame| start_of(&frame.bytes));
-        self.state = Within::SkippedLine;
-        Some(Err(FrameError::MoreBehind))
     }
 
     /// The next frame, still to be [decoded](RawFrame::decode). `None` means that more bytes are needed, not that the
@@ -361,7 +299,6 @@ impl FrameReader {
                     None
                 }
                 Within::Object | Within::SkippedObject => self.scan_object(),
-                Within::Behind => self.scan_behind(),
                 Within::Line | Within::SkippedLine => self.scan_line().map(Err),
             };
             if found.is_some() {
@@ -383,6 +320,14 @@ impl Iterator for FrameReader {
         self.next_raw()
             .map(|frame| frame?.decode().map_err(|(error, _)| error))
     }
+}
+
+fn not_an_object(line: &[u8]) -> FrameError {
+    let prefix = line.get(..MAX_PREFIX).unwrap_or(line);
+    let text = String::from_utf8_lossy(prefix.trim_ascii_end());
+    let excerpt = text::excerpt(&text);
+    let is_cut = prefix.len() == MAX_PREFIX;
+    FrameError::NotAnObject(if is_cut { excerpt + "…" } else { excerpt })
 }
 
 const fn is_space(byte: u8) -> bool {
@@ -427,7 +372,7 @@ pub enum FrameError {
     /// More than [`MAX_NESTING`] levels.
     #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
     TooDeep,
-    /// Something stood behind the object of a message that holds one.
+    /// Something stood behind the object of a message, which holds one.
     #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
     MoreBehind,
     /// Longer than the limit, which it holds: [`MAX_FRAME`] unless the reader has another.
@@ -448,6 +393,8 @@ pub enum FramePart {
     Lines(Series),
     /// Any other frame.
     Frame(RawFrame),
+    /// A whole message of a WebSocket. Nobody has looked at it.
+    Message(Bytes),
     /// A stretch that is no frame, and its first bytes, at most [`KEPT_START`] of them.
     Error(FrameError, Vec<u8>),
 }
@@ -471,6 +418,25 @@ pub struct RawFrame {
 }
 
 impl RawFrame {
+    /// The frame that a message holds, which may be pretty-printed. `None` if the message is nothing but white space.
+    ///
+    /// # Errors
+    /// If it is anything else than one object; with its first bytes.
+    pub fn of_message(message: &[u8]) -> Option<Result<Self, (FrameError, Vec<u8>)>> {
+        let text = message.trim_ascii();
+        if text.is_empty() {
+            return None;
+        }
+        Some(match one_object(text) {
+            Ok(has_literals) => Ok(Self {
+                bytes: text.to_vec(),
+                has_literals,
+                newline: true,
+            }),
+            Err(error) => Err((error, start_of(text))),
+        })
+    }
+
     /// How long it is, in bytes; never 0.
     #[must_use]
     #[allow(clippy::len_without_is_empty, reason = "it has two braces at least")]
@@ -503,17 +469,41 @@ impl RawFrame {
     }
 }
 
+/// Whether the object, if `text` is one, may have names of numbers that are not finite.
+fn one_object(text: &[u8]) -> Result<bool, FrameError> {
+    if !text.starts_with(b"{") {
+        let line = text.split(|byte| *byte == b'\n').next();
+        return Err(not_an_object(line.unwrap_or_default()));
+    }
+    let mut nesting = Nesting::new();
+    let mut rest = text;
+    loop {
+        let (scanned, event) = nesting.scan(rest);
+        rest = rest.get(scanned..).unwrap_or_default();
+        match event {
+            Some(Event::Balanced) if rest.is_empty() => return Ok(nesting.has_literals),
+            Some(Event::Balanced) => return Err(FrameError::MoreBehind),
+            // Between tokens a newline is white space.
+            Some(Event::Fault(FrameError::LineEnded)) if !rest.is_empty() => {
+                rest = rest.get(1..).unwrap_or_default();
+            }
+            Some(Event::Fault(error)) => return Err(error),
+            None => return Err(FrameError::LineEnded),
+        }
+    }
+}
+
 // ---- the end of one JSON object: the state after a byte depends on the bytes so far, not on how they were cut up ----
 
 const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
 
 /// The reason why a scan of an object stops.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug)]
 enum Event {
+    /// The object has ended.
     Balanced,
-    Newline { in_string: bool },
-    Mismatch { opener: char, found: char },
-    TooDeep,
+    /// It is none. A newline is such a fault too.
+    Fault(FrameError),
 }
 
 /// State of the scan in an object: the brackets that are open, and whether it is inside a string.
@@ -555,7 +545,7 @@ impl Nesting {
                 at += plain_in_string(bytes.get(at..).unwrap_or_default());
                 match bytes.get(at) {
                     None => break,
-                    Some(b'\n') => return (at, Some(Event::Newline { in_string: true })),
+                    Some(b'\n') => return (at, Some(Event::Fault(FrameError::LineEndedInString))),
                     Some(b'\\') => self.escaped = true,
                     Some(_) => self.in_string = false,
                 }
@@ -563,7 +553,7 @@ impl Nesting {
                 continue;
             }
             if byte == b'\n' {
-                return (at, Some(Event::Newline { in_string: false }));
+                return (at, Some(Event::Fault(FrameError::LineEnded)));
             }
             at += 1;
             if let Some(event) = self.structural(byte) {
@@ -592,14 +582,14 @@ impl Nesting {
         if self.depth <= MAX_NESTING {
             self.brackets = (self.brackets << 1) + bracket;
         }
-        (self.depth == MAX_NESTING + 1).then_some(Event::TooDeep)
+        (self.depth == MAX_NESTING + 1).then_some(Event::Fault(FrameError::TooDeep))
     }
 
     fn close(&mut self, bracket: u128) -> Option<Event> {
         if self.depth <= MAX_NESTING {
             if self.brackets & 1 != bracket {
                 let (opener, found) = if bracket == 1 { ('{', ']') } else { ('[', '}') };
-                return Some(Event::Mismatch { opener, found });
+                return Some(Event::Fault(FrameError::Mismatch { opener, found }));
             }
             self.brackets >>= 1;
         }

@@ -5,6 +5,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use serde::{Serialize, Serializer};
 use serde_json::value::RawValue;
 
 use super::json;
@@ -17,7 +18,7 @@ pub struct Payload(Arc<Inner>);
 struct Inner {
     raw: Box<RawValue>,
     /// The text as it is written, if it differs from what came.
-    line: Option<Box<str>>,
+    line: Option<Box<RawValue>>,
 }
 
 impl Payload {
@@ -37,28 +38,34 @@ impl Payload {
     #[must_use]
     pub fn allocated(&self) -> usize {
         let counts = 2 * size_of::<usize>();
-        let line = self.0.line.as_ref().map_or(0, |line| line.len());
+        let line = self.0.line.as_ref().map_or(0, |line| line.get().len());
         counts + size_of::<Inner>() + self.get().len() + line
     }
 
     /// The text as it is written: [strict](json::strict), on one line.
     #[must_use]
     pub fn line(&self) -> &str {
-        self.0.line.as_deref().unwrap_or_else(|| self.get())
+        self.written().get()
+    }
+
+    fn written(&self) -> &RawValue {
+        self.0.line.as_ref().unwrap_or(&self.0.raw)
     }
 }
 
 impl From<Box<RawValue>> for Payload {
     fn from(raw: Box<RawValue>) -> Self {
         let strict = json::strict(raw.get());
-        // Valid JSON has a carriage return between tokens only. Some readers take one for the end of a line: then what
-        // another client has put between two of them would be a frame to them.
+        // Valid JSON has line ends between tokens only. Some readers take a carriage return for one: then what another
+        // client has put between two of them would be a frame to them.
         let line = match strict {
-            text if text.contains('\r') => Some(text.replace('\r', " ")),
+            text if text.contains('\r') || text.contains('\n') => {
+                Some(text.replace(['\r', '\n'], " "))
+            }
             Cow::Owned(text) => Some(text),
             Cow::Borrowed(_) => None,
         };
-        let line = line.map(String::into_boxed_str);
+        let line = line.and_then(|line| RawValue::from_string(line).ok());
         Self(Arc::new(Inner { raw, line }))
     }
 }
@@ -66,6 +73,13 @@ impl From<Box<RawValue>> for Payload {
 impl From<&RawValue> for Payload {
     fn from(raw: &RawValue) -> Self {
         raw.to_owned().into()
+    }
+}
+
+/// As it is written.
+impl Serialize for Payload {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.written().serialize(serializer)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::field_by_field::FieldByField as _;
-use crate::services::{Address, Ask, Callable, Streamed};
+use crate::services::{Address, Ask, Callable, ResponseWriter, Streamed};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
 use crate::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
@@ -103,25 +103,16 @@ impl<const N: usize> Callable for RunOffline<N> {
 }
 
 impl<const N: usize> Streamed for RunOffline<N> {
-    type Writer = Result<RolloutWriter<N>, Bytes>;
-
-    fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Self::Writer {
+    fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Box<dyn ResponseWriter> {
         match answer {
-            Ok(ran) => Ok(RolloutWriter::new(*ran, to)),
-            Err(why) => Err(to.failure(&why.to_string())),
-        }
-    }
-
-    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
-        match writer {
-            Ok(encoding) => encoding.advance(),
-            Err(failure) => Some(failure.clone()),
+            Ok(ran) => Box::new(RolloutWriter::new(*ran, to)),
+            Err(why) => Box::new(Some(to.failure(&why.to_string()))),
         }
     }
 }
 
 /// The answer, written a slice at a time: it may be 30 MB.
-pub struct RolloutWriter<const N: usize> {
+struct RolloutWriter<const N: usize> {
     run: Rollout<N>,
     took: Duration,
     writer: StreamedResponse,
@@ -151,7 +142,30 @@ impl<const N: usize> RolloutWriter<N> {
         }
     }
 
-    /// Writes some more. Returns the frame once it is whole.
+    fn finish(&mut self) -> Bytes {
+        let method = self.run.known(self.run.deviation());
+        let sampling = self.run.known(self.run.from_ideal());
+        let writer = &mut self.writer;
+        writer.raw(&format!(
+            "],\"evaluations\":{},\"wall_time\":",
+            self.run.evaluations()
+        ));
+        writer.number(self.took.as_secs_f64());
+        for (name, value) in [
+            ("error", method.0),
+            ("error_uncertainty", method.1),
+            ("sampling_error", sampling.0),
+            ("sampling_error_uncertainty", sampling.1),
+        ] {
+            writer.raw(&format!(",\"{name}\":"));
+            writer.number(value.unwrap_or(f64::NAN));
+        }
+        writer.raw("}");
+        std::mem::take(writer).finish(true, "")
+    }
+}
+
+impl<const N: usize> ResponseWriter for RolloutWriter<N> {
     fn advance(&mut self) -> Option<Bytes> {
         let Some(head) = ARRAYS.get(self.column) else {
             return Some(self.finish());
@@ -180,28 +194,6 @@ impl<const N: usize> RolloutWriter<N> {
             self.entry = 0;
         }
         None
-    }
-
-    fn finish(&mut self) -> Bytes {
-        let method = self.run.known(self.run.deviation());
-        let sampling = self.run.known(self.run.from_ideal());
-        let writer = &mut self.writer;
-        writer.raw(&format!(
-            "],\"evaluations\":{},\"wall_time\":",
-            self.run.evaluations()
-        ));
-        writer.number(self.took.as_secs_f64());
-        for (name, value) in [
-            ("error", method.0),
-            ("error_uncertainty", method.1),
-            ("sampling_error", sampling.0),
-            ("sampling_error_uncertainty", sampling.1),
-        ] {
-            writer.raw(&format!(",\"{name}\":"));
-            writer.number(value.unwrap_or(f64::NAN));
-        }
-        writer.raw("}");
-        std::mem::take(writer).finish(true, "")
     }
 }
 

@@ -9,7 +9,6 @@ mod closing;
 mod heads;
 mod http;
 mod life;
-mod lines;
 mod messages;
 mod unread;
 

@@ -1,80 +1,74 @@
-//! Lines that are messages, as on WebSocket: each holds one object.
+//! Messages of a WebSocket: each holds one object.
 
 use pendularm::protocol::limits::MAX_NESTING;
-use pendularm::protocol::wire::frame::FrameReader;
+use pendularm::protocol::op;
+use pendularm::protocol::wire::frame::{FrameError, RawFrame};
 
 use super::nested;
 
-/// Where a line is a message, it holds one object or none of it is a frame; so it is with the next.
+/// The text of the frame; `None` if there is nothing but white space.
+fn read(message: &str) -> Option<Result<String, FrameError>> {
+    let frame = RawFrame::of_message(message.as_bytes())?;
+    let decoded = frame.and_then(RawFrame::decode);
+    Some(decoded.map(|frame| frame.text).map_err(|(error, start)| {
+        assert!(message.trim().as_bytes().starts_with(&start), "{message:?}");
+        error
+    }))
+}
+
 #[test]
-fn a_message_holds_one_object() {
-    let mut reader = FrameReader::of_messages();
-    for (message, objects) in [
-        ("{\"a\":1}", 1),
-        (" {\"a\":1} \r\t", 1),
-        ("{\"a\":1}{\"a\":1}", 0),
-        (
-            "{\"a\":1} {\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}",
-            0,
-        ),
-        ("{\"a\":1},", 0),
-        ("{\"a\":1}\u{0}", 0),
-        ("", 0),
-        ("{}", 1),
+fn a_message_holds_one_object_and_may_be_pretty_printed() {
+    for (message, text) in [
+        ("{}", "{}"),
+        (" {\"a\":1} \r\t\n", "{\"a\":1}"),
+        ("{\n \"op\":\n\"x\"\r\n}", "{\n \"op\":\n\"x\"\r\n}"),
+        ("{\"a\":[NaN,\n\"}\\\"\"]}", "{\"a\":[9e999,\n\"}\\\"\"]}"),
     ] {
-        reader.push(format!("{message}\n").as_bytes());
-        let found: Vec<_> = reader.by_ref().collect();
-        let frames = found.iter().filter(|frame| frame.is_ok()).count();
-        assert_eq!(frames, objects, "{message:?}: {found:?}");
-        let is_silent = message.is_empty();
-        assert_eq!(
-            found.len(),
-            usize::from(!is_silent),
-            "{message:?}: {found:?}"
-        );
+        assert_eq!(read(message), Some(Ok(text.to_owned())), "{message:?}");
+    }
+    for silent in ["", " \r\n\t\n"] {
+        assert_eq!(read(silent), None);
     }
 }
 
-/// A message is read as it comes: bytes behind its object, however late they come, make it none.
+/// Nothing is done of a message that holds anything else.
 #[test]
-fn what_is_behind_the_object_of_a_message_may_come_late() {
-    let mut reader = FrameReader::of_messages();
-    for (pieces, objects) in [
-        (["{\"a\":1}", " \t", "\r\n"], 1),
-        (["{\"a\":1}", " ", "{}\n"], 0),
-        (["{\"a\":1}", ",", "{}\n"], 0),
-        (["{\"a\":1", "} ", "x\n"], 0),
-    ] {
-        let mut found = Vec::new();
-        for piece in pieces {
-            assert_eq!(found, [], "{pieces:?}: before it has ended");
-            reader.push(piece.as_bytes());
-            found.extend(reader.by_ref());
-            let has_ended = piece.ends_with('\n') || !found.is_empty();
-            assert_eq!(reader.is_unfinished(), !piece.ends_with('\n'), "{piece:?}");
-            if has_ended {
-                break;
-            }
-        }
-        reader.push(b"\n");
-        assert_eq!(reader.next(), None);
-        assert!(!reader.is_unfinished());
-        let frames = found.iter().filter(|frame| frame.is_ok()).count();
-        assert_eq!((found.len(), frames), (1, objects), "{pieces:?}: {found:?}");
-    }
-}
-
-/// One error is all that comes of a message.
-#[test]
-fn nothing_is_done_of_a_message_whose_first_object_is_refused() {
+fn a_message_that_is_not_one_object_is_refused_as_a_whole() {
     let too_deep = nested(MAX_NESTING + 1);
-    let mut reader = FrameReader::of_messages();
-    for refused in ["]", "{]", &too_deep] {
-        reader.push(format!("{refused} {{\"a\":1}}\n{{}}\n").as_bytes());
-        let found: Vec<_> = reader.by_ref().collect();
-        assert!(
-            matches!(&found[..], [Err(_), Ok(frame)] if frame.text == "{}"),
-            "{found:?}"
-        );
+    let mismatch = FrameError::Mismatch {
+        opener: '{',
+        found: ']',
+    };
+    let none = |text: &str| FrameError::NotAnObject(text.to_owned());
+    for (message, why) in [
+        ("{\"a\":1}{\"a\":1}", FrameError::MoreBehind),
+        (
+            "{\"a\":1} \n{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}",
+            FrameError::MoreBehind,
+        ),
+        ("{\"a\":1},", FrameError::MoreBehind),
+        ("{\"a\":1}\u{0}", FrameError::MoreBehind),
+        ("{\"a\":1\n", FrameError::LineEnded),
+        ("{\"a\":\"\n\"}", FrameError::LineEndedInString),
+        ("{\"a\":\"\\\n\"}", FrameError::LineEndedInString),
+        ("{]\n{}", mismatch),
+        (&format!("{too_deep}\n{{}}"), FrameError::TooDeep),
+        ("]\n{}", none("]")),
+        (&"x".repeat(99), none(&("x".repeat(32) + "…"))),
+    ] {
+        assert_eq!(read(message), Some(Err(why)), "{message:?}");
     }
+    let not_utf8 = RawFrame::of_message(b"{\"\xff\":1}").unwrap().unwrap();
+    let (error, _) = not_utf8.decode().unwrap_err();
+    assert_eq!(error, FrameError::NotUtf8 { at: 2 });
+}
+
+/// What passes through to other clients is one line.
+#[test]
+fn the_payload_of_a_pretty_printed_message_is_one_line() {
+    let text = read("{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{\r\n\"a\":\n1}}").unwrap();
+    let Ok(op::Op::Publish { msg, .. }) = op::read(&text.unwrap()).op else {
+        panic!("it publishes");
+    };
+    assert_eq!(msg.line(), "{  \"a\": 1}");
 }

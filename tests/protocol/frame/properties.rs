@@ -1,6 +1,6 @@
 //! Any stream, cut anywhere. The fuzz target `frame` holds the reader against the rules written down slowly.
 
-use pendularm::protocol::wire::frame::{FrameReader, opening};
+use pendularm::protocol::wire::frame::opening;
 use proptest::prelude::*;
 
 use super::{nested, outcomes, read};
@@ -41,23 +41,6 @@ proptest! {
         cuts in proptest::collection::vec(any::<prop::sample::Index>(), 0..12),
     ) {
         prop_assert_eq!(read(cut(&stream, &cuts)), read([&stream[..]]));
-    }
-
-    #[test]
-    fn any_split_gives_the_same_frames_of_messages(
-        stream in stream(),
-        cuts in proptest::collection::vec(any::<prop::sample::Index>(), 0..12),
-    ) {
-        let messages = |pieces: Vec<&[u8]>| {
-            let mut reader = FrameReader::of_messages();
-            let mut found = Vec::new();
-            for piece in pieces {
-                reader.push(piece);
-                found.extend(reader.by_ref());
-            }
-            (found, reader.finish())
-        };
-        prop_assert_eq!(messages(cut(&stream, &cuts)), messages(vec![&stream]));
     }
 
     #[test]

@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 
-use std::sync::Arc;
-
 use pendularm::protocol::catalog::{Action, Node, Rosapi, Service, Topic, types};
 use pendularm::protocol::ros::rosapi::{Census, ListedService, ListedTopic, answer};
 use serde_json::{Value, json};
@@ -11,20 +9,17 @@ use serde_json::{Value, json};
 /// Clients that talk on `/chat` and about `/joint_states`, listen to `/wish`, and provide two services.
 fn census() -> Census {
     let topic = |name: &str, type_name: Option<&str>, published, subscribed| {
-        let type_name = type_name.map(Into::into);
-        Arc::new(ListedTopic {
-            name: name.into(),
+        let (name, type_name) = (name.into(), type_name.map(Into::into));
+        ListedTopic {
+            name,
             type_name,
             published,
             subscribed,
-        })
+        }
     };
-    let service = |name: &str, type_name: Option<&str>| {
-        let type_name = type_name.map(Into::into);
-        Arc::new(ListedService {
-            name: name.into(),
-            type_name,
-        })
+    let service = |name: &str, type_name: Option<&str>| ListedService {
+        name: name.into(),
+        type_name: type_name.map(Into::into),
     };
     Census {
         topics: vec![

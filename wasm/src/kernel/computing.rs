@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 
 use bytes::Bytes;
 use pendularm::services::study::Work;
-use pendularm::services::{Address, Answered, Streamed};
+use pendularm::services::{Address, Answered, ResponseWriter, Streamed};
 
 use super::Clock;
 
@@ -48,7 +48,7 @@ pub(super) struct Streaming<A: Streamed> {
 
 enum Stage<A: Streamed> {
     Working(Box<dyn Work<A::Answer>>),
-    Writing(A::Writer),
+    Writing(Box<dyn ResponseWriter>),
 }
 
 impl<A: Streamed> Streaming<A> {
@@ -66,7 +66,7 @@ impl<A: Streamed> Computation for Streaming<A> {
                 self.stage = Stage::Writing(A::begin(answer, &self.to));
                 None
             }
-            Stage::Writing(writer) => A::advance(writer),
+            Stage::Writing(writer) => writer.advance(),
         }
     }
 }

@@ -6,7 +6,7 @@
 use bytes::Bytes;
 
 use crate::actors::node::Ask;
-use crate::actors::wire::{Address, Callable, Streamed};
+use crate::actors::wire::{Address, Callable, ResponseWriter, Streamed};
 use crate::math::integrator::Method;
 use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
 use crate::protocol::catalog::Service;
@@ -66,25 +66,19 @@ impl Callable for IntegrationStep {
 }
 
 impl Streamed for IntegrationStep {
-    type Writer = Result<SamplesWriter, Bytes>;
-
-    fn begin(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Self::Writer {
+    fn begin(
+        answer: Result<Box<Particle>, NotIntegrated>,
+        to: &Address,
+    ) -> Box<dyn ResponseWriter> {
         match answer {
-            Ok(particle) => Ok(SamplesWriter::new(particle, to)),
-            Err(why) => Err(to.failure(&why.to_string())),
-        }
-    }
-
-    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
-        match writer {
-            Ok(encoding) => encoding.advance(),
-            Err(failure) => Some(failure.clone()),
+            Ok(particle) => Box::new(SamplesWriter::new(particle, to)),
+            Err(why) => Box::new(Some(to.failure(&why.to_string()))),
         }
     }
 }
 
 /// The answer, written a slice at a time: it may be 60 MB.
-pub struct SamplesWriter {
+struct SamplesWriter {
     particle: Box<Particle>,
     writer: StreamedResponse,
     array: Array,
@@ -111,7 +105,26 @@ impl SamplesWriter {
         }
     }
 
-    /// Writes some more. Returns the frame once it is whole.
+    fn value(&self, entry: usize) -> f64 {
+        match self.array {
+            Array::Times => self.particle.time(entry),
+            Array::Positions => self
+                .particle
+                .positions()
+                .get(entry)
+                .copied()
+                .unwrap_or(f64::NAN),
+            Array::Velocities => self
+                .particle
+                .velocities()
+                .get(entry)
+                .copied()
+                .unwrap_or(f64::NAN),
+        }
+    }
+}
+
+impl ResponseWriter for SamplesWriter {
     fn advance(&mut self) -> Option<Bytes> {
         let samples = self.particle.positions().len();
         let end = samples.min(self.entry + NUMBERS_PER_LOOK);
@@ -141,23 +154,5 @@ impl SamplesWriter {
             }
         };
         None
-    }
-
-    fn value(&self, entry: usize) -> f64 {
-        match self.array {
-            Array::Times => self.particle.time(entry),
-            Array::Positions => self
-                .particle
-                .positions()
-                .get(entry)
-                .copied()
-                .unwrap_or(f64::NAN),
-            Array::Velocities => self
-                .particle
-                .velocities()
-                .get(entry)
-                .copied()
-                .unwrap_or(f64::NAN),
-        }
     }
 }

@@ -49,8 +49,8 @@ impl Gate for HttpGate<'_> {
         Ok(())
     }
 
-    async fn delay(&self) -> bool {
-        self.session.delay_wrong_token().await
+    async fn delay(&self) {
+        self.session.delay_wrong_token().await;
     }
 }
 

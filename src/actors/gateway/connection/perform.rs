@@ -22,9 +22,7 @@ use crate::protocol::op::{
     self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Problem, Subscribe,
 };
 use crate::protocol::wire::fragments::Fragments;
-use crate::protocol::wire::frame::{
-    Foreign, FrameError, FramePart, FrameReader, RawFrame, is_host_line,
-};
+use crate::protocol::wire::frame::{Foreign, FrameError, FramePart, RawFrame, is_host_line};
 use crate::protocol::wire::payload::Payload;
 
 /// The error for a client that asks for binary frames over raw TCP.
@@ -137,8 +135,11 @@ impl Performer {
     }
 
     async fn perform_part(&mut self, cut: FramePart) -> OpOutcome {
-        let frame = match cut {
-            FramePart::Frame(frame) => frame,
+        let (length, read): (_, Box<dyn FnOnce() -> Option<Incoming> + Send>) = match cut {
+            FramePart::Frame(frame) => (frame.len(), Box::new(move || Some(read(frame)))),
+            FramePart::Message(message) => {
+                (message.len(), Box::new(move || read_message(&message)))
+            }
             FramePart::Lines(lines) => {
                 self.speaks_json = true;
                 return self.perform(None, Op::PublishLines(lines), 0).await;
@@ -153,12 +154,13 @@ impl Performer {
             }
         };
         self.speaks_json = true;
-        let length = frame.len();
         if length > MEDIUM {
             self.performed = Some(self.permit().await);
         }
-        let Some(incoming) = read_frame(length, move || read(frame)).await else {
-            return OpOutcome::Refused(refusal(UNREADABLE));
+        let incoming = match read_frame(length, read).await {
+            Some(Some(incoming)) => incoming,
+            Some(None) => return OpOutcome::Done,
+            None => return OpOutcome::Refused(refusal(UNREADABLE)),
         };
         let is_published = matches!(incoming.op, Ok(Op::Publish { .. } | Op::Fragment(_)));
         if length > SHORT && !is_published && self.performed.is_none() {
@@ -216,9 +218,8 @@ impl Performer {
         }
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(whole) => whole.ok_or(OpOutcome::Done)?,
-            Err(why) => {
-                let refused = op::read_start(&self.fragments.take_refused(), &why);
-                return Ok((under_id(refused, id), 0));
+            Err((why, start)) => {
+                return Ok((under_id(op::read_start(&start, &why), id), 0));
             }
         };
         let length = whole.bytes();
@@ -227,7 +228,7 @@ impl Performer {
         } else {
             self.performed.clone_from(&self.pieces);
         }
-        let whole = match read_frame(length, move || read_whole(&whole.text())).await {
+        let whole = match read_frame(length, move || read_message(whole.text().as_bytes())).await {
             Some(Some(whole)) => whole,
             Some(None) => return Err(OpOutcome::Done),
             None => return Err(OpOutcome::Refused(refusal(UNREADABLE))),
@@ -323,15 +324,10 @@ fn read(frame: RawFrame) -> Incoming {
     }
 }
 
-/// Reads a frame that came in pieces, under the same bounds and with the same leniency as any other. `None` if there is
-/// nothing but white space. Nothing is done of a text with more than one frame.
-fn read_whole(text: &str) -> Option<Incoming> {
-    let mut frames = FrameReader::new();
-    frames.push(text.as_bytes());
-    frames.push(b"\n");
-    Some(match (frames.next_raw()?, frames.next_raw()) {
-        (Ok(_), Some(_)) => op::read_start(text.as_bytes(), &FrameError::MoreBehind),
-        (Ok(frame), None) => read(frame),
-        (Err(error), _) => op::read_start(text.as_bytes(), &error),
+/// Reads a message of a WebSocket, or a frame that came in pieces. `None` if there is nothing but white space.
+fn read_message(message: &[u8]) -> Option<Incoming> {
+    Some(match RawFrame::of_message(message)? {
+        Ok(frame) => read(frame),
+        Err((error, start)) => op::read_start(&start, &error),
     })
 }

@@ -4,12 +4,13 @@
 //! client's requests happen in the order in which it sent them. A series of messages counts as one op. One poll reads a
 //! bounded number of bytes and performs a bounded number of ops.
 
+use std::collections::VecDeque;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{self, Poll, ready};
 
 use actix::prelude::*;
-use bytes::BytesMut;
+use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
@@ -18,7 +19,7 @@ use super::perform::{OpOutcome, Performer, refusal};
 use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, yield_turn};
 use super::session::Opened;
 use super::timer::Timer;
-use super::transport::Transport;
+use super::transport::ReceivedData;
 use super::unfinished::Unfinished;
 use super::writer::ClientWriter;
 use crate::actors::ConnectionId;
@@ -42,6 +43,8 @@ struct ClientReader {
     frames: FrameReader,
     /// Bytes that have come and not been given to `frames`.
     chunk: BytesMut,
+    /// Messages of a WebSocket that have come, with the room of long ones.
+    messages: VecDeque<(Bytes, Option<Permit>)>,
     /// Whether all frames that have come have been cut off.
     is_cut: bool,
     /// None while it performs an op.
@@ -85,16 +88,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         );
         self.transport = Some(opened.transport);
         self.place = Some(opened.place);
-        let frames = if has_messages {
-            FrameReader::of_messages()
-        } else {
-            FrameReader::new()
-        };
         ctx.spawn(ClientReader {
             id,
             step: ReadStep::Frames,
-            frames,
+            frames: FrameReader::new(),
             chunk: opened.first,
+            messages: VecDeque::new(),
             is_cut: true,
             performer: Some(performer),
             performing: None,
@@ -266,14 +265,28 @@ impl ClientReader {
             } else if self.has_ended {
                 return self.poll_last(cx);
             } else {
-                match ready!(self.poll_read(connection, cx))? {
-                    Some(0) => self.has_ended = true,
-                    Some(_) => {}
-                    None => {
-                        connection.refuse(refusal(TOO_SLOW));
-                        return Poll::Ready(Ok(()));
-                    }
-                }
+                let Some(received) = ready!(self.poll_read(connection, cx))? else {
+                    connection.refuse(refusal(TOO_SLOW));
+                    return Poll::Ready(Ok(()));
+                };
+                bytes += self.take_in(received);
+            }
+        }
+    }
+
+    /// Notes what has come. Returns the bytes of a message.
+    fn take_in(&mut self, received: ReceivedData) -> usize {
+        match received {
+            ReceivedData::Bytes(bytes) => {
+                self.has_ended = bytes == 0;
+                0
+            }
+            #[cfg(feature = "web")]
+            ReceivedData::Message(message, permit) => {
+                let bytes = message.len();
+                self.messages.push_back((message, permit));
+                self.is_cut = false;
+                bytes
             }
         }
     }
@@ -307,16 +320,19 @@ impl ClientReader {
         };
         performer.give_back();
         self.waits_since = None;
-        let Some(cut) = self.frames.cut() else {
+        let cut = match self.messages.pop_front() {
+            Some((message, permit)) => {
+                performer.coming = permit;
+                Some(FramePart::Message(message))
+            }
+            None => self.frames.cut(),
+        };
+        let Some(cut) = cut else {
             self.is_cut = true;
             if !self.frames.is_unfinished() {
                 self.unfinished.begin_anew();
             } else if performer.coming.is_none() && self.frames.buffered() > MEDIUM {
-                let taken = connection.transport.as_mut();
-                performer.coming = taken.and_then(Transport::take_permit);
-                if performer.coming.is_none() {
-                    self.room = Some(Box::pin(performer.room()));
-                }
+                self.room = Some(Box::pin(performer.room()));
             }
             self.performer = Some(performer);
             return false;
@@ -325,12 +341,7 @@ impl ClientReader {
         match &cut {
             FramePart::Lines(_) => connection.outgoing.set_singly(false),
             FramePart::Frame(frame) => connection.outgoing.set_singly(!frame.newline()),
-            FramePart::Error(..) => {}
-        }
-        if performer.coming.is_none()
-            && let Some(transport) = &mut connection.transport
-        {
-            performer.coming = transport.take_permit();
+            FramePart::Message(_) | FramePart::Error(..) => {}
         }
         self.performing = Some(Box::pin(performer.take(cut)));
         true
@@ -354,7 +365,7 @@ impl ClientReader {
         &mut self,
         connection: &mut Connection<S>,
         cx: &mut task::Context<'_>,
-    ) -> Poll<Result<Option<usize>, ClientLost>> {
+    ) -> Poll<Result<Option<ReceivedData>, ClientLost>> {
         let Some(transport) = &mut connection.transport else {
             return Poll::Ready(Err(ClientLost::Gone));
         };
@@ -362,8 +373,7 @@ impl ClientReader {
         let began = *self.waits_since.get_or_insert_with(Instant::now);
         if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
             self.waits_since = None;
-            if is_unfinished {
-                let received = read.unwrap_or_default();
+            if is_unfinished && let Ok(ReceivedData::Bytes(received)) = read {
                 self.unfinished.wait(began.elapsed(), received);
             }
             return Poll::Ready(read.map(Some));
@@ -383,9 +393,9 @@ impl ClientReader {
         }
     }
 
-    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`], so that the end of the
-    /// stream is seen. It is an error if the client is gone. A client that has ended its stream counts as gone when
-    /// nothing was written or computed for [`RESPONSES_TIME`].
+    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`] or [`FRAMES_IN_A_ROW`]
+    /// messages, so that the end of the stream is seen. It is an error if the client is gone. A client that has ended
+    /// its stream counts as gone when nothing was written or computed for [`RESPONSES_TIME`].
     fn poll_ahead<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
@@ -400,11 +410,13 @@ impl ClientReader {
             ready!(self.timer.poll(Some(due), cx));
             return Poll::Ready(Err(ClientLost::Gone));
         }
-        if self.chunk.len() >= CHUNK {
+        let messages = self.messages.iter().map(|(message, _)| message.len());
+        let bytes = self.chunk.len() + messages.sum::<usize>();
+        if bytes >= CHUNK || self.messages.len() >= FRAMES_IN_A_ROW {
             return Poll::Pending;
         }
-        let read = ready!(transport.poll_read(cx, &mut self.chunk))?;
-        self.has_ended = read == 0;
+        let received = ready!(transport.poll_read(cx, &mut self.chunk))?;
+        self.take_in(received);
         Poll::Ready(Ok(()))
     }
 }

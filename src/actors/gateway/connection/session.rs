@@ -14,9 +14,9 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::Admission;
 use super::admission::authentication::{AuthError, authenticate, opens_as_command};
 use super::admission::slots::HeldSlot;
+use super::admission::{Admission, WRONG_TOKEN_TIME};
 use super::plain::{CHUNK, discard};
 use super::transport::Transport;
 use crate::actors::ConnectionId;
@@ -70,19 +70,6 @@ impl Drop for HeldPlace {
     fn drop(&mut self) {
         self.registry.do_send(Disconnect(self.id));
     }
-}
-
-/// The protocol that a client speaks, by its first bytes.
-enum DetectedProtocol {
-    /// It speaks JSON, if anything.
-    Json,
-    /// It sends an HTTP request that is answered.
-    #[cfg(feature = "web")]
-    Http,
-    /// It speaks another protocol, or has not spoken in time; holds the error for it.
-    Foreign(String),
-    /// The runtime has ended the connection first.
-    Finished,
 }
 
 /// How a client is served.
@@ -290,21 +277,17 @@ impl ClientSession {
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        if !is_wrong_token || self.delay_wrong_token().await {
-            self.refuse(stream, why).await;
+        if is_wrong_token {
+            self.delay_wrong_token().await;
         }
+        self.refuse(stream, why).await;
     }
 
-    /// Waits after a wrong token: longer with each one from its address. Returns whether it is answered.
-    pub(super) async fn delay_wrong_token(&self) -> bool {
-        let attempts = &self.admission.newcomers.failed_attempts;
+    /// Waits before a wrong token is answered. The right one is admitted at once.
+    pub(super) async fn delay_wrong_token(&self) {
         let from = self.ends.peer.ip();
-        if let Some(wrong) = attempts.due_warning(from) {
-            tracing::warn!(%from, wrong, "wrong tokens were shown");
-        }
-        let wait = attempts.wait(from);
-        sleep(wait.unwrap_or(HEAD_TIME)).await;
-        wait.is_some()
+        tracing::warn!(%from, "a wrong token was shown");
+        sleep(WRONG_TOKEN_TIME).await;
     }
 
     /// Makes the client known.
@@ -330,37 +313,28 @@ impl ClientSession {
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        match self.detect_protocol(stream, first, examination).await {
-            DetectedProtocol::Json => match examination {
-                Examination::Served => HowServed::Json,
-                Examination::Kept(due) => match opens_as_command(stream, first, due).await {
+        match (self.detect(stream, first, examination).await, examination) {
+            (HowServed::Json, Examination::Kept(due)) => {
+                match opens_as_command(stream, first, due).await {
                     true => HowServed::Command,
                     false => HowServed::Undecided,
-                },
-                Examination::Token(token, due) => {
-                    match authenticate(token, stream, first, due).await {
-                        Ok(true) => HowServed::Command,
-                        Ok(false) => HowServed::Json,
-                        Err(why) => HowServed::Refused {
-                            why: why.to_string(),
-                            is_wrong_token: why == AuthError::Wrong,
-                        },
-                    }
                 }
-            },
-            #[cfg(feature = "web")]
-            DetectedProtocol::Http => {
-                let due = examination.due();
-                HowServed::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME))
             }
-            DetectedProtocol::Foreign(why) => HowServed::Refused {
-                why,
-                is_wrong_token: false,
-            },
-            DetectedProtocol::Finished => {
+            (HowServed::Json, Examination::Token(token, due)) => {
+                match authenticate(token, stream, first, due).await {
+                    Ok(true) => HowServed::Command,
+                    Ok(false) => HowServed::Json,
+                    Err(why) => HowServed::Refused {
+                        why: why.to_string(),
+                        is_wrong_token: why == AuthError::Wrong,
+                    },
+                }
+            }
+            (HowServed::Gone, _) => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
                 HowServed::Gone
             }
+            (how, _) => how,
         }
     }
 
@@ -395,12 +369,16 @@ impl ClientSession {
     /// Reads until the first bytes tell the client's protocol. A client that ends before that counts as one that
     /// speaks JSON. A silent client may stay silent, unless it has something to show until `due`; a client that has
     /// begun what may become a request has to go on.
-    async fn detect_protocol<S: AsyncRead + Unpin>(
+    async fn detect<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
         first: &mut BytesMut,
         examination: Examination<'_>,
-    ) -> DetectedProtocol {
+    ) -> HowServed {
+        let foreign = |why: &str| HowServed::Refused {
+            why: why.to_owned(),
+            is_wrong_token: false,
+        };
         let mut deadline = examination.due();
         loop {
             match opening(first) {
@@ -415,38 +393,34 @@ impl ClientSession {
                         deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
-                Opening::Json => return DetectedProtocol::Json,
+                Opening::Json => return HowServed::Json,
                 #[cfg(feature = "web")]
                 Opening::Foreign(Foreign::Http)
                     if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
                 {
-                    return DetectedProtocol::Http;
+                    let due = examination.due();
+                    return HowServed::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME));
                 }
-                Opening::Foreign(foreign) => {
-                    return DetectedProtocol::Foreign(foreign.explanation().to_owned());
-                }
+                Opening::Foreign(protocol) => return foreign(protocol.explanation()),
             }
             let read = tokio::select! {
                 biased;
-                () = self.finish.notified() => return DetectedProtocol::Finished,
+                () = self.finish.notified() => return HowServed::Gone,
                 // A few bytes decide, and there is room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
                     return match examination {
-                        Examination::Token(..) => {
-                            DetectedProtocol::Foreign(AuthError::TooLate.to_string())
-                        }
+                        Examination::Token(..) => foreign(&AuthError::TooLate.to_string()),
                         Examination::Served => {
-                            let why = "what this connection began with did not go on";
-                            DetectedProtocol::Foreign(why.to_owned())
+                            foreign("what this connection began with did not go on")
                         }
                         // It is refused like any other client without a place.
-                        Examination::Kept(_) => DetectedProtocol::Json,
+                        Examination::Kept(_) => HowServed::Json,
                     };
                 }
             };
             if read.unwrap_or(0) == 0 {
-                return DetectedProtocol::Json;
+                return HowServed::Json;
             }
         }
     }

@@ -1,11 +1,11 @@
 //! The transport of a client's frames: plain bytes, or a WebSocket around them.
 //!
-//! **Invariant:** the reader sees a stream of bytes in which every frame ends where its braces close or with its line.
-//! The writer hands over whole frames that end in a newline. Both hold for either.
+//! **Invariant:** the reader gets a stream of bytes, in which every frame ends where its braces close or with its line,
+//! or whole messages. The writer hands over whole frames that end in a newline, for either.
 
 use std::io;
 use std::pin::Pin;
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, ready};
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -14,6 +14,7 @@ use tokio::time::Instant;
 use super::plain::{self, ClientLost};
 #[cfg(feature = "web")]
 use super::websocket::WebSocket;
+#[cfg(feature = "web")]
 use crate::actors::resources::memory::Permit;
 
 /// The stream of a client that is served, and the protocol on it.
@@ -21,6 +22,15 @@ pub(super) enum Transport<S> {
     Plain(S),
     #[cfg(feature = "web")]
     WebSocket(Box<WebSocket<S>>),
+}
+
+/// What a client has sent.
+pub(super) enum ReceivedData {
+    /// This many bytes of a stream; none at its end, after which the client may still be reading.
+    Bytes(usize),
+    /// A message, and the room that it takes if it is long.
+    #[cfg(feature = "web")]
+    Message(Bytes, Option<Permit>),
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
@@ -42,19 +52,21 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Appends the available bytes; 0 at the end of the stream, after which the client may still be reading.
+    /// Appends the available bytes of a stream, or gives the next message.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
-    ) -> Poll<Result<usize, ClientLost>> {
-        match self {
-            Self::Plain(stream) => {
-                plain::poll_read(stream, cx, chunk).map(|read| read.map_err(|_| ClientLost::Gone))
-            }
+    ) -> Poll<Result<ReceivedData, ClientLost>> {
+        Poll::Ready(match self {
+            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk)) {
+                Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
+                Err(_) => Err(ClientLost::Gone),
+            },
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.poll_read(cx, chunk),
-        }
+            Self::WebSocket(socket) => ready!(socket.poll_read(cx))
+                .map(|(message, permit)| ReceivedData::Message(message, permit)),
+        })
     }
 
     /// Reads from a client that was refused: nothing that comes is looked at.
@@ -67,15 +79,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
             Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
-        }
-    }
-
-    /// The room that a long message has taken while it came, if this reads messages.
-    pub(super) fn take_permit(&mut self) -> Option<Permit> {
-        match self {
-            Self::Plain(_) => None,
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.take_permit(),
         }
     }
 

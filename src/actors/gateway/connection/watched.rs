@@ -19,10 +19,8 @@ use crate::protocol::limits::MEDIUM;
 pub(super) const READ_BUFFER: usize = 8 * 1024;
 /// Bytes that are read before the reader yields. They may be ten thousand empty frames without a message.
 const TURN: usize = 32 * 1024;
-/// Longest head of a frame: two bytes, eight of a length, four of the mask.
-const LONGEST_HEAD: usize = 14;
-/// The lowest opcode of a control frame, which may come between the parts of a message.
-const CONTROL: u8 = 8;
+/// Bytes of the head of a control frame: two, and four of the mask.
+const CONTROL_HEAD: usize = 6;
 /// Bytes of a turn that a control frame counts as, beside its own: a ping is answered with a write of its own, which
 /// takes longer than reading these.
 const CONTROL_COST: usize = 1024;
@@ -42,15 +40,15 @@ pub(super) struct MonitoredStream<S> {
     pub(super) taken: Instant,
     /// Whether the last write found no room: the next that does find some is a sign of life.
     is_blocked: bool,
-    /// The place in the message that comes.
-    place: FramePlace,
-    /// Arrival time of its first byte, plus all time spent not reading.
+    /// Bytes that were read since the last message was complete, without control frames: the message that comes.
+    coming: usize,
+    /// Arrival time of the first of them, plus all time spent not reading.
     began: Option<Instant>,
     /// Bytes that may still be read before the reader yields, in any number of messages.
     turn: usize,
     memory: Memory,
     /// The room for the message that comes, if it is long.
-    pub(super) permit: Option<Permit>,
+    permit: Option<Permit>,
     waiting: Option<ComingPermit>,
 }
 
@@ -64,7 +62,7 @@ impl<S> MonitoredStream<S> {
             life: now,
             taken: now,
             is_blocked: false,
-            place: FramePlace::default(),
+            coming: 0,
             began: None,
             turn: TURN,
             memory,
@@ -83,17 +81,23 @@ impl<S> MonitoredStream<S> {
         self.turn == 0
     }
 
-    /// Reading goes on after this time. Where `is_next`, the last message has been read.
-    pub(super) fn read_on(&mut self, unread: Duration, is_next: bool) {
+    /// Reading goes on after this time.
+    pub(super) fn read_on(&mut self, unread: Duration) {
         self.began = self.began.map(|began| began + unread);
-        if is_next && self.place.message <= MEDIUM {
-            self.permit = None;
-        }
     }
 
-    /// A control frame has come.
-    pub(super) const fn control(&mut self) {
+    /// A message is complete. Returns the room that it has taken, if it is long.
+    pub(super) fn end_message(&mut self) -> Option<Permit> {
+        self.coming = 0;
+        self.began = None;
+        self.permit.take()
+    }
+
+    /// A control frame with that many bytes has come. It may lie between the parts of a message.
+    pub(super) fn end_control(&mut self, payload: usize) {
         self.turn = self.turn.saturating_sub(CONTROL_COST);
+        self.coming = self.coming.saturating_sub(CONTROL_HEAD + payload);
+        self.began = self.began.filter(|_| self.coming > 0);
     }
 
     /// When the message that has begun is late.
@@ -103,7 +107,7 @@ impl<S> MonitoredStream<S> {
 
     /// Waits until there is room for the message that comes, if it is long.
     fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        if self.place.message <= MEDIUM || self.permit.is_some() {
+        if self.coming <= MEDIUM || self.permit.is_some() {
             return Poll::Ready(());
         }
         let waiting = self.waiting.get_or_insert_with(|| {
@@ -116,84 +120,6 @@ impl<S> MonitoredStream<S> {
         self.waiting = None;
         self.permit = Some(permit);
         Poll::Ready(())
-    }
-}
-
-/// The place in a peer's frames (RFC 6455, section 5.2), by the bytes that have come. One read may bring the end of a
-/// message and the beginning of the next.
-#[derive(Default)]
-struct FramePlace {
-    /// The head of the present frame, as far as it has come.
-    head: [u8; LONGEST_HEAD],
-    /// Its bytes that have come.
-    known: usize,
-    /// Bytes of the frame's payload that are still to come.
-    left: u64,
-    /// Whether a message has begun that is not complete.
-    is_open: bool,
-    /// Its payload so far.
-    message: usize,
-}
-
-impl FramePlace {
-    const fn is_between_messages(&self) -> bool {
-        self.known == 0 && !self.is_open
-    }
-
-    const fn is_control(&self) -> bool {
-        self.head[0] & 0x0f >= CONTROL
-    }
-
-    /// Passes these bytes. Whether a message, or a control frame outside of one, ends among them.
-    fn pass(&mut self, mut bytes: &[u8]) -> bool {
-        let mut has_ended = false;
-        while let Some((first, rest)) = bytes.split_first() {
-            if self.left > 0 {
-                let length = usize::try_from(self.left).unwrap_or(usize::MAX);
-                let length = length.min(bytes.len());
-                self.left -= length as u64;
-                self.message += if self.is_control() { 0 } else { length };
-                bytes = bytes.get(length..).unwrap_or_default();
-            } else {
-                if let Some(byte) = self.head.get_mut(self.known) {
-                    *byte = *first;
-                }
-                self.known += 1;
-                bytes = rest;
-                let Some(length) = self.payload() else {
-                    continue;
-                };
-                self.left = length;
-                self.is_open |= !self.is_control();
-            }
-            if self.left == 0 {
-                has_ended |= self.end_frame();
-            }
-        }
-        has_ended
-    }
-
-    /// The length of the payload, once the head is complete.
-    fn payload(&self) -> Option<u64> {
-        let (_, extended) = self.head.split_at(2);
-        let (bytes, length) = match self.head[1] & 0x7f {
-            126 => (2, u64::from(u16::from_be_bytes(*extended.first_chunk()?))),
-            127 => (8, u64::from_be_bytes(*extended.first_chunk()?)),
-            short => (0, u64::from(short)),
-        };
-        let mask = if self.head[1] & 0x80 == 0 { 0 } else { 4 };
-        (self.known >= 2 && self.known == 2 + bytes + mask).then_some(length)
-    }
-
-    /// The frame is complete. Whether no message is open now.
-    const fn end_frame(&mut self) -> bool {
-        self.known = 0;
-        let is_last = self.head[0] & 0x80 != 0;
-        if is_last && !self.is_control() {
-            self.is_open = false;
-            self.message = 0;
-        }
-        !self.is_open
     }
 }
 
@@ -224,15 +150,8 @@ impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
         if received > 0 {
             let now = Instant::now();
             self.life = now;
-            if self
-                .place
-                .pass(buffer.filled().get(before..).unwrap_or_default())
-            {
-                self.began = None;
-            }
-            if !self.place.is_between_messages() {
-                self.began.get_or_insert(now);
-            }
+            self.coming += received;
+            self.began.get_or_insert(now);
         }
         polled
     }

@@ -20,12 +20,11 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, CHUNK, ClientLost};
+use super::plain::{self, ClientLost};
 use super::timer::Timer;
 use super::watched::{MonitoredStream, READ_BUFFER};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::MAX_FRAME;
-use crate::web::message::OneLine;
 
 /// Ping interval: below the idle timeouts of NATs and proxies.
 const PING_INTERVAL: Duration = Duration::from_secs(15);
@@ -52,8 +51,6 @@ pub(super) struct WebSocket<S> {
     asked: Option<Instant>,
     /// When the last read ended; none while one is under way.
     unread_since: Option<Instant>,
-    /// The message that has come, while some of it has not been read.
-    line: Option<OneLine>,
     /// A long message, kept until the library reads on: it would keep the memory of one that is gone for the next.
     spent: Option<Bytes>,
     /// The kind of the message that the next write continues, if it does not begin one.
@@ -85,7 +82,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             ping_is_due: false,
             asked: None,
             unread_since: Some(now),
-            line: None,
             spent: None,
             unfinished: None,
             underway: 0,
@@ -104,37 +100,22 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         self.stream().begin_turn();
     }
 
-    pub(super) fn take_permit(&mut self) -> Option<Permit> {
-        self.stream().permit.take()
-    }
-
-    /// Appends the received part of a message: a long one a chunk at a time, as over TCP.
+    /// Waits for a message. With a long one comes the room that it takes.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
-        chunk: &mut BytesMut,
-    ) -> Poll<Result<usize, ClientLost>> {
+    ) -> Poll<Result<(Bytes, Option<Permit>), ClientLost>> {
         // While nothing was read, no sign of life could be seen.
         let unread = self.unread_since.take();
         let unread = unread.map_or(Duration::ZERO, |since| since.elapsed());
         self.asked = self.asked.map(|asked| asked + unread);
-        let is_next = self.line.is_none();
-        self.stream().read_on(unread, is_next);
-        if is_next {
-            ready!(self.poll_message(cx))?;
-        }
-        let before = chunk.len();
-        if let Some(line) = &mut self.line
-            && line.append(CHUNK, chunk)
-        {
-            self.line = None;
-        }
+        self.stream().read_on(unread);
+        let message = ready!(self.poll_message(cx))?;
         self.unread_since = Some(Instant::now());
-        Poll::Ready(Ok(chunk.len() - before))
+        Poll::Ready(Ok((message, self.stream().end_message())))
     }
 
-    /// Waits for a message.
-    fn poll_message(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), ClientLost>> {
+    fn poll_message(&mut self, cx: &mut Context<'_>) -> Poll<Result<Bytes, ClientLost>> {
         loop {
             if self.stream().is_turn_over() {
                 // Other connections have a turn.
@@ -148,8 +129,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
                 Poll::Ready(Some(Ok(Message::Binary(bytes)))) => bytes,
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
                 // it.
-                Poll::Ready(Some(Ok(_))) => {
-                    self.stream().control();
+                Poll::Ready(Some(Ok(control))) => {
+                    self.stream().end_control(control.len());
                     continue;
                 }
                 // The peer has closed, and takes no answers any more.
@@ -169,8 +150,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
                 }
             };
             self.spent = (message.len() > SHORT).then(|| message.clone());
-            self.line = Some(OneLine::new(message));
-            return Poll::Ready(Ok(()));
+            return Poll::Ready(Ok(message));
         }
     }
 

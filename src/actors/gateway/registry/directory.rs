@@ -1,5 +1,5 @@
-//! The names that clients have registered: topics that they use, services and actions that they serve. They are kept in
-//! order, so that telling them costs no search.
+//! The names that clients serve to others: services and actions. They are kept in order, and so are the topics, so that
+//! telling them costs no search.
 //!
 //! **Invariant:** a name is here exactly as long as a client has it registered.
 
@@ -7,15 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::actors::ConnectionId;
-use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
-
-/// How a client uses a topic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Use {
-    Advertised,
-    Subscribed,
-}
 
 /// What a client may serve to others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,22 +42,11 @@ impl Served {
     }
 }
 
-/// The names, each with all that is known of it. Listed entries are shared with each census.
+/// The services and actions by their absolute names, each with all that is known of it.
 #[derive(Default)]
 pub(crate) struct Directory {
-    topics: BTreeMap<Arc<str>, Users>,
     services: BTreeMap<Arc<str>, Provider>,
     actions: BTreeMap<Arc<str>, Provider>,
-}
-
-/// Clients that use a topic.
-struct Users {
-    publishers: usize,
-    subscribers: usize,
-    /// The first type that was named and is known: messages are encoded by it.
-    known: Option<Type>,
-    /// The topic as rosapi lists it, with the first type that was named.
-    listed: Arc<ListedTopic>,
 }
 
 /// The client that serves a service or an action.
@@ -74,88 +55,10 @@ pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,
     /// The name as the provider spells it: it is called by that.
     pub(crate) spelling: Box<str>,
-    listed: Arc<ListedService>,
-}
-
-impl Users {
-    fn of(topic: &Arc<str>) -> Self {
-        Self {
-            publishers: 0,
-            subscribers: 0,
-            known: None,
-            listed: Arc::new(ListedTopic {
-                name: Arc::clone(topic),
-                type_name: None,
-                published: false,
-                subscribed: false,
-            }),
-        }
-    }
-
-    fn count(&mut self, how: Use, change: impl FnOnce(&mut usize)) {
-        match how {
-            Use::Advertised => change(&mut self.publishers),
-            Use::Subscribed => change(&mut self.subscribers),
-        }
-        let (published, subscribed) = (self.publishers > 0, self.subscribers > 0);
-        if (self.listed.published, self.listed.subscribed) != (published, subscribed) {
-            let listed = Arc::make_mut(&mut self.listed);
-            (listed.published, listed.subscribed) = (published, subscribed);
-        }
-    }
-
-    /// Somebody has named a type; true if it stays with the topic.
-    fn note(&mut self, type_name: &str) -> bool {
-        if self.known.is_none() {
-            self.known = types::find(type_name);
-        }
-        let is_first = self.listed.type_name.is_none();
-        if is_first {
-            Arc::make_mut(&mut self.listed).type_name = Some(type_name.into());
-        }
-        is_first
-    }
+    type_name: Option<Arc<str>>,
 }
 
 impl Directory {
-    /// A client has begun to use a topic.
-    pub(crate) fn add(&mut self, topic: &str, how: Use, type_name: Option<&str>) {
-        if !self.topics.contains_key(topic) {
-            let name = Arc::from(topic);
-            let users = Users::of(&name);
-            self.topics.insert(name, users);
-        }
-        if let Some(users) = self.topics.get_mut(topic) {
-            users.count(how, |count| *count += 1);
-            if let Some(type_name) = type_name {
-                users.note(type_name);
-            }
-        }
-    }
-
-    /// A client that uses a topic already has named its type; true if that stays with the topic.
-    pub(crate) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
-        let users = self.topics.get_mut(topic);
-        users.is_some_and(|users| users.note(type_name))
-    }
-
-    /// A client has ceased to use a topic in this way.
-    pub(crate) fn remove(&mut self, topic: &str, how: Use) {
-        let Some(users) = self.topics.get_mut(topic) else {
-            debug_assert!(false, "{topic} was not counted");
-            return;
-        };
-        users.count(how, |count| *count = count.saturating_sub(1));
-        if users.publishers == 0 && users.subscribers == 0 {
-            self.topics.remove(topic);
-        }
-    }
-
-    /// The type of a topic that clients use, if one has named it and it is known.
-    pub(crate) fn known_type(&self, topic: &str) -> Option<Type> {
-        self.topics.get(topic)?.known
-    }
-
     fn served(&mut self, kind: Served) -> &mut BTreeMap<Arc<str>, Provider> {
         match kind {
             Served::Service => &mut self.services,
@@ -171,18 +74,12 @@ impl Directory {
         (connection, spelling): (ConnectionId, &str),
         type_name: Option<&str>,
     ) -> Option<ConnectionId> {
-        let listed = Arc::new(ListedService {
-            name: name.into(),
-            type_name: type_name.map(Into::into),
-        });
         let provider = Provider {
             connection,
             spelling: spelling.into(),
-            listed: Arc::clone(&listed),
+            type_name: type_name.map(Into::into),
         };
-        let before = self
-            .served(kind)
-            .insert(Arc::clone(&listed.name), provider)?;
+        let before = self.served(kind).insert(name.into(), provider)?;
         Some(before.connection)
     }
 
@@ -203,18 +100,25 @@ impl Directory {
         is_served
     }
 
-    /// All names, up to the limit of a list; none if there are more than `at_most`.
-    pub(crate) fn census(&self, at_most: usize) -> Option<Census> {
-        if self.topics.len() + self.services.len() + self.actions.len() > at_most {
+    /// These and the topics, up to the limit of a list; none if there are more than `at_most`.
+    pub(crate) fn census(
+        &self,
+        topics: impl ExactSizeIterator<Item = ListedTopic>,
+        at_most: usize,
+    ) -> Option<Census> {
+        if topics.len() + self.services.len() + self.actions.len() > at_most {
             return None;
         }
         let listed = |all: &BTreeMap<Arc<str>, Provider>| {
-            let all = all.values().take(MAX_LISTED);
-            all.map(|one| Arc::clone(&one.listed)).collect()
+            let all = all.iter().take(MAX_LISTED);
+            let all = all.map(|(name, one)| ListedService {
+                name: Arc::clone(name),
+                type_name: one.type_name.clone(),
+            });
+            all.collect()
         };
-        let topics = self.topics.values().take(MAX_LISTED);
         Some(Census {
-            topics: topics.map(|users| Arc::clone(&users.listed)).collect(),
+            topics: topics.take(MAX_LISTED).collect(),
             services: listed(&self.services),
             actions: listed(&self.actions),
         })
@@ -227,8 +131,19 @@ mod tests {
 
     const CLIENT: ConnectionId = ConnectionId(1);
 
-    fn whole(directory: &Directory) -> Census {
-        directory.census(usize::MAX).unwrap()
+    /// This many topics, and services.
+    fn census(topics: usize, services: usize, at_most: usize) -> Option<Census> {
+        let mut directory = Directory::default();
+        for n in 0..services {
+            provide(&mut directory, Served::Service, &format!("/{n:05}"), None);
+        }
+        let topics = (0..topics).map(|n| ListedTopic {
+            name: format!("/{n:05}").into(),
+            type_name: None,
+            published: true,
+            subscribed: false,
+        });
+        directory.census(topics, at_most)
     }
 
     fn provide(directory: &mut Directory, kind: Served, name: &str, type_name: Option<&str>) {
@@ -237,47 +152,34 @@ mod tests {
 
     #[test]
     fn so_many_topics_and_services_are_listed_and_no_more() {
-        let mut directory = Directory::default();
-        for n in 0..=MAX_LISTED {
-            directory.add(&format!("/{n:05}"), Use::Advertised, None);
-            provide(&mut directory, Served::Service, &format!("/{n:05}"), None);
-        }
-        let census = whole(&directory);
-        assert_eq!(
-            (census.topics.len(), census.services.len()),
-            (MAX_LISTED, MAX_LISTED)
+        let census = census(MAX_LISTED + 1, MAX_LISTED + 1, usize::MAX).unwrap();
+        let listed = (census.topics.len(), census.services.len());
+        assert_eq!(listed, (MAX_LISTED, MAX_LISTED));
+        let last = format!("/{:05}", MAX_LISTED - 1);
+        let names = (
+            &*census.topics[MAX_LISTED - 1].name,
+            &*census.services[MAX_LISTED - 1].name,
         );
-        directory.remove("/00000", Use::Advertised);
-        assert_eq!(
-            &*whole(&directory).topics[MAX_LISTED - 1].name,
-            format!("/{MAX_LISTED:05}")
-        );
+        assert_eq!(names, (&*last, &*last));
     }
 
     #[test]
     fn a_census_shows_every_change_and_none_is_made_of_more_than_is_wanted() {
+        assert_eq!(census(0, 0, 0), Some(Census::default()));
+        assert!(census(2, 1, 3).is_some() && census(2, 1, 2).is_none());
         let mut directory = Directory::default();
-        assert_eq!(directory.census(0).unwrap(), Census::default());
-        let changes: [fn(&mut Directory); 9] = [
-            |directory| directory.add("/t", Use::Subscribed, None),
-            |directory| assert!(directory.note_type("/t", "a/b")),
-            |directory| directory.add("/t", Use::Advertised, Some("c/d")),
-            |directory| directory.remove("/t", Use::Subscribed),
+        let whole = |directory: &Directory| directory.census([].into_iter(), 1).unwrap();
+        let changes: [fn(&mut Directory); 5] = [
             |directory| provide(directory, Served::Service, "/s", None),
             |directory| provide(directory, Served::Service, "/s", Some("a/b")),
-            |directory| provide(directory, Served::Action, "/a", None),
             |directory| assert!(directory.withdraw(Served::Service, "/s", CLIENT)),
+            |directory| provide(directory, Served::Action, "/a", None),
             |directory| assert!(directory.withdraw(Served::Action, "/a", CLIENT)),
         ];
         for (n, change) in changes.into_iter().enumerate() {
             let before = whole(&directory);
             change(&mut directory);
             assert_ne!(before, whole(&directory), "change {n}");
-            assert!(directory.census(0).is_none());
         }
-        let census = whole(&directory);
-        let topic = &census.topics[0];
-        assert_eq!(topic.type_name.as_deref(), Some("a/b"));
-        assert!(topic.published && !topic.subscribed);
     }
 }

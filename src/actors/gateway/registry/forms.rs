@@ -51,7 +51,7 @@ pub(super) fn within_bounds(wanted: Encoding, forms: &[Encoding]) -> Encoding {
 /// A message, or a series of them, that is to be made in other forms.
 pub(super) struct ToEncode {
     /// The topic, as the subscribers spell it.
-    pub(super) spelling: Arc<str>,
+    pub(super) spelling: Box<str>,
     pub(super) plain: Bytes,
     /// The forms.
     pub(super) encodings: Vec<Encoding>,

@@ -3,7 +3,7 @@
 //! **Invariant:** each ends once: by the answer of its own provider, by its deadline, or with that client. A goal
 //! outlives its sender, but then its progress is not sent.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use tokio::time::Instant;
 
@@ -39,6 +39,14 @@ pub(crate) enum RequestTerms {
     },
 }
 
+/// What a request is found by. Deadlines come first, the next one before all else.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum RequestKey {
+    Deadline(Instant),
+    Caller(ConnectionId),
+    Provider(ConnectionId),
+}
+
 impl Forwarded {
     fn deadline(&self) -> Option<Instant> {
         match self.terms {
@@ -46,28 +54,24 @@ impl Forwarded {
             RequestTerms::Goal { .. } => None,
         }
     }
+
+    fn keys(&self) -> impl Iterator<Item = RequestKey> + use<> {
+        let clients = [
+            RequestKey::Caller(self.caller),
+            RequestKey::Provider(self.provider),
+        ];
+        let deadline = self.deadline().map(RequestKey::Deadline);
+        clients.into_iter().chain(deadline)
+    }
 }
 
 /// Requests of one kind, by their numbers.
 #[derive(Default)]
 pub(crate) struct Requests {
     outstanding: BTreeMap<u64, Forwarded>,
-    by_caller: NumbersByClient,
-    by_provider: NumbersByClient,
-    by_deadline: BTreeSet<(Instant, u64)>,
+    /// The numbers under each key.
+    index: BTreeSet<(RequestKey, u64)>,
     made: u64,
-}
-
-/// The numbers of the requests that concern a client.
-type NumbersByClient = HashMap<ConnectionId, BTreeSet<u64>>;
-
-fn remove(numbers: &mut NumbersByClient, client: ConnectionId, number: u64) {
-    if let Some(of_client) = numbers.get_mut(&client) {
-        of_client.remove(&number);
-        if of_client.is_empty() {
-            numbers.remove(&client);
-        }
-    }
 }
 
 /// The id of request `number` at its provider.
@@ -89,18 +93,20 @@ impl Requests {
     pub(crate) fn add(&mut self, request: Forwarded) -> String {
         self.made += 1;
         let number = self.made;
-        let (caller, provider) = (request.caller, request.provider);
-        self.by_caller.entry(caller).or_default().insert(number);
-        self.by_provider.entry(provider).or_default().insert(number);
-        let deadline = request.deadline().map(|deadline| (deadline, number));
-        self.by_deadline.extend(deadline);
+        self.index.extend(request.keys().map(|key| (key, number)));
         self.outstanding.insert(number, request);
         own_id(number)
     }
 
-    /// Requests of `caller` that have not ended.
-    pub(crate) fn waiting_for(&self, caller: ConnectionId) -> usize {
-        self.by_caller.get(&caller).map_or(0, BTreeSet::len)
+    /// The numbers of the requests under a key, oldest first.
+    fn numbers(&self, key: RequestKey) -> impl DoubleEndedIterator<Item = u64> + '_ {
+        let range = self.index.range((key, 0)..=(key, u64::MAX));
+        range.map(|(_, number)| *number)
+    }
+
+    /// Whether a request of `caller` has not ended.
+    pub(crate) fn has_waiting(&self, caller: ConnectionId) -> bool {
+        self.numbers(RequestKey::Caller(caller)).next().is_some()
     }
 
     /// The number of the request that `provider` means by `id`, if it is that provider's. Without an id, it is the only
@@ -114,8 +120,8 @@ impl Requests {
         let number = match id {
             Some(id) => number_of(id)?,
             None => {
-                let numbers = self.by_provider.get(&provider)?;
-                *numbers.first().filter(|_| numbers.len() == 1)?
+                let mut numbers = self.numbers(RequestKey::Provider(provider));
+                numbers.next().filter(|_| numbers.next().is_none())?
             }
         };
         let request = self.outstanding.get(&number)?;
@@ -133,8 +139,8 @@ impl Requests {
         name: &str,
         caller: ConnectionId,
     ) -> Option<(String, &Forwarded)> {
-        let numbers = self.by_caller.get(&caller)?.iter().rev();
-        let mut requests = numbers.filter_map(|number| Some((*number, self.get(*number)?)));
+        let numbers = self.numbers(RequestKey::Caller(caller)).rev();
+        let mut requests = numbers.filter_map(|number| Some((number, self.get(number)?)));
         let (number, request) =
             requests.find(|(_, one)| one.id.as_ref() == id && names::are_same(&one.name, name))?;
         Some((own_id(number), request))
@@ -147,10 +153,8 @@ impl Requests {
     /// Takes a request that ends.
     pub(crate) fn take(&mut self, number: u64) -> Option<Forwarded> {
         let request = self.outstanding.remove(&number)?;
-        remove(&mut self.by_caller, request.caller, number);
-        remove(&mut self.by_provider, request.provider, number);
-        if let Some(deadline) = request.deadline() {
-            self.by_deadline.remove(&(deadline, number));
+        for key in request.keys() {
+            self.index.remove(&(key, number));
         }
         Some(request)
     }
@@ -164,23 +168,33 @@ impl Requests {
 
     /// When the first request's time will be over.
     pub(crate) fn next_deadline(&self) -> Option<Instant> {
-        self.by_deadline.first().map(|(deadline, _)| *deadline)
+        match self.index.first()? {
+            (RequestKey::Deadline(deadline), _) => Some(*deadline),
+            _ => None,
+        }
     }
 
     /// Takes the request whose time has been over for longest, if there is one.
     pub(crate) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
-        let (_, number) = *self.by_deadline.first().filter(|(due, _)| *due <= now)?;
+        self.next_deadline().filter(|due| *due <= now)?;
+        let (_, number) = *self.index.first()?;
         self.take(number)
     }
 
     /// Takes the numbers of the requests that wait for `provider`, which will not answer them.
-    pub(crate) fn take_numbers(&mut self, provider: ConnectionId) -> BTreeSet<u64> {
-        self.by_provider.remove(&provider).unwrap_or_default()
+    pub(crate) fn take_numbers(&mut self, provider: ConnectionId) -> Vec<u64> {
+        let key = RequestKey::Provider(provider);
+        let numbers: Vec<u64> = self.numbers(key).collect();
+        for number in &numbers {
+            self.index.remove(&(key, *number));
+        }
+        numbers
     }
 
     /// Forgets the requests that `caller` has made.
     pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
-        for number in self.by_caller.remove(&caller).unwrap_or_default() {
+        let numbers: Vec<u64> = self.numbers(RequestKey::Caller(caller)).collect();
+        for number in numbers {
             self.take(number);
         }
     }

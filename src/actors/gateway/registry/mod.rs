@@ -27,7 +27,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::{Instant, sleep_until};
 
-use self::directory::{Directory, Served, Use};
+use self::directory::{Directory, Served};
 use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
@@ -49,7 +49,7 @@ use crate::protocol::names;
 use crate::protocol::op::{ActionServerOp, Op, Verbosity};
 use crate::protocol::wire::payload::Payload;
 
-/// Calls, goals and registrations that are ended in a row, which takes a third of a millisecond.
+/// Calls and goals that are ended in a row, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -67,7 +67,8 @@ pub struct Registry {
     /// Calls and goals that wait for the clients that serve them.
     calls: Requests,
     goals: Requests,
-    leftovers: VecDeque<Leftovers>,
+    /// Calls and goals whose provider has gone.
+    orphaned: VecDeque<(Served, u64)>,
     /// When the next cleanup is, and the task that waits for it.
     next_cleanup: Option<(Instant, SpawnHandle)>,
     nodes: Nodes,
@@ -117,13 +118,6 @@ struct Registrations {
     actions: BTreeMap<Box<str>, KeptEntry>,
 }
 
-/// What is left of a client that has gone: calls and goals that it has not answered, and its registrations.
-struct Leftovers {
-    client: ConnectionId,
-    requests: VecDeque<(Served, u64)>,
-    registered: Registrations,
-}
-
 /// The sender of the frame that is being performed, and the frame's `id`.
 struct FrameOrigin {
     from: ConnectionId,
@@ -140,7 +134,7 @@ impl Registry {
             directory: Directory::default(),
             calls: Requests::default(),
             goals: Requests::default(),
-            leftovers: VecDeque::new(),
+            orphaned: VecDeque::new(),
             next_cleanup: None,
             nodes: Nodes::default(),
             latched: HashMap::new(),
@@ -277,7 +271,7 @@ impl Handler<Retire> for Registry {
     fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
         self.schedule_cleanup(ctx);
-        if self.calls.waiting_for(id) == 0 {
+        if !self.calls.has_waiting(id) {
             return Handled::at_once();
         }
         let (answered, all_answered) = oneshot::channel();
@@ -343,7 +337,7 @@ impl Handler<TakeCensus> for Registry {
     type Result = MessageResult<TakeCensus>;
 
     fn handle(&mut self, take: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.directory.census(take.at_most))
+        MessageResult(self.directory.census(self.topics.listed(), take.at_most))
     }
 }
 
@@ -354,7 +348,7 @@ impl Handler<SetTap> for Registry {
         let unwanted: Vec<&str> = Topic::ALL
             .map(Topic::name)
             .into_iter()
-            .filter(|topic| !self.topics.has_subscribers(topic))
+            .filter(|topic| self.topics.subscribers(topic).is_empty())
             .collect();
         let was_set = self.tap.is_some();
         self.tap = tap;
@@ -367,7 +361,7 @@ impl Handler<SetTap> for Registry {
         }
         for (topic, frame) in &self.latched {
             if let Some(tap) = &mut self.tap
-                && self.topics.has_subscribers(topic.name())
+                && !self.topics.subscribers(topic.name()).is_empty()
             {
                 tap(Tapped::Published(*topic, frame));
             }
@@ -465,7 +459,7 @@ impl Registry {
                     status,
                     result,
                 } => self.complete(origin, Served::Action, &action, |name, id| {
-                    messages::action_result_raw(name, id, &values, status, result)
+                    messages::action_result(name, id, &values, status, result)
                 }),
             },
             Op::ServiceResponse {
@@ -476,7 +470,7 @@ impl Registry {
             } => {
                 let status = status.unwrap_or_default();
                 self.complete(origin, Served::Service, &service, |service, id| {
-                    messages::response_raw(service, id, &values, result, &status)
+                    messages::response(service, id, &values, result, &status)
                 })
             }
             Op::BadAnswer {
@@ -532,7 +526,7 @@ impl Registry {
 
     /// Whether messages on the topic of that absolute name are to be made.
     fn is_wanted(&self, topic: &str) -> bool {
-        self.tap.is_some() || self.topics.has_subscribers(topic)
+        self.tap.is_some() || !self.topics.subscribers(topic).is_empty()
     }
 
     /// Notes that the topic has no subscriber any more.
@@ -555,27 +549,35 @@ impl Registry {
 // ---- cleanup: however many end at one instant, all others have a turn after every few of them -----------------------
 
 impl Registry {
-    /// Leaves all that a client has registered to the cleanup, with the calls and goals that wait for its answer.
+    /// Withdraws all that a client has registered, and leaves the calls and goals that wait for its answer to the
+    /// cleanup: they may be those of all other clients.
     fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
         };
         let registered = std::mem::take(&mut client.registered);
-        let goals = self.goals.take_numbers(id).into_iter();
-        let calls = self.calls.take_numbers(id).into_iter();
-        self.leftovers.push_back(Leftovers {
-            client: id,
-            requests: goals
-                .map(|number| (Served::Action, number))
-                .chain(calls.map(|number| (Served::Service, number)))
-                .collect(),
-            registered,
-        });
+        for topic in registered.advertised.keys() {
+            self.topics.remove_publisher(topic);
+        }
+        for topic in registered.subscriptions.keys() {
+            self.drop_subscriber(topic, id);
+        }
+        for service in registered.services.keys() {
+            self.directory.withdraw(Served::Service, service, id);
+        }
+        for action in registered.actions.keys() {
+            self.directory.withdraw(Served::Action, action, id);
+        }
+        for kind in [Served::Action, Served::Service] {
+            let numbers = self.requests(kind).take_numbers(id);
+            self.orphaned
+                .extend(numbers.into_iter().map(|number| (kind, number)));
+        }
     }
 
-    /// Schedules the next cleanup: at once if there are leftovers, else when the first call's time is over.
+    /// Schedules the next cleanup: at once if a provider has gone, else when the first call's time is over.
     fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.leftovers.is_empty()).then(Instant::now);
+        let left = (!self.orphaned.is_empty()).then(Instant::now);
         let Some(due) = left.or_else(|| self.calls.next_deadline()) else {
             return;
         };
@@ -605,34 +607,20 @@ impl Registry {
                 self.fail(&call, &Refusal::TimedOut(call.name.to_string()));
                 continue;
             }
-            let Some(left) = self.leftovers.front_mut() else {
+            let Some((kind, number)) = self.orphaned.pop_front() else {
                 return;
             };
-            let client = left.client;
-            if let Some((kind, number)) = left.requests.pop_front() {
-                // It may have ended otherwise.
-                if let Some(request) = self.requests(kind).take(number) {
-                    self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
-                }
-            } else if let Some((topic, _entry)) = left.registered.advertised.pop_first() {
-                self.directory.remove(&topic, Use::Advertised);
-            } else if let Some((topic, _entries)) = left.registered.subscriptions.pop_first() {
-                self.drop_subscriber(&topic, client);
-            } else if let Some((service, _entry)) = left.registered.services.pop_first() {
-                self.directory.withdraw(Served::Service, &service, client);
-            } else if let Some((action, _entry)) = left.registered.actions.pop_first() {
-                self.directory.withdraw(Served::Action, &action, client);
-            } else {
-                self.leftovers.pop_front();
+            // It may have ended otherwise.
+            if let Some(request) = self.requests(kind).take(number) {
+                self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
             }
         }
     }
 
     /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
-    fn drop_subscriber(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+    fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
         let name = names::absolute(topic);
-        self.topics.remove(topic, connection);
-        self.directory.remove(&name, Use::Subscribed);
+        self.topics.remove_subscriber(&name, topic, connection);
         if let Some(client) = self.clients.get_mut(&connection)
             && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
             && !names::spellings(&name).any(|one| client.registered.subscriptions.contains_key(one))

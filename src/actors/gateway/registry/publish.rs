@@ -123,15 +123,16 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) {
         for spelling in names::spellings(topic) {
-            let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
+            let mut subscribers = self.subscribers_as(topic, spelling).peekable();
+            if subscribers.peek().is_none() {
                 continue;
-            };
+            }
             let plain = cover_message(self.permit.as_ref(), encode(spelling));
             let mut encodings = Vec::new();
             for subscriber in subscribers {
                 if is_sent_plain(subscriber.encoding, plain.len()) {
                     let underway = pace.as_deref_mut().map(Backpressure::underway);
-                    deliver(subscriber, name, plain.clone(), underway);
+                    deliver(subscriber, plain.clone(), underway);
                     continue;
                 }
                 let encoding = within_bounds(subscriber.encoding, &encodings);
@@ -140,7 +141,7 @@ impl Registry {
                 }
             }
             if !encodings.is_empty() {
-                let message = self.to_encode(name, plain, encodings);
+                let message = self.to_encode(spelling, plain, encodings);
                 let underway = pace.as_deref_mut().map(Backpressure::underway);
                 self.deliver_encoded(message, underway, ctx);
             }
@@ -154,7 +155,7 @@ impl Registry {
         underway: Option<DeliveryGuard>,
         ctx: &mut Context<Self>,
     ) {
-        let (spelling, length) = (Arc::clone(&message.spelling), message.plain.len());
+        let (spelling, length) = (message.spelling.clone(), message.plain.len());
         // A node does not wait, and none of its messages is long.
         if underway.is_none() || !message.is_long() {
             return self.deliver_made(&spelling, length, &message.make(), underway.as_ref());
@@ -173,50 +174,47 @@ impl Registry {
         made: &[(Encoding, Made)],
         underway: Option<&DeliveryGuard>,
     ) {
-        let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
-            return;
-        };
         let forms: Vec<Encoding> = made.iter().map(|(form, _)| *form).collect();
         let is_sent = |one: &&Subscriber| !is_sent_plain(one.encoding, length);
-        for subscriber in subscribers.iter().filter(is_sent) {
+        let topic = &*names::absolute(spelling);
+        for subscriber in self.subscribers_as(topic, spelling).filter(is_sent) {
             let encoding = within_bounds(subscriber.encoding, &forms);
             let of_form = made.iter().find(|(form, _)| *form == encoding);
             if let Some((_, made)) = of_form {
-                self.deliver_form(subscriber, name, made, underway);
+                self.deliver_form(subscriber, made, underway);
             }
         }
     }
 
+    /// The subscribers to `topic`, an absolute name, that spell it so.
+    fn subscribers_as(&self, topic: &str, spelling: &str) -> impl Iterator<Item = &Subscriber> {
+        let subscribers = self.topics.subscribers(topic).iter();
+        subscribers.filter(move |one| *one.spelling == *spelling)
+    }
+
     /// Delivers the forms that could be made of a message. The others count as dropped.
-    fn deliver_form(
-        &self,
-        subscriber: &Subscriber,
-        name: &Arc<str>,
-        made: &Made,
-        underway: Option<&DeliveryGuard>,
-    ) {
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made, underway: Option<&DeliveryGuard>) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
-            deliver(subscriber, name, frame.clone(), underway.cloned());
+            deliver(subscriber, frame.clone(), underway.cloned());
         }
     }
 
     /// Delivers a latched topic's last message for a subscription that came after it.
-    pub(super) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
-        let latched =
-            Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
-        let subscriber = self
-            .topics
-            .subscribers(spelling)
-            .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
-        if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
+    pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
+        let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
+        let Some((topic, Some(frame))) = latched else {
+            return;
+        };
+        let mut subscribers = self.subscribers_as(topic.name(), spelling);
+        if let Some(subscriber) = subscribers.find(|one| one.connection == to) {
             let plain = messages::respelled(topic.name(), spelling, frame);
             if is_sent_plain(subscriber.encoding, plain.len()) {
-                return deliver(subscriber, spelling, plain, None);
+                return deliver(subscriber, plain, None);
             }
             let message = self.to_encode(spelling, plain, vec![subscriber.encoding]);
             for (_, made) in message.make() {
-                self.deliver_form(subscriber, spelling, &made, None);
+                self.deliver_form(subscriber, &made, None);
             }
         }
     }
@@ -225,14 +223,14 @@ impl Registry {
     pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),
-            None => Some(self.directory.known_type(&names::absolute(topic))?.name),
+            None => Some(self.topics.known_type(&names::absolute(topic))?.name),
         }
     }
 
     /// A JSON frame, or a series of them, that is to be made in other forms.
-    fn to_encode(&self, spelling: &Arc<str>, plain: Bytes, encodings: Vec<Encoding>) -> ToEncode {
+    fn to_encode(&self, spelling: &str, plain: Bytes, encodings: Vec<Encoding>) -> ToEncode {
         ToEncode {
-            spelling: Arc::clone(spelling),
+            spelling: spelling.into(),
             plain,
             encodings,
             type_name: self.known_type(spelling).map(Into::into),
@@ -269,14 +267,9 @@ fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
-fn deliver(
-    subscriber: &Subscriber,
-    topic: &Arc<str>,
-    frame: Bytes,
-    underway: Option<DeliveryGuard>,
-) {
+fn deliver(subscriber: &Subscriber, frame: Bytes, underway: Option<DeliveryGuard>) {
     subscriber.outlet.do_send(Deliver {
-        topic: Some(Arc::clone(topic)),
+        topic: Some(Arc::clone(&subscriber.spelling)),
         frame,
         underway,
     });

@@ -272,14 +272,7 @@ impl Registry {
         encode: impl FnOnce(&str, &str) -> Bytes,
     ) -> Result<(), Refusal> {
         let absolute = &*names::absolute(name);
-        let provider = self.directory.provider(kind, absolute).cloned();
-        let client = provider.and_then(|provider| {
-            let client = self.clients.get_mut(&provider.connection)?;
-            // A client that has stopped sending serves nothing, though the name may not be withdrawn yet.
-            let is_served = client.registered.served(kind).contains_key(absolute);
-            is_served.then(|| (client.backlog(), provider))
-        });
-        let Some((backlog, provider)) = client else {
+        let Some(provider) = self.directory.provider(kind, absolute).cloned() else {
             return Err(match kind {
                 Served::Service => NoService::NoProvider(name.to_owned()).into(),
                 Served::Action => Refusal::NoAction(name.to_owned()),
@@ -288,7 +281,8 @@ impl Registry {
         if matches!(args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);
         }
-        if backlog > MAX_BACKLOG {
+        let server = self.clients.get(&provider.connection);
+        if server.is_some_and(|server| server.backlog() > MAX_BACKLOG) {
             return Err(Refusal::ProviderBusy(name.to_owned()));
         }
         let Some(caller) = self.clients.get(&origin.from) else {
@@ -354,7 +348,7 @@ impl Registry {
         let is_wanted =
             matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
         if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
-            let frame = messages::action_feedback_raw(&goal.name, goal.id.as_ref(), values);
+            let frame = messages::action_feedback(&goal.name, goal.id.as_ref(), values);
             sender.outlets.deliver.do_send(Deliver {
                 topic: None,
                 frame: cover_message(self.permit.as_ref(), frame),
@@ -451,7 +445,7 @@ impl Registry {
 
     /// If this was the last call that its caller waited for, a client that has stopped sending may go.
     fn note_answered(&mut self, request: &Forwarded) {
-        if self.calls.waiting_for(request.caller) == 0
+        if !self.calls.has_waiting(request.caller)
             && let Some(client) = self.clients.get_mut(&request.caller)
         {
             client.answered = None;

@@ -4,9 +4,8 @@
 
 use std::sync::Arc;
 
-use super::directory::Use;
 use super::refusal::Refusal;
-use super::topics::{Subscription, throttle_of};
+use super::topics::{Subscriber, Subscription, throttle_of};
 use super::{FrameOrigin, Registry};
 use crate::actors::gateway::messages::{Configure, Throttle};
 use crate::protocol::catalog::{Direction, Topic, types};
@@ -33,10 +32,10 @@ impl Registry {
         let bytes = topic.len() + type_name.map_or(0, str::len);
         let entry = client.kept.enter(bytes, before)?;
         if is_new {
-            self.directory.add(topic, Use::Advertised, type_name);
+            self.topics.add_publisher(topic);
         }
-        let is_noted = |type_name| self.directory.note_type(topic, type_name);
-        if is_new || type_name.is_some_and(is_noted) {
+        let is_noted = type_name.is_some_and(|name| self.topics.note_type(topic, name));
+        if is_new || is_noted {
             client.registered.advertised.insert(topic.into(), entry);
         }
         if let Some(topic) = Topic::from_name(topic) {
@@ -51,7 +50,7 @@ impl Registry {
         };
         let topic = &*names::absolute(topic);
         if client.registered.advertised.remove(topic).is_some() {
-            self.directory.remove(topic, Use::Advertised);
+            self.topics.remove_publisher(topic);
         }
         if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
             client.withdrawn.insert(topic);
@@ -79,17 +78,24 @@ impl Registry {
         let is_new = before.is_none();
         let instead = before.map(|one| &one.entry);
         let entry = client.kept.enter(topic.len() + bytes, instead)?;
-        let (name, new) = self
-            .topics
-            .add(topic, origin.from, client.outlets.deliver.clone());
-        let type_name = subscribe.type_name.as_deref();
-        if new {
-            self.directory.add(&absolute, Use::Subscribed, type_name);
-        } else if let Some(type_name) = type_name {
-            self.directory.note_type(&absolute, type_name);
+        let known = client.registered.subscriptions.get_key_value(topic);
+        let known = known.map(|(name, _)| Arc::clone(name));
+        let name = known.unwrap_or_else(|| {
+            let spelling: Arc<str> = topic.into();
+            let subscriber = Subscriber {
+                connection: origin.from,
+                spelling: Arc::clone(&spelling),
+                outlet: client.outlets.deliver.clone(),
+                encoding: Encoding::default(),
+            };
+            self.topics.add_subscriber(&absolute, subscriber);
+            spelling
+        });
+        if let Some(type_name) = subscribe.type_name.as_deref() {
+            self.topics.note_type(&absolute, type_name);
         }
         let subscriptions = &mut client.registered.subscriptions;
-        let subscriptions = subscriptions.entry(name.clone()).or_default();
+        let subscriptions = subscriptions.entry(Arc::clone(&name)).or_default();
         subscriptions.retain(|one| one.id != id);
         subscriptions.push(Subscription {
             id,
@@ -99,8 +105,8 @@ impl Registry {
             entry,
         });
         let throttle = throttle_of(subscriptions);
-        self.topics.configure(&name, origin.from, subscriptions);
-        let shared = Arc::clone(&name);
+        self.topics
+            .set_encoding(&absolute, topic, origin.from, subscriptions);
         if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
             // The throttle of an earlier subscription must not hold back the latched message of this one.
             client.outlets.configure.do_send(Configure {
@@ -118,7 +124,7 @@ impl Registry {
         if first {
             self.tell_owner(topic, true);
         } else if is_new {
-            self.deliver_latched(&shared, origin.from);
+            self.deliver_latched(topic, origin.from);
         }
         Ok(())
     }
@@ -157,7 +163,9 @@ impl Registry {
         if left.is_empty() {
             self.drop_subscriber(&name, origin.from);
         } else {
-            self.topics.configure(&name, origin.from, &left);
+            let absolute = names::absolute(topic);
+            self.topics
+                .set_encoding(&absolute, topic, origin.from, &left);
             subscriptions.insert(name, left);
         }
     }

@@ -1,9 +1,9 @@
-//! The registry's table of topics and their subscribers.
+//! The registry's table of topics: who advertises and who subscribes to each, and its type.
 //!
-//! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
+//! **Invariant:** a topic is here exactly as long as a client uses it. A connection stands at most once under each
+//! spelling of a topic, however often it subscribed.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,8 +12,9 @@ use actix::prelude::*;
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Throttle};
-use crate::protocol::names;
+use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::op::Encoding;
+use crate::protocol::ros::rosapi::ListedTopic;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
 #[derive(Debug)]
@@ -26,14 +27,6 @@ pub(crate) struct Subscription {
     pub(crate) entry: KeptEntry,
 }
 
-/// A connection under a topic.
-pub(crate) struct Subscriber {
-    pub(crate) connection: ConnectionId,
-    pub(crate) outlet: Recipient<Deliver>,
-    /// The encoding that its subscriptions come to.
-    pub(crate) encoding: Encoding,
-}
-
 /// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
 pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
     let queue_lengths = || subscriptions.iter().map(|one| one.queue_length);
@@ -44,76 +37,148 @@ pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
     })
 }
 
-/// The encoding that a connection's subscriptions to one topic come to.
-fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
-    let all = subscriptions.iter().map(|one| one.encoding);
-    all.reduce(Encoding::merged).unwrap_or_default()
-}
-
-/// Every topic that somebody subscribes to, by the spelling that the subscriber used.
+/// The topics, by their absolute names.
 #[derive(Default)]
 pub(crate) struct Topics {
-    subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
+    by_name: BTreeMap<Arc<str>, TopicUsers>,
+}
+
+/// Clients that use a topic.
+#[derive(Default)]
+struct TopicUsers {
+    publishers: usize,
+    subscribers: Vec<Subscriber>,
+    /// The first type that was named.
+    type_name: Option<Arc<str>>,
+    /// The first type that was named and is known: messages are encoded by it.
+    known: Option<Type>,
+}
+
+/// A connection under a topic.
+pub(crate) struct Subscriber {
+    pub(crate) connection: ConnectionId,
+    /// The topic as it spells it: its messages come under that name.
+    pub(crate) spelling: Arc<str>,
+    pub(crate) outlet: Recipient<Deliver>,
+    /// The encoding that its subscriptions come to.
+    pub(crate) encoding: Encoding,
 }
 
 impl Topics {
-    /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this
-    /// subscriber.
-    pub(crate) fn add(
-        &mut self,
-        topic: &str,
-        connection: ConnectionId,
-        outlet: Recipient<Deliver>,
-    ) -> (Arc<str>, bool) {
-        let name = self
-            .subscribers
-            .get_key_value(topic)
-            .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
-        let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
-        let new = !subscribers.iter().any(|one| one.connection == connection);
-        if new {
-            subscribers.push(Subscriber {
-                connection,
-                outlet,
-                encoding: Encoding::default(),
-            });
-        }
-        (name, new)
+    /// A client has begun to advertise a topic.
+    pub(crate) fn add_publisher(&mut self, topic: &str) {
+        self.by_name.entry(topic.into()).or_default().publishers += 1;
     }
 
-    /// Sets how a subscriber's messages are written, by what its subscriptions come to.
-    pub(crate) fn configure(
-        &mut self,
-        topic: &Arc<str>,
-        connection: ConnectionId,
-        subscriptions: &[Subscription],
-    ) {
-        let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
-        for subscriber in subscribers.filter(|one| one.connection == connection) {
-            subscriber.encoding = encoding_of(subscriptions);
-        }
+    /// A client has begun to subscribe to a topic under a spelling.
+    pub(crate) fn add_subscriber(&mut self, topic: &str, subscriber: Subscriber) {
+        let users = self.by_name.entry(topic.into()).or_default();
+        users.subscribers.push(subscriber);
     }
 
-    /// Removes a subscriber.
-    pub(crate) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
-        let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
+    /// A client that uses a topic has named its type; true if that stays with the topic.
+    pub(crate) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            return false;
+        };
+        if users.known.is_none() {
+            users.known = types::find(type_name);
+        }
+        let is_first = users.type_name.is_none();
+        users.type_name.get_or_insert_with(|| type_name.into());
+        is_first
+    }
+
+    /// A client does not advertise a topic any more.
+    pub(crate) fn remove_publisher(&mut self, topic: &str) {
+        self.remove(topic, |users| {
+            users.publishers = users.publishers.saturating_sub(1)
+        });
+    }
+
+    /// A client does not subscribe to a topic under that spelling any more.
+    pub(crate) fn remove_subscriber(&mut self, topic: &str, spelling: &str, client: ConnectionId) {
+        self.remove(topic, |users| {
+            users
+                .subscribers
+                .retain(|one| one.connection != client || *one.spelling != *spelling);
+        });
+    }
+
+    fn remove(&mut self, topic: &str, change: impl FnOnce(&mut TopicUsers)) {
+        let Some(users) = self.by_name.get_mut(topic) else {
+            debug_assert!(false, "{topic} was not counted");
             return;
         };
-        entry.get_mut().retain(|one| one.connection != connection);
-        if entry.get().is_empty() {
-            entry.remove();
+        change(users);
+        if users.publishers == 0 && users.subscribers.is_empty() {
+            self.by_name.remove(topic);
         }
     }
 
-    /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
-    pub(crate) fn has_subscribers(&self, topic: &str) -> bool {
-        names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
+    /// The subscribers to a topic, under all its spellings.
+    pub(crate) fn subscribers(&self, topic: &str) -> &[Subscriber] {
+        let users = self.by_name.get(topic);
+        users.map_or(&[], |users| &users.subscribers)
     }
 
-    /// A spelling, shared, and those who subscribed with it, if there are any.
-    pub(crate) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
-        self.subscribers
-            .get_key_value(topic)
-            .map(|(name, list)| (name, list.as_slice()))
+    /// Sets how the messages of a topic are written for a client that subscribes to it under that spelling, by what its
+    /// subscriptions come to.
+    pub(crate) fn set_encoding(
+        &mut self,
+        topic: &str,
+        spelling: &str,
+        client: ConnectionId,
+        subscriptions: &[Subscription],
+    ) {
+        let all = subscriptions.iter().map(|one| one.encoding);
+        let encoding = all.reduce(Encoding::merged).unwrap_or_default();
+        let users = self.by_name.get_mut(topic).into_iter();
+        for subscriber in users.flat_map(|users| &mut users.subscribers) {
+            if subscriber.connection == client && *subscriber.spelling == *spelling {
+                subscriber.encoding = encoding;
+            }
+        }
+    }
+
+    /// The type of a topic that clients use, if one has named it and it is known.
+    pub(crate) fn known_type(&self, topic: &str) -> Option<Type> {
+        self.by_name.get(topic)?.known
+    }
+
+    /// The topics as rosapi lists them.
+    pub(crate) fn listed(&self) -> impl ExactSizeIterator<Item = ListedTopic> {
+        self.by_name.iter().map(|(name, users)| ListedTopic {
+            name: Arc::clone(name),
+            type_name: users.type_name.clone(),
+            published: users.publishers > 0,
+            subscribed: !users.subscribers.is_empty(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_type_stays_with_a_topic_and_a_topic_with_its_last_user() {
+        let mut topics = Topics::default();
+        topics.add_publisher("/t");
+        topics.add_publisher("/t");
+        assert!(topics.note_type("/t", "a/b") && !topics.note_type("/t", "c/d"));
+        for _ in 0..2 {
+            let listed: Vec<ListedTopic> = topics.listed().collect();
+            let one = ListedTopic {
+                name: "/t".into(),
+                type_name: Some("a/b".into()),
+                published: true,
+                subscribed: false,
+            };
+            assert_eq!(listed, [one]);
+            topics.remove_publisher("/t");
+        }
+        assert_eq!(topics.listed().len(), 0);
+        assert!(!topics.note_type("/t", "a/b"));
     }
 }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams, SetPeriod};
 use crate::actors::node::Ask;
-use crate::actors::wire::{Address, Answered, Callable, Streamed};
+use crate::actors::wire::{Address, Answered, Callable, ResponseWriter, Streamed};
 use crate::protocol::catalog::{self, Service};
 use crate::protocol::messages::Stamp;
 use crate::protocol::op::Arguments;
@@ -207,14 +207,9 @@ impl Callable for Look {
 }
 
 impl Streamed for Look {
-    type Writer = Option<Bytes>;
-
-    fn begin(Listing { look, census }: Listing, to: &Address) -> Self::Writer {
-        Some(to.outcome(rosapi::answer(look.question, &look.name, &census)))
-    }
-
-    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
-        writer.take()
+    fn begin(Listing { look, census }: Listing, to: &Address) -> Box<dyn ResponseWriter> {
+        let answer = rosapi::answer(look.question, &look.name, &census);
+        Box::new(Some(to.outcome(answer)))
     }
 }
 

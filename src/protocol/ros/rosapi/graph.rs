@@ -15,16 +15,16 @@ use crate::protocol::names;
 /// Topics, and services, of clients in one answer: more than any screen shows. The first by name are listed.
 pub const MAX_LISTED: usize = 4096;
 
-/// The topics, services and actions that clients have registered; at most [`MAX_LISTED`] of each. Entries are shared by
-/// those who hold a census: one of thousands is made in a third of a millisecond.
+/// The topics, services and actions that clients have registered; at most [`MAX_LISTED`] of each. Names are shared
+/// with the registry.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Census {
     /// Topics that clients advertise or subscribe to, the runtime's own included, by absolute name.
-    pub topics: Vec<Arc<ListedTopic>>,
+    pub topics: Vec<ListedTopic>,
     /// Services that clients provide, by absolute name.
-    pub services: Vec<Arc<ListedService>>,
+    pub services: Vec<ListedService>,
     /// Actions that clients serve, by absolute name.
-    pub actions: Vec<Arc<ListedService>>,
+    pub actions: Vec<ListedService>,
 }
 
 impl Census {
@@ -72,14 +72,14 @@ pub(super) struct Graph<'a> {
 impl Graph<'_> {
     /// Topics of clients alone.
     fn foreign(&self) -> impl Iterator<Item = &ListedTopic> {
-        let topics = self.census.topics.iter().map(Arc::as_ref);
+        let topics = self.census.topics.iter();
         topics.filter(|topic| Topic::from_name(&topic.name).is_none())
     }
 
     /// The topic as clients use it, if they do.
     fn listed(&self, name: &str) -> Option<&ListedTopic> {
         let name = names::absolute(name);
-        let mut topics = self.census.topics.iter().map(Arc::as_ref);
+        let mut topics = self.census.topics.iter();
         topics.find(|topic| *topic.name == *name)
     }
 
@@ -153,7 +153,7 @@ impl Graph<'_> {
 
     /// Services of that type that clients provide.
     fn foreign_services_of(&self, type_name: &str) -> impl Iterator<Item = &ListedService> {
-        let services = self.census.services.iter().map(Arc::as_ref);
+        let services = self.census.services.iter();
         services.filter(move |service| {
             let own = service.type_name.as_deref();
             own.is_some_and(|own| names::same_type(own, type_name))

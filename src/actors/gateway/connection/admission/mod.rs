@@ -4,11 +4,10 @@
 //! however silent, keep nobody out who has shown it.
 
 pub(super) mod authentication;
-mod failed_attempts;
 pub(super) mod slots;
 
-use self::failed_attempts::FailedAttempts;
-pub use self::failed_attempts::{ATTEMPT_INTERVAL, FREE_ATTEMPTS, MAX_ADDRESSES};
+use std::time::Duration;
+
 use self::slots::Slots;
 use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
@@ -19,6 +18,10 @@ pub const MAX_AUTH_BYTES: usize = 16 * 1024;
 /// Connections that have not shown the token yet. They are counted apart from the clients, and the oldest is closed
 /// for the next. A client that shows the token at once is never the oldest of them.
 pub const MAX_UNAUTHENTICATED: usize = 128;
+
+/// How long the answer to a wrong token takes. No more of them are answered in that time than there may be clients that
+/// have not shown the token. The [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
+pub const WRONG_TOKEN_TIME: Duration = Duration::from_millis(500);
 
 /// Clients that wait for a kept place, where no other place is free. The oldest is refused when there are more.
 pub const MAX_WAITING: usize = 128;
@@ -35,12 +38,11 @@ pub struct Admission {
     pub newcomers: Newcomers,
 }
 
-/// The clients that are not admitted yet, and the addresses whose tokens were wrong.
+/// The clients that are not admitted yet.
 #[derive(Debug)]
 pub struct Newcomers {
     /// Slots of clients that have to show the token and have not.
     pub(super) unauthenticated: Slots,
-    pub(super) failed_attempts: FailedAttempts,
     /// Slots of clients that may have a kept place, while they have not shown it or none is free.
     pub(super) waiting: Slots,
 }
@@ -51,7 +53,6 @@ impl Newcomers {
     pub fn of(unauthenticated: usize) -> Self {
         Self {
             unauthenticated: Slots::new(unauthenticated),
-            failed_attempts: FailedAttempts::default(),
             waiting: Slots::new(MAX_WAITING),
         }
     }
