@@ -24,7 +24,9 @@
 )]
 
 pub use super::critical::{BEYOND, Critical};
-pub use super::limits::{ADVISED_PART, LimitSearch, Limits, Rest, limit_held, limits};
+pub use super::limits::{
+    ADVISED_PART, Limits, Rest, limit_held, limits, most_bytes, search_limits,
+};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
 use super::slow_modes;

@@ -8,7 +8,7 @@ use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::growth::growth_per_period;
-use pendularm::report::experiments::measure::{growth, growths, measured_limit};
+use pendularm::report::experiments::measure::measured_limit;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
@@ -363,30 +363,6 @@ fn no_parameters_make_a_limit_that_is_no_number() {
                     assert!(limit.is_none_or(|limit| limit >= 0.0), "{limits:?}");
                 }
             }
-        }
-    }
-}
-
-/// Cells that grow, die out, escape at once and hardly change, so that most arms end before the last.
-#[test]
-fn a_map_measures_what_each_of_its_cells_measures_alone() {
-    for sampling in Sampling::ALL {
-        for method in Method::ALL {
-            let cells: Vec<_> = (0..40)
-                .map(|cell| {
-                    let gains = Gains {
-                        kp: [1000.0 * f64::from(1 + cell % 7), 250.0],
-                        ..Gains::<2>::default()
-                    };
-                    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
-                        .with_method(method)
-                        .with_timestep(2e-4 * 1.15_f64.powi(cell))
-                })
-                .collect();
-            let alone: Vec<_> = cells.iter().map(|cell| growth(cell, sampling)).collect();
-            assert_eq!(growths(&cells, sampling), alone, "{method}");
-            let escaped = alone.iter().filter(|growth| growth.is_none()).count();
-            assert!((1..40).contains(&escaped), "{method}: {escaped} escaped");
         }
     }
 }

@@ -52,7 +52,7 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for Repeated<N> {
         self.took += ran.took;
         self.runs += 1;
         let mut first = self.first.take().unwrap_or(ran);
-        let evaluations = u64::from(self.runs).saturating_mul(first.run.evaluations());
+        let evaluations = u64::from(self.runs).saturating_mul(first.run.evaluations);
         if self.took >= LEAST_MEASURED || evaluations >= MOST_EVALUATIONS {
             first.took = self.took / self.runs;
             return Some(Ok(first));
