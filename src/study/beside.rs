@@ -20,24 +20,11 @@ pub(crate) trait Steppable<const N: usize>: Send {
     /// Takes a step. Returns its cost in evaluations of the dynamics; none if the run has diverged.
     fn step(&mut self) -> Option<u64>;
     fn state(&self) -> &State<N>;
-
-    /// Takes up to `steps` steps, and ends where the run diverges.
-    fn advance(&mut self, steps: u64) {
-        for _ in 0..steps {
-            if self.step().is_none() {
-                return;
-            }
-        }
-    }
 }
 
 impl<const N: usize> Steppable<N> for Simulation<N> {
     fn step(&mut self) -> Option<u64> {
         Simulation::step(self).then(|| self.method().evaluations().into())
-    }
-
-    fn advance(&mut self, steps: u64) {
-        Simulation::advance(self, steps);
     }
 
     fn state(&self) -> &State<N> {
@@ -105,4 +92,34 @@ pub(super) async fn largest_distance<const N: usize>(
         piece.spend(work).await;
     }
     largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::paused::at_once;
+
+    /// A run that has diverged.
+    struct Diverged(State<2>);
+
+    impl Steppable<2> for Diverged {
+        fn step(&mut self) -> Option<u64> {
+            None
+        }
+
+        fn state(&self) -> &State<2> {
+            &self.0
+        }
+    }
+
+    #[test]
+    fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
+        let arm = Arm::default();
+        let run = || Box::new(Diverged(State::rest()));
+        let truth = || Box::new(Simulation::new(arm, crate::study::linear::no_control()));
+        let off = largest_distance(&arm, (run(), 1_000_000), (truth(), 1), f64::INFINITY);
+        assert!(at_once(off).is_infinite());
+        let off = largest_distance(&arm, (truth(), 1_000_000), (run(), 1), f64::INFINITY);
+        assert!(at_once(off).is_infinite());
+    }
 }

@@ -30,8 +30,8 @@ impl<F: FnMut(u64) -> bool> StepTrial for F {
     }
 }
 
-/// The fewest steps between `first` and `most`, both included, whose run is good enough. The search ends bisection once two
-/// numbers are as near as one `part`th of the larger one: 64 means to a 64th, `u64::MAX` to the last step.
+/// The fewest steps between `first` and `most`, both included, whose run is good enough. Bisection ends once two
+/// numbers are as near as a part of the larger one: 64 means to a 64th, `u64::MAX` to the last step.
 pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial) -> Option<u64> {
     let first = first.max(1);
     if first > most {

@@ -69,7 +69,7 @@ const ABOVE_GRAVITY: f64 = 2.0;
 /// How long the default arms take to settle with the default gains, with some reserve \[s\].
 const DEFAULT_SETTLING: f64 = 3.0;
 
-/// Steps of a move between two returns to the caller.
+/// Steps of a move in a piece.
 const STEPS_PER_PIECE: u64 = 1000;
 
 /// The demands on gains.

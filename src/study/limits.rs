@@ -139,13 +139,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let here = PoseCandidate::as_it_is(equilibrium);
     let (mut least, mut worst) = (held, here);
     let (mut bound, mut runaway) = (None, None);
-    if let Some(mut proof) = Proof::new(&control) {
-        let Proven { timestep, pose } = loop {
-            if let Some(proven) = proof.advance(BOXES) {
-                break proven;
-            }
-            pause().await;
-        };
+    if let Some(Proven { timestep, pose }) = prove(&control).await {
         bound = Some(timestep);
         // The pose where the bound comes nearest to fail.
         let nearest = PoseCandidate::as_it_is(pose);
@@ -173,6 +167,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         (least, worst) = smallest_of_all_poses(control, sought, (least, worst)).await;
         agrees = is_near(bound, least);
     }
+    let useful = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
+    let has_no_estimate = method == Method::Euler || control.arm.gravity() == 0.0;
     let mut limits = Limits {
         equilibrium,
         rest: if runs_away { Rest::Unstable } else { kind },
@@ -180,8 +176,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         continuous,
         minimum_held: least,
         minimum_continuous: Some(0.0),
-        bound: bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least)),
-        bound_is_proven: false,
+        bound: useful,
+        bound_is_proven: useful.is_some() && has_no_estimate,
         certified: agrees,
         worst_pose: None,
         critical: None,
@@ -194,8 +190,6 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         limits.critical = critical(&pose.linear(&control), method, 0.0);
         return limits;
     }
-    let has_no_estimate = method == Method::Euler || control.arm.gravity() == 0.0;
-    limits.bound_is_proven = limits.bound.is_some() && has_no_estimate;
     limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
     if let Some(limit) = least {
         limits.worst_pose = Some(worst.pose);
@@ -206,6 +200,17 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let found = smallest_of_all_poses(control, sought, (continuous, here)).await;
     limits.minimum_continuous = found.0;
     limits
+}
+
+/// The bound for all poses, if there is something to prove it with.
+async fn prove<const N: usize>(control: &ControlLoop<N>) -> Option<Proven<N>> {
+    let mut proof = Proof::new(control)?;
+    loop {
+        if let Some(proven) = proof.advance(BOXES) {
+            return Some(proven);
+        }
+        pause().await;
+    }
 }
 
 /// The pose in which the loop rests, how it does so, and the loop there.
@@ -225,8 +230,8 @@ fn settle<const N: usize>(control: &ControlLoop<N>) -> ([f64; N], Rest, Linear) 
     (rest.position, kind, linear)
 }
 
-/// Whether there are a bound and a smallest limit, and they agree. The limit may fall short of the bound a little, since
-/// growth counts only from some size on.
+/// Whether there are a bound and a smallest limit, and they agree. The limit may fall short of the bound a little,
+/// since growth counts only from some size on.
 fn is_near(bound: Option<f64>, least: Option<f64>) -> bool {
     let both = bound.zip(least);
     both.is_some_and(|(bound, least)| (least / bound - 1.0).abs() <= AGREEMENT)

@@ -26,6 +26,7 @@ use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::fewest::{StepTrial, fewest};
 use super::limits;
+use super::paused::pause;
 use super::taylor::{ROUNDING, TaylorReference};
 use crate::math::arm::State;
 use crate::math::count::{self, in_f64};
@@ -174,6 +175,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     let mut candidates: Vec<Candidate> = Vec::new();
     let (mut longest_stable, mut has_run) = (0.0_f64, false);
     for method in Method::ALL.into_iter().rev() {
+        pause().await;
         let control = control.with_method(method);
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);

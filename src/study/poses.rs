@@ -84,8 +84,8 @@ pub(super) enum Sought {
     Runaway,
 }
 
-/// The smallest of a bound \[s\], which is the limit at a known pose, and the limits of all poses, with its pose; `None`
-/// if nothing limits. A pose that runs away has a limit of zero. There is a pause after every pose.
+/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if nothing limits. A pose that runs
+/// away has a limit of zero. There is a pause after every pose.
 pub(super) async fn smallest_of_all_poses<const N: usize>(
     control: ControlLoop<N>,
     sought: Sought,

@@ -12,8 +12,7 @@ use pendularm::report::experiments::measure::measured_limit;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
-    Rest, Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix,
-    step_matrix,
+    Rest, Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 use serde::Deserialize;
 
@@ -420,10 +419,11 @@ fn a_deviation_grows_per_control_period_as_the_spectral_radius_says() {
             ControlLoop::new(Arm::default(), Gains::<2>::default(), setpoint).with_method(method);
         let linear = Linear::at_setpoint(&control);
         for substeps in [1, 10] {
-            let limit = largest_period(&linear, method, substeps).unwrap();
+            let stepping = Stepping::held(&linear, method, substeps, false);
+            let limit = stepping.limit().unwrap();
             for part in [0.3, 0.9, 1.01, 1.05] {
                 let period = part * limit;
-                let predicted = period_matrix(&linear, method, substeps, period).spectral_radius();
+                let predicted = stepping.matrix(period).spectral_radius();
                 let measured = growth_per_period(&control.with_timestep(period), substeps).unwrap();
                 // The ratio shows in the swing that is left over 4000 periods.
                 assert!(

@@ -84,7 +84,7 @@ impl<const N: usize> Handler<Call<RunOffline<N>>> for Study<N> {
 
     fn handle(&mut self, call: Call<RunOffline<N>>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| RolloutWork::new(ask, present));
+        self.begin(reply, ctx, move |present| RolloutWork::new(&ask, present));
     }
 }
 

@@ -311,8 +311,19 @@ impl<const N: usize> SceneRun for ArmRun<N> {
     }
 
     fn replay(&self, method: Method, steps: u64) -> f64 {
-        let mut run = self.ready(method, ARM_DURATION / in_f64(steps));
-        run.advance(steps);
+        let timestep = ARM_DURATION / in_f64(steps);
+        if self.drive == Actuation::Held {
+            let control = self.control.with_method(method).with_timestep(timestep);
+            let mut live = control.simulation(self.start);
+            live.advance(steps);
+            return live.state().position.iter().sum();
+        }
+        let mut run = self.ready(method, timestep);
+        for _ in 0..steps {
+            if run.step().is_none() {
+                break;
+            }
+        }
         run.state().position.iter().sum()
     }
 

@@ -87,7 +87,8 @@ pub(super) fn make(section: &mut Section) {
 }
 
 /// A panel for each method, for which `measure` has two functions of the kind's value: the predicted limit \[s\], and
-/// whether a timestep holds. Returns how many cells lie within the advised part of the limit, and how many of them fail.
+/// whether a timestep holds. Returns how many cells lie within the advised part of the limit, and how many of them
+/// fail.
 fn map<P: Fn(f64) -> f64, H: Fn(f64, f64) -> bool>(
     kind: &Kind,
     columns: usize,

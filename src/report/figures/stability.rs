@@ -18,7 +18,7 @@ use crate::report::svg::{
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{
-    Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix, step_matrix,
+    Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 
 pub(super) fn make(section: &mut Section) {
@@ -443,7 +443,8 @@ impl Growth {
             .push(Mark::Horizontal(1.0, "ink", "unstable above"));
         for (turn, (substeps, label, class, marker)) in (0..).zip(SUBSTEPS) {
             let predicted = |substeps, period| {
-                period_matrix(&linear, method, substeps, period).spectral_radius()
+                let stepping = Stepping::held(&linear, method, substeps, false);
+                stepping.matrix(period).spectral_radius()
             };
             let curve = (0..=200).map(|index| along(index, 200));
             let curve = curve.map(|period| (period, predicted(substeps, period)));
@@ -455,7 +456,7 @@ impl Growth {
             ));
             // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
             let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
-            let limit = largest_period(&linear, method, substeps);
+            let limit = Stepping::held(&linear, method, substeps, false).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
             let steep =
                 around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * f64::from(turn)));

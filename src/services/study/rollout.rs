@@ -24,7 +24,9 @@ use crate::services::{Address, Ask, Callable, Streamed};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
 use crate::study::paused::Paused;
-use crate::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, rollout};
+use crate::study::rollout::{
+    MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout,
+};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -240,7 +242,7 @@ pub struct RolloutWork<const N: usize> {
 impl<const N: usize> RolloutWork<N> {
     /// The work that `ask` asks for, of an arm that is `present` so.
     #[must_use]
-    pub fn new(ask: RunOffline<N>, present: Present<N>) -> Self {
+    pub fn new(ask: &RunOffline<N>, present: Present<N>) -> Self {
         let samples = usize::try_from(ask.samples.unwrap_or(DEFAULT_SAMPLES));
         let is_compared = ask.reference.unwrap_or(false);
         let run = |reference: bool| {
@@ -253,7 +255,8 @@ impl<const N: usize> RolloutWork<N> {
         Self {
             most_bytes: samples
                 .unwrap_or(usize::MAX)
-                .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES),
+                .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES)
+                .saturating_add(most_bytes::<N>()),
             alone: Some(run(false)),
             took: Duration::ZERO,
             compared: is_compared.then(|| run(true)),

@@ -102,6 +102,12 @@ pub struct Rollout<const N: usize> {
     pub divergence: Option<Divergence>,
 }
 
+/// The most memory that [`rollout`] takes beside its samples, in bytes.
+#[must_use]
+pub const fn most_bytes<const N: usize>() -> usize {
+    size_of::<[Reference<N>; REFERENCES]>() + size_of::<[Ideal<N>; 2]>()
+}
+
 /// Makes a run, in pieces; its start is its first sample.
 ///
 /// # Errors
@@ -114,9 +120,11 @@ pub async fn rollout<const N: usize>(
     let samples = request.samples.min(steps + 1);
     let intervals = samples.saturating_sub(1).max(1);
     let mut run = control.simulation(start);
-    let mut references = request
+    // On the heap, so that a run that has not begun takes no room for them.
+    let references = |index| Reference::new(&control, start, index);
+    let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
         .reference
-        .then(|| std::array::from_fn(|index| Reference::new(&control, start, index)));
+        .then(|| Box::new(std::array::from_fn(references)));
     let mut ideals = (request.reference && !control.is_free())
         .then(|| [1, 2].map(|cuts| Ideal::new(&control, start, cuts)));
     let mut made = Rollout {
@@ -133,7 +141,7 @@ pub async fn rollout<const N: usize>(
             let ahead = due - run.steps();
             let taken = run.advance(ahead.min(stride(&request)));
             piece.spend(taken * evaluations).await;
-            for reference in references.iter_mut().flatten() {
+            for reference in references.as_deref_mut().into_iter().flatten() {
                 reference.follow(taken, &mut piece).await;
             }
             for ideal in ideals.iter_mut().flatten() {
@@ -143,7 +151,7 @@ pub async fn rollout<const N: usize>(
         if run.divergence().is_some() {
             break;
         }
-        made.sample(&run, references.as_ref(), ideals.as_ref());
+        made.sample(&run, references.as_deref(), ideals.as_ref());
     }
     made.steps = run.steps();
     made.evaluations = run.steps() * evaluations;

@@ -24,14 +24,13 @@ pub(super) struct Repeated<const N: usize> {
 
 impl<const N: usize> Repeated<N> {
     pub(super) fn new(ask: RunOffline<N>, present: Present<N>) -> Self {
-        let alone = RunOffline {
-            reference: None,
-            ..ask.clone()
-        };
         Self {
-            alone,
+            work: RolloutWork::new(&ask, present),
+            alone: RunOffline {
+                reference: None,
+                ..ask
+            },
             present,
-            work: RolloutWork::new(ask, present),
             first: None,
             took: Duration::ZERO,
             runs: 0,
@@ -58,7 +57,7 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for Repeated<N> {
             return Some(Ok(first));
         }
         self.first = Some(first);
-        self.work = RolloutWork::new(self.alone.clone(), self.present);
+        self.work = RolloutWork::new(&self.alone, self.present);
         None
     }
 }

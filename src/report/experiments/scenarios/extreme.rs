@@ -10,7 +10,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{Check, Observation, apart, arm, each, fastest, free, held, is_near, verdict};
+use super::support::{Named, Observation, apart, arm, each, fastest, free, held, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -24,17 +24,19 @@ use crate::study::paused::at_once;
 use crate::study::rollout::{Rollout, RolloutRequest, rollout};
 use crate::study::stability::{Sampling, largest_timestep};
 
-/// The checks of S27 to S35, in order.
-pub(super) const CHECKS: [Check; 9] = [
-    gravity,
-    tiny_steps,
-    huge_steps,
-    wound,
-    huge_setpoints,
-    subnormal_start,
-    subnormal_inertia,
-    refused,
-    || refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be"),
+/// The checks of S27 to S35.
+pub(super) const CHECKS: [Named; 9] = [
+    ("S27", gravity),
+    ("S28", tiny_steps),
+    ("S29", huge_steps),
+    ("S30", wound),
+    ("S31", huge_setpoints),
+    ("S32", subnormal_start),
+    ("S33", subnormal_inertia),
+    ("S34", refused),
+    ("S35", || {
+        refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be")
+    }),
 ];
 
 /// The largest error of a free swing against the study's reference, and the run \[rad\].
