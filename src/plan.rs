@@ -10,7 +10,8 @@ use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::shown::Shown;
 use crate::study::control_loop::ControlLoop;
-use crate::study::planner::{MAX_DURATION, PlanError, Planned, Planning, Task};
+use crate::study::paused::at_once;
+use crate::study::planner::{self, MAX_DURATION, PlanError, Planned, Task};
 use crate::value::{Links, ValueReader, needed, read_links};
 
 /// How long a move under control is watched \[s\]: with the default gains it has settled.
@@ -91,12 +92,7 @@ fn plan<const N: usize>(options: &PlanOptions, gains: Gains<N>) -> Result<String
         duration,
         error: options.error,
     };
-    let mut planning = Planning::new(task)?;
-    loop {
-        if let Some(planned) = planning.advance() {
-            return planned.map(|planned| text(&task, &planned));
-        }
-    }
+    at_once(planner::plan(task)).map(|planned| text(&task, &planned))
 }
 
 fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {

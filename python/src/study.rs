@@ -10,11 +10,12 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::clocks::{ClockLimits, clock_limits};
 use pendularm::study::control_loop::{ControlLoop, no_control};
-use pendularm::study::gains::{GainsRequirements, GainsSearch};
+use pendularm::study::gains::{GainsRequirements, search_gains};
 use pendularm::study::motion::{FREE_SECONDS, Motion};
-use pendularm::study::planner::{Planned, Planning, Task};
-use pendularm::study::rollout::{Rollout, RolloutRequest};
-use pendularm::study::stability::{LimitSearch, Limits};
+use pendularm::study::paused::Paused;
+use pendularm::study::planner::{self, Planned, Task};
+use pendularm::study::rollout::{Rollout, RolloutRequest, rollout as rollout_of};
+use pendularm::study::stability::{Limits, search_limits};
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
@@ -23,9 +24,6 @@ use crate::arrays::{joints_or, room};
 use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
 use crate::gains;
 use crate::patience::until_done;
-
-/// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
-const EVALUATIONS_PER_LOOK: u64 = 2000;
 
 // ---- stability ------------------------------------------------------------------------------------------------------
 
@@ -60,7 +58,7 @@ pub(crate) fn stability<'py>(
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method).with_period(period);
         let start = read_state(("q", q.as_ref()), ("qd", qd.as_ref()))?;
         let motion = Motion::ahead(&control, &start);
-        let mut search = LimitSearch::new(&control);
+        let mut search = Paused::new(search_limits(control));
         let limits = until_done(py, || search.advance())?;
         listed_limits(py, &limits, clock_limits(&control), motion, control.is_free())
     })
@@ -174,29 +172,26 @@ pub(crate) fn rollout<'py>(
 
 /// Makes the run by itself, which is timed, and again beside its reference, if one is wanted.
 fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<Held<'_, PyDict>> {
-    let mut alone = Rollout::new(RolloutRequest {
-        reference: false,
-        ..request
-    })
-    .map_err(refused)?;
+    let steps = request.steps().map_err(refused)?;
     // More than two runs and the answer take, since a run's own vectors abort where there is no memory.
-    let samples = usize::try_from(request.samples.min(alone.steps() + 1)).unwrap_or(usize::MAX);
+    let samples = usize::try_from(request.samples.min(steps + 1)).unwrap_or(usize::MAX);
     drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
-    until_done(py, || {
+    let mut alone = Paused::new(rollout_of(RolloutRequest {
+        reference: false,
+        ..request
+    }));
+    let mut made = until_done(py, || {
         let began = Instant::now();
-        let steps = alone.advance(EVALUATIONS_PER_LOOK);
+        let made = alone.advance();
         took += began.elapsed();
-        (steps == 0).then_some(())
+        made
     })?;
     if request.reference {
-        let mut compared = Rollout::new(request).map_err(refused)?;
-        until_done(py, || {
-            (compared.advance(EVALUATIONS_PER_LOOK) == 0).then_some(())
-        })?;
-        alone = compared;
+        let mut compared = Paused::new(rollout_of(request));
+        made = until_done(py, || compared.advance())?;
     }
-    listed_run(py, &alone, took)
+    listed_run(py, &made.map_err(refused)?, took)
 }
 
 fn listed_run<'py, const N: usize>(
@@ -210,16 +205,16 @@ fn listed_run<'py, const N: usize>(
             .into_pyarray(py)
             .reshape([rows.len(), N])
     };
-    let (error, uncertainty) = run.known(run.deviation());
-    let (sampling, sampling_uncertainty) = run.known(run.from_ideal());
-    let divergence = run.divergence().map(|found| (found.step, found.time));
+    let (error, uncertainty) = run.known(run.deviation.as_ref());
+    let (sampling, sampling_uncertainty) = run.known(run.from_ideal.as_ref());
+    let divergence = run.divergence.map(|found| (found.step, found.time));
     let found = PyDict::new(py);
-    found.set_item("times", run.times().to_pyarray(py))?;
-    found.set_item("positions", rows(run.positions())?)?;
-    found.set_item("velocities", rows(run.velocities())?)?;
-    found.set_item("efforts", rows(run.efforts())?)?;
-    found.set_item("energy", run.energy().to_pyarray(py))?;
-    found.set_item("evaluations", run.evaluations())?;
+    found.set_item("times", run.times.to_pyarray(py))?;
+    found.set_item("positions", rows(&run.positions)?)?;
+    found.set_item("velocities", rows(&run.velocities)?)?;
+    found.set_item("efforts", rows(&run.efforts)?)?;
+    found.set_item("energy", run.energy.to_pyarray(py))?;
+    found.set_item("evaluations", run.evaluations)?;
     found.set_item("wall_time", took.as_secs_f64())?;
     found.set_item("error", error)?;
     found.set_item("error_uncertainty", uncertainty)?;
@@ -261,7 +256,7 @@ pub(crate) fn suggest_gains<'py>(
     let timestep = fields::number("timestep", timestep, Bound::Positive)?;
     for_either!(Chain, or_default(arm)?, arm => {
         let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
-        let mut search = GainsSearch::new(&control, requirements).map_err(refused)?;
+        let mut search = Paused::new(search_gains(control, requirements));
         let found = until_done(py, || search.advance())?.map_err(refused)?;
         let listed = PyDict::new(py);
         listed.set_item("kp", found.gains.kp.to_pyarray(py))?;
@@ -306,12 +301,12 @@ pub(crate) fn plan<'py>(
     for_either!(Chain, or_default(arm)?, arm => {
         let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_period(period);
         let usual = if control.is_free() { 10.0 } else { 4.0 };
-        let mut planning = Planning::new(Task {
+        let mut planning = Paused::new(planner::plan(Task {
             control,
             start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
             duration: fields::number("duration", duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
             error,
-        }).map_err(refused)?;
+        }));
         let planned = until_done(py, || planning.advance())?.map_err(refused)?;
         listed_plan(py, &planned, (!control.is_free()).then_some(period.period))
     })

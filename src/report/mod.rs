@@ -48,12 +48,6 @@ pub struct ReportOptions {
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A name that is no section's.
-    #[error("--only: there is no section {name:?}; there are {}", names())]
-    UnknownSection {
-        /// The name.
-        name: String,
-    },
     /// A section that is kept, and whose file cannot be read.
     #[error("cannot read {}: {error}; --only with its name makes it anew", path.display())]
     Read {
@@ -86,13 +80,8 @@ pub fn names() -> String {
 /// Makes the report and answers the page's path.
 ///
 /// # Errors
-/// A section that does not exist, one that is kept and cannot be read, or a file that cannot be written.
+/// A section that is kept and cannot be read, or a file that cannot be written.
 pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
-    for name in &options.only {
-        if !SECTIONS.iter().any(|section| section.name == name) {
-            return Err(ReportError::UnknownSection { name: name.clone() });
-        }
-    }
     let machine = Machine::here();
     let kept = options.out.join("sections");
     fs::create_dir_all(&kept).map_err(|error| ReportError::Write {

@@ -3,187 +3,123 @@
 //! They are compared after every step of the first run. A comparison in even intervals would miss what happens in
 //! between: the first milliseconds of a stiff loop, or a whole turn of a fast link.
 //!
-//! **Invariant:** a comparison goes on by pieces, and a piece takes a millisecond at most (optimised build).
-
-use glam::DVec2;
+//! **Invariant:** a piece of a comparison takes a millisecond at most (optimised build).
 
 use super::continuous::ContinuousLoop;
+use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 
-/// Evaluations of the dynamics between two returns to the caller; a piece may exceed them by one step.
-const WORK_PER_PIECE: u64 = 2000;
-
 /// Most coefficients of a followed arm: some seconds of one core.
 const MAX_COEFFICIENTS: u64 = 40_000_000;
 
 /// A run that can be stepped and seen.
-pub(super) trait Steppable {
+pub(crate) trait Steppable<const N: usize>: Send {
     /// Takes a step. Returns its cost in evaluations of the dynamics; none if the run has diverged.
     fn step(&mut self) -> Option<u64>;
-    fn end_effector(&self) -> DVec2;
+    fn state(&self) -> &State<N>;
 }
 
-impl<const N: usize> Steppable for Simulation<N> {
+impl<const N: usize> Steppable<N> for Simulation<N> {
     fn step(&mut self) -> Option<u64> {
         Simulation::step(self).then(|| self.method().evaluations().into())
     }
 
-    fn end_effector(&self) -> DVec2 {
-        forward(self.arm().lengths(), &self.state().position).position
+    fn state(&self) -> &State<N> {
+        Simulation::state(self)
     }
 }
 
-/// The motion that others are compared with.
-#[derive(Debug, Clone)]
-pub(super) enum ReferenceRun<const N: usize> {
-    /// An arm under a law that acts at every instant.
-    Law(ContinuousLoop<N>),
-    /// An arm under a law that runs once a control period.
-    Sampled(Box<Simulation<N>>),
-    /// An arm left to itself.
-    Free(FreeMotion<N>),
+impl<const N: usize> Steppable<N> for ContinuousLoop<N> {
+    fn step(&mut self) -> Option<u64> {
+        ContinuousLoop::step(self).then(|| self.control.method.evaluations().into())
+    }
+
+    fn state(&self) -> &State<N> {
+        &self.state
+    }
 }
 
 /// An arm left to itself, followed within a tolerance.
-#[derive(Debug, Clone)]
 pub(super) struct FreeMotion<const N: usize> {
-    arm: Arm<N>,
-    taylor: TaylorReference<N>,
-    timestep: f64,
+    pub(super) arm: Arm<N>,
+    pub(super) taylor: TaylorReference<N>,
+    /// Length of a step \[s\].
+    pub(super) timestep: f64,
 }
 
-impl<const N: usize> FreeMotion<N> {
-    pub(super) fn new(arm: Arm<N>, start: State<N>, timestep: f64, tolerance: f64) -> Self {
-        Self {
-            arm,
-            taylor: TaylorReference::within(start, tolerance),
-            timestep,
-        }
-    }
-}
-
-impl<const N: usize> Steppable for ReferenceRun<N> {
+impl<const N: usize> Steppable<N> for FreeMotion<N> {
     fn step(&mut self) -> Option<u64> {
-        match self {
-            Self::Law(law) => law.step().then(|| law.control.method.evaluations().into()),
-            Self::Sampled(sampled) => Steppable::step(&mut **sampled),
-            Self::Free(free) => {
-                let before = free.taylor.coefficients();
-                let is_followed = free.taylor.follow(&free.arm, &[0.0; N], free.timestep);
-                let after = free.taylor.coefficients();
-                (is_followed && after <= MAX_COEFFICIENTS).then_some(after - before)
-            }
-        }
+        let before = self.taylor.coefficients();
+        let is_followed = self.taylor.follow(&self.arm, &[0.0; N], self.timestep);
+        let after = self.taylor.coefficients();
+        (is_followed && after <= MAX_COEFFICIENTS).then_some(after - before)
     }
 
-    fn end_effector(&self) -> DVec2 {
-        let (arm, state) = match self {
-            Self::Sampled(sampled) => (sampled.arm(), sampled.state()),
-            Self::Law(law) => (&law.control.arm, &law.state),
-            Self::Free(free) => (&free.arm, free.taylor.state()),
-        };
-        forward(arm.lengths(), &state.position).position
+    fn state(&self) -> &State<N> {
+        self.taylor.state()
     }
 }
 
-/// A run on its way beside the truth.
-#[derive(Debug, Clone)]
-pub(super) struct Beside<R, const N: usize> {
-    run: R,
-    truth: ReferenceRun<N>,
-    /// Steps of the truth in one of the run.
-    truth_steps: u64,
-    /// Steps of the run that are still to be taken.
-    left: u64,
-    /// How far the end effectors may come apart \[m\]; the comparison ends beyond that.
+/// The largest distance \[m\] of two end effectors after any of the run's `steps`, each as long as `truth_steps` of the
+/// truth. Infinite if one of them diverges; the comparison ends once they are further than `allowed` \[m\] apart.
+pub(super) async fn largest_distance<const N: usize>(
+    arm: &Arm<N>,
+    (mut run, steps): (Box<dyn Steppable<N>>, u64),
+    (mut truth, truth_steps): (Box<dyn Steppable<N>>, u64),
     allowed: f64,
-    apart: f64,
-}
-
-impl<R: Steppable, const N: usize> Beside<R, N> {
-    pub(super) fn new(
-        run: R,
-        steps: u64,
-        truth: ReferenceRun<N>,
-        truth_steps: u64,
-        allowed: f64,
-    ) -> Self {
-        Self {
-            run,
-            truth,
-            truth_steps,
-            left: steps,
-            allowed,
-            apart: 0.0,
+) -> f64 {
+    let mut step = || {
+        let mut work = run.step()?;
+        for _ in 0..truth_steps {
+            work += truth.step()?;
         }
-    }
-
-    /// Goes on by a piece. Returns the largest distance \[m\] once it is known, or known to be too large; infinite if a
-    /// run has diverged.
-    pub(super) fn advance(&mut self) -> Option<f64> {
-        let mut work = 0;
-        while self.left > 0 && self.apart <= self.allowed {
-            if work >= WORK_PER_PIECE {
-                return None;
-            }
-            let Some(more) = self.step() else {
-                // A run that has diverged costs nothing, so the loop would not end.
-                self.left = 0;
-                self.apart = f64::INFINITY;
-                break;
-            };
-            work += more;
-            self.left -= 1;
+        let [one, other] = [&run, &truth].map(|it| forward(arm.lengths(), &it.state().position));
+        let apart = one.position.distance(other.position);
+        Some((work, if apart.is_nan() { f64::INFINITY } else { apart }))
+    };
+    let (mut largest, mut piece) = (0.0, PieceWork::default());
+    for _ in 0..steps {
+        let Some((work, apart)) = step() else {
+            return f64::INFINITY;
+        };
+        largest = apart.max(largest);
+        if largest > allowed {
+            break;
         }
-        Some(self.apart)
+        piece.spend(work).await;
     }
-
-    fn step(&mut self) -> Option<u64> {
-        let mut work = self.run.step()?;
-        for _ in 0..self.truth_steps {
-            work += self.truth.step()?;
-        }
-        let apart = self.run.end_effector().distance(self.truth.end_effector());
-        self.apart = self
-            .apart
-            .max(if apart.is_nan() { f64::INFINITY } else { apart });
-        Some(work)
-    }
+    largest
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::paused::at_once;
 
-    /// A run that has diverged, and counts how often it is asked on.
-    struct Diverged<'a>(&'a std::cell::Cell<u64>);
+    /// A run that has diverged.
+    struct Diverged(State<2>);
 
-    impl Steppable for Diverged<'_> {
+    impl Steppable<2> for Diverged {
         fn step(&mut self) -> Option<u64> {
-            self.0.set(self.0.get() + 1);
             None
         }
 
-        fn end_effector(&self) -> DVec2 {
-            DVec2::NAN
+        fn state(&self) -> &State<2> {
+            &self.0
         }
     }
 
     #[test]
-    fn a_comparison_ends_with_its_numbers_however_far_apart_is_allowed() {
-        let asked = std::cell::Cell::new(0);
-        let arm = Arm::<2>::default();
-        let start = State {
-            position: [0.0; 2],
-            velocity: [0.0; 2],
-        };
-        let truth = ReferenceRun::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
-        let mut beside = Beside::new(Diverged(&asked), 1_000_000, truth, 1, f64::INFINITY);
-        assert_eq!(beside.advance(), Some(f64::INFINITY));
-        assert_eq!(beside.advance(), Some(f64::INFINITY));
-        assert_eq!(asked.get(), 1);
+    fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
+        let arm = Arm::default();
+        let run = || Box::new(Diverged(State::rest()));
+        let truth = || Box::new(Simulation::new(arm, crate::study::linear::no_control()));
+        let off = largest_distance(&arm, (run(), 1_000_000), (truth(), 1), f64::INFINITY);
+        assert!(at_once(off).is_infinite());
+        let off = largest_distance(&arm, (truth(), 1_000_000), (run(), 1), f64::INFINITY);
+        assert!(at_once(off).is_infinite());
     }
 }

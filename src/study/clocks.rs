@@ -9,7 +9,7 @@
 use super::control_loop::ControlLoop;
 use super::limits::limit_held;
 use super::linear::Linear;
-use super::stability::{Modes, Stepping};
+use super::stability::Stepping;
 use crate::math::integrator::Method;
 
 /// Steps of Runge-Kutta 4 in a control period for which the arm moves as it would move exactly. A period near its limit
@@ -32,15 +32,11 @@ pub struct ClockLimits {
 #[must_use]
 pub fn clock_limits<const N: usize>(control: &ControlLoop<N>) -> ClockLimits {
     let linear = Linear::at_setpoint(control);
-    let period = period_limit(&linear, control.period.delay);
+    let period = Stepping::held(&linear, Method::Rk4, EXACT, control.period.delay).limit();
     ClockLimits {
         period,
         timestep: timestep_limit(control, &linear, period),
     }
-}
-
-fn period_limit(linear: &Linear, delayed: bool) -> Option<f64> {
-    Stepping::held(linear, Method::Rk4, EXACT, delayed).search(&Modes::of(linear))
 }
 
 /// A period has a whole number of steps: the longest steps are those of the smallest number at which it is stable.
@@ -51,7 +47,7 @@ fn timestep_limit<const N: usize>(
 ) -> Option<f64> {
     let (method, delayed) = (control.method, control.period.delay);
     let every_step = if delayed {
-        Stepping::held(linear, method, 1, true).search(&Modes::of(linear))
+        Stepping::held(linear, method, 1, true).limit()
     } else {
         limit_held(control)
     };

@@ -12,6 +12,7 @@ use crate::math::arm::State;
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::increment;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::simulation::add_carried;
 
 /// An arm whose control law is evaluated in every stage, integral and all. The method steps `(q, s)`: the
 /// integral `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
@@ -23,9 +24,22 @@ pub struct ContinuousLoop<const N: usize> {
     pub state: State<N>,
     /// Integral of the position error \[rad s\].
     pub integral: [f64; N],
+    /// The rounding error of the state, carried into the next step as the live arm does it.
+    carry: State<N>,
 }
 
 impl<const N: usize> ContinuousLoop<N> {
+    /// The loop in `state`, with an `integral` \[rad s\].
+    #[must_use]
+    pub fn new(control: ControlLoop<N>, state: State<N>, integral: [f64; N]) -> Self {
+        Self {
+            control,
+            state,
+            integral,
+            carry: State::rest(),
+        }
+    }
+
     /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if integrals of more
     /// than three joints would have to be stepped.
     pub fn step(&mut self) -> bool {
@@ -103,10 +117,17 @@ impl<const N: usize> ContinuousLoop<N> {
     }
 
     fn take(&mut self, dq: &[f64; N], dv: &[f64; N], ds: &[f64; N]) -> bool {
-        let next = self.state.plus(&(*dq, *dv));
+        let (state, carry) = (&self.state, &self.carry);
+        let (position, position_carry) = add_carried(&state.position, &carry.position, dq);
+        let (velocity, velocity_carry) = add_carried(&state.velocity, &carry.velocity, dv);
+        let next = State { position, velocity };
         let finite = next.is_finite();
         if finite {
             self.state = next;
+            self.carry = State {
+                position: position_carry,
+                velocity: velocity_carry,
+            };
             self.integral = std::array::from_fn(|i| {
                 (self.integral[i] + ds[i]).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
             });

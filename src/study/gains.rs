@@ -18,8 +18,9 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::control_loop::ControlLoop;
+use super::limits;
 use super::matrix::largest;
-use super::stability::LimitSearch;
+use super::paused::pause;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
@@ -40,9 +41,11 @@ pub const MAX_STEPS: f64 = 1e6;
 /// How long a move is watched, in settling times: an arm that has settled must stay.
 const WATCHED: f64 = 1.5;
 
-/// Weights of the inertia that a joint feels while the others are free, beside that of all links beyond it: for springs
-/// and integrals, and for damping.
-const SHAPES: [(f64, f64); 6] = [
+/// Two weights: for springs and integrals, and for damping.
+type Shape = (f64, f64);
+
+/// Weights of the inertia that a joint feels while the others are free, beside that of all links beyond it.
+const SHAPES: [Shape; 6] = [
     (0.0, 0.0),
     (0.5, 0.5),
     (0.25, 0.5),
@@ -66,7 +69,7 @@ const ABOVE_GRAVITY: f64 = 2.0;
 /// How long the default arms take to settle with the default gains, with some reserve \[s\].
 const DEFAULT_SETTLING: f64 = 3.0;
 
-/// Steps of a move between two returns to the caller.
+/// Steps of a move in a piece.
 const STEPS_PER_PIECE: u64 = 1000;
 
 /// The demands on gains.
@@ -116,207 +119,116 @@ pub enum GainsError {
     },
 }
 
-/// A search for gains, to be paused: no piece takes longer than a millisecond or so of one core (optimised build).
-#[derive(Debug, Clone)]
-pub struct GainsSearch<const N: usize> {
-    /// Arm, method and timestep; its gains are those that are being tried.
-    control: ControlLoop<N>,
+/// The most memory that [`search_gains`] takes, in bytes.
+#[must_use]
+pub const fn most_bytes<const N: usize>() -> usize {
+    limits::most_bytes::<N>()
+}
+
+/// Looks for gains for the arm, method and timestep of `control`, in pieces; its gains and setpoint do not matter.
+///
+/// # Errors
+/// A settling time of too many steps, or demands that no gains meet.
+pub async fn search_gains<const N: usize>(
+    mut control: ControlLoop<N>,
     requirements: GainsRequirements,
-    shape: usize,
-    pace: f64,
-    paces: u32,
-    stage: GainsStage<N>,
-}
-
-#[derive(Debug, Clone)]
-enum GainsStage<const N: usize> {
-    Limiting(Box<LimitSearch<N>>),
-    Moving(Box<TestMove<N>>),
-    Done(Result<SuggestedGains<N>, GainsError>),
-}
-
-/// Gains that are stable with the margin, on their moves.
-#[derive(Debug, Clone)]
-struct TestMove<const N: usize> {
-    limit: Option<f64>,
-    certified: bool,
-    index: u32,
-    run: Simulation<N>,
-    /// When a joint was last seen off the setpoint \[s\], in this move and in all.
-    off_at: f64,
-    slowest: f64,
-}
-
-impl<const N: usize> GainsSearch<N> {
-    /// The most memory that a search takes, in bytes.
-    pub const MOST_BYTES: usize = size_of::<Self>() + LimitSearch::<N>::MOST_BYTES;
-
-    /// A search for the arm, method and timestep of `control`; its gains and setpoint do not matter.
-    ///
-    /// # Errors
-    /// A settling time of too many steps.
-    pub fn new(
-        control: &ControlLoop<N>,
-        requirements: GainsRequirements,
-    ) -> Result<Self, GainsError> {
-        let steps = requirements.settling_time / control.timestep;
-        if steps > MAX_STEPS {
-            return Err(GainsError::TooManySteps { steps });
-        }
-        let mut search = Self {
-            control: *control,
-            requirements,
-            shape: 0,
-            pace: 1.0,
-            paces: 0,
-            stage: GainsStage::Done(Err(requirements.not_found(control.timestep))),
-        };
-        search.control.setpoint = Setpoint::default();
-        search.begin_shape(0);
-        Ok(search)
+) -> Result<SuggestedGains<N>, GainsError> {
+    let GainsRequirements {
+        settling_time,
+        margin,
+    } = requirements;
+    let timestep = control.timestep;
+    let steps = settling_time / timestep;
+    if steps > MAX_STEPS {
+        return Err(GainsError::TooManySteps { steps });
     }
-
-    /// Goes on by one piece; the answer, once it is found.
-    pub fn advance(&mut self) -> Option<Result<SuggestedGains<N>, GainsError>> {
-        match &mut self.stage {
-            GainsStage::Done(answer) => return Some(*answer),
-            GainsStage::Limiting(search) => {
-                if let Some(limits) = search.advance() {
-                    self.judge(limits.trusted(), limits.certified);
-                }
+    control.setpoint = Setpoint::default();
+    for shape in SHAPES {
+        let mut pace = slowest_pace(&control.arm, shape, settling_time);
+        for paces in 0..MAX_PACES {
+            control.gains = scaled(&control.arm, shape, pace);
+            let limits = limits::search_limits(control).await;
+            let limit = limits.trusted();
+            let is_unstable = limit == Some(0.0);
+            let is_short = limit.is_some_and(|limit| limit < margin * timestep);
+            // The loop is too fast, or its springs hardly hold the load: some faster paces tell.
+            if is_short && !is_unstable && paces >= SOFT_PACES {
+                break;
             }
-            GainsStage::Moving(trial) => {
-                match trial.advance(&self.control, self.requirements.settling_time) {
-                    None => {}
-                    Some(None) => self.go_faster(),
-                    Some(Some(settled_after)) => {
-                        self.stage = GainsStage::Done(Ok(SuggestedGains {
-                            gains: self.control.gains,
-                            limit: trial.limit,
-                            certified: trial.certified,
-                            settled_after,
-                        }));
-                    }
-                }
-            }
-        }
-        None
-    }
-
-    /// Goes on to the moves if the limit leaves the margin. Where it does not, the loop is too fast, or its springs
-    /// hardly hold the load: some faster paces tell.
-    fn judge(&mut self, limit: Option<f64>, certified: bool) {
-        let least = self.requirements.margin * self.control.timestep;
-        match limit {
-            Some(0.0) => self.go_faster(),
-            Some(limit) if limit < least && self.paces < SOFT_PACES => self.go_faster(),
-            Some(limit) if limit < least => self.begin_shape(self.shape + 1),
-            limit => {
-                let trial = TestMove {
+            if !is_short
+                && !is_unstable
+                && let Some(settled_after) = settle(&control, settling_time).await
+            {
+                return Ok(SuggestedGains {
+                    gains: control.gains,
                     limit,
-                    certified,
-                    index: 0,
-                    run: start_of_move(&self.control, 0),
-                    off_at: 0.0,
-                    slowest: 0.0,
-                };
-                self.stage = GainsStage::Moving(Box::new(trial));
+                    certified: limits.certified,
+                    settled_after,
+                });
             }
+            pace *= FASTER;
         }
     }
+    Err(GainsError::NotFound {
+        settling_time,
+        margin,
+        timestep,
+    })
+}
 
-    fn go_faster(&mut self) {
-        self.pace *= FASTER;
-        self.paces += 1;
-        if self.paces < MAX_PACES {
-            self.try_pace();
-        } else {
-            self.begin_shape(self.shape + 1);
-        }
-    }
-
-    fn begin_shape(&mut self, shape: usize) {
-        self.shape = shape;
-        self.paces = 0;
-        if shape < SHAPES.len() {
-            self.pace = self.slowest_pace();
-            self.try_pace();
-        } else {
-            self.stage = GainsStage::Done(Err(self.requirements.not_found(self.control.timestep)));
-        }
-    }
-
-    fn try_pace(&mut self) {
-        self.control.gains = self.gains(self.pace);
-        self.stage = GainsStage::Limiting(Box::new(LimitSearch::new(&self.control)));
-    }
-
-    /// The default gains, scaled to the arm's inertia and to a pace.
-    fn gains(&self, pace: f64) -> Gains<N> {
-        let Gains { kp, ki, kd } = template::<N>();
-        let (springs, damping) = SHAPES.get(self.shape).copied().unwrap_or_default();
-        let scaled = |gains: [f64; N], weight: f64, power: i32| {
-            let here = inertia(&self.control.arm, weight);
-            let there = inertia(&Arm::<N>::default(), weight);
-            std::array::from_fn(|i| gains[i] * here[i] / there[i] * pace.powi(power))
-        };
-        Gains {
-            kp: scaled(kp, springs, 2),
-            ki: scaled(ki, springs, 3),
-            kd: scaled(kd, damping, 1),
-        }
-    }
-
-    /// The pace that settles in time if the arm is like the default one, or, if that is more, at which springs hold the
-    /// load and integrals carry it.
-    fn slowest_pace(&self) -> f64 {
-        let Gains { kp, ki, .. } = self.gains(1.0);
-        let load = gravity_load(&self.control.arm, &[0.0; N]);
-        let carries = (0..N).map(|i| {
-            let springs = (ABOVE_GRAVITY * load[i].abs() / kp[i]).sqrt();
-            let integrals = cbrt(2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i]));
-            springs.max(integrals)
-        });
-        largest(carries).max(DEFAULT_SETTLING / self.requirements.settling_time)
+/// The default gains, scaled to an arm's inertia and to a pace.
+fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) -> Gains<N> {
+    let Gains { kp, ki, kd } = template::<N>();
+    let scaled = |gains: [f64; N], weight: f64, power: i32| {
+        let here = inertia(arm, weight);
+        let there = inertia(&Arm::<N>::default(), weight);
+        std::array::from_fn(|i| gains[i] * here[i] / there[i] * pace.powi(power))
+    };
+    Gains {
+        kp: scaled(kp, springs, 2),
+        ki: scaled(ki, springs, 3),
+        kd: scaled(kd, damping, 1),
     }
 }
 
-impl GainsRequirements {
-    fn not_found(self, timestep: f64) -> GainsError {
-        GainsError::NotFound {
-            settling_time: self.settling_time,
-            margin: self.margin,
-            timestep,
-        }
-    }
+/// The pace that settles in time if the arm is like the default one, or, if that is more, at which springs hold the
+/// load and integrals carry it.
+fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: Shape, settling_time: f64) -> f64 {
+    let Gains { kp, ki, .. } = scaled(arm, shape, 1.0);
+    let load = gravity_load(arm, &[0.0; N]);
+    let carries = (0..N).map(|i| {
+        let springs = (ABOVE_GRAVITY * load[i].abs() / kp[i]).sqrt();
+        let integrals = cbrt(2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i]));
+        springs.max(integrals)
+    });
+    largest(carries).max(DEFAULT_SETTLING / settling_time)
 }
 
-impl<const N: usize> TestMove<N> {
-    /// Goes on with the moves: once all have settled in time the slowest time \[s\], or none as soon as one has not.
-    /// They are made one by one: where gains fail the first ones tell.
-    fn advance(&mut self, control: &ControlLoop<N>, settling_time: f64) -> Option<Option<f64>> {
-        for _ in 0..STEPS_PER_PIECE {
-            let moving = self.run.step();
-            let setpoint = self.run.pid().setpoint().position;
-            let position = &self.run.state().position;
+/// Makes the moves one by one, since where gains fail the first ones tell. Returns how long the slowest one took \[s\],
+/// or none as soon as one does not settle in time.
+async fn settle<const N: usize>(control: &ControlLoop<N>, settling_time: f64) -> Option<f64> {
+    let mut slowest: f64 = 0.0;
+    for index in 0..MOVES {
+        let mut run = start_of_move(control, index);
+        let setpoint = run.pid().setpoint().position;
+        // When a joint was last seen off the setpoint.
+        let mut off_at = 0.0;
+        while run.time() < WATCHED * settling_time {
+            if run.steps().is_multiple_of(STEPS_PER_PIECE) {
+                pause().await;
+            }
+            let is_moving = run.step();
+            let position = &run.state().position;
             if (0..N).any(|i| (position[i] - setpoint[i]).abs() > SETTLED) {
-                self.off_at = self.run.time();
+                off_at = run.time();
             }
-            if !moving || self.off_at > settling_time {
-                return Some(None);
-            }
-            if self.run.time() >= WATCHED * settling_time {
-                self.slowest = self.slowest.max(self.off_at);
-                self.index += 1;
-                if self.index == MOVES {
-                    return Some(Some(self.slowest));
-                }
-                self.off_at = 0.0;
-                self.run = start_of_move(control, self.index);
+            if !is_moving || off_at > settling_time {
+                return None;
             }
         }
-        None
+        slowest = slowest.max(off_at);
     }
+    Some(slowest)
 }
 
 /// A move about to begin: every other one out of a swing as fast as a fall makes it.

@@ -1,12 +1,13 @@
 //! All limits of a control loop: at its setpoint, and the smallest over all poses, bounded from below where it can be.
 //!
-//! **Invariant:** a search cut into slices finds the same bits as one made at once.
+//! **Invariant:** the work is bounded, and no piece of it takes longer than about a millisecond (optimised build).
 
 use super::control_loop::ControlLoop;
 use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
 use super::motion::Motion;
-use super::poses::{PoseCandidate, PoseSearch, Sought};
+use super::paused::{at_once, pause};
+use super::poses::{self, PoseCandidate, Sought, smallest_of_all_poses};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
@@ -115,229 +116,125 @@ impl<const N: usize> Limits<N> {
 /// All limits of a loop. Some 15 ms of one core for two links, 0.3 s for three (optimised build).
 #[must_use]
 pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
-    let mut search = LimitSearch::new(control);
-    loop {
-        if let Some(limits) = search.advance() {
-            return limits;
-        }
-    }
+    at_once(search_limits(*control))
 }
 
-/// A search for [`limits`] that can be paused: no advance takes longer than about a millisecond of one core (optimised
-/// build).
-#[derive(Debug, Clone)]
-pub struct LimitSearch<const N: usize> {
-    control: ControlLoop<N>,
-    limits: Limits<N>,
-    /// How the loop rests, unless it runs away.
-    kind: Rest,
-    /// A pose in which the loop runs away.
-    runaway: Option<PoseCandidate<N>>,
-    stage: LimitStage<N>,
+/// The most memory that [`search_limits`] takes, in bytes.
+#[must_use]
+pub const fn most_bytes<const N: usize>() -> usize {
+    Proof::<N>::MOST_BYTES + poses::most_bytes::<N>()
 }
 
-#[derive(Debug, Clone)]
-enum LimitStage<const N: usize> {
-    Setpoint,
-    Held(Linear),
-    Continuous(Linear),
-    Proving(Box<Proof<N>>),
-    Runaway(PoseSearch<N>),
-    Poses(Sampling, PoseSearch<N>),
-    Done,
-}
-
-impl<const N: usize> LimitSearch<N> {
-    /// The most memory that a search takes, in bytes.
-    pub const MOST_BYTES: usize = size_of::<Self>() + Proof::<N>::MOST_BYTES;
-
-    /// A search that has not begun.
-    #[must_use]
-    pub fn new(control: &ControlLoop<N>) -> Self {
-        Self {
-            control: *control,
-            limits: Limits {
-                equilibrium: control.setpoint.position,
-                rest: Rest::Setpoint,
-                held: None,
-                continuous: None,
-                minimum_held: None,
-                minimum_continuous: None,
-                bound: None,
-                bound_is_proven: false,
-                certified: false,
-                worst_pose: None,
-                critical: None,
-                advised: None,
-            },
-            kind: Rest::Setpoint,
-            runaway: None,
-            stage: LimitStage::Setpoint,
+/// Does what [`limits`] does, in pieces.
+pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N> {
+    let method = control.method;
+    let (equilibrium, kind, linear) = settle(&control);
+    pause().await;
+    let mut held = largest_timestep(&linear, method, Sampling::Held);
+    // A joint that nothing draws back drifts, but a loop that is stable at some timestep does not run away.
+    let mut runs_away = held == Some(0.0) && Modes::of(&linear).run_away();
+    pause().await;
+    let continuous = largest_timestep(&linear, method, Sampling::Continuous);
+    pause().await;
+    let here = PoseCandidate::as_it_is(equilibrium);
+    let (mut least, mut worst) = (held, here);
+    let (mut bound, mut runaway) = (None, None);
+    if let Some(Proven { timestep, pose }) = prove(&control).await {
+        bound = Some(timestep);
+        // The pose where the bound comes nearest to fail.
+        let nearest = PoseCandidate::as_it_is(pose);
+        let there = largest_timestep(&nearest.linear(&control), method, Sampling::Held);
+        if there.is_some_and(|there| there > 0.0 && least.is_none_or(|least| there < least)) {
+            (least, worst) = (there, nearest);
         }
-    }
-
-    /// Goes on by one piece. Returns the limits once they are all found.
-    pub fn advance(&mut self) -> Option<Limits<N>> {
-        let method = self.control.method;
-        let limits = &mut self.limits;
-        self.stage = match std::mem::replace(&mut self.stage, LimitStage::Done) {
-            LimitStage::Setpoint => LimitStage::Held(self.settle()),
-            LimitStage::Held(linear) => {
-                limits.held = largest_timestep(&linear, method, Sampling::Held);
-                // A joint that nothing draws back drifts, but a loop that is stable at some timestep does not run away.
-                if limits.held == Some(0.0) && Modes::of(&linear).run_away() {
-                    limits.rest = Rest::Unstable;
-                }
-                LimitStage::Continuous(linear)
-            }
-            LimitStage::Continuous(linear) => {
-                limits.continuous = largest_timestep(&linear, method, Sampling::Continuous);
-                match Proof::new(&self.control) {
-                    Some(proof) => LimitStage::Proving(Box::new(proof)),
-                    None => self.search_without_bound(),
-                }
-            }
-            LimitStage::Proving(mut proof) => match proof.advance(BOXES) {
-                None => LimitStage::Proving(proof),
-                Some(proven) => self.compare(&proven),
-            },
-            LimitStage::Runaway(mut search) => {
-                if search.advance() {
-                    LimitStage::Runaway(search)
-                } else {
-                    let (found, pose) = search.smallest();
-                    self.runaway = found.map(|_| pose);
-                    self.search_held(self.at_rest(self.limits.held))
-                }
-            }
-            LimitStage::Poses(sampling, mut search) => {
-                if search.advance() {
-                    LimitStage::Poses(sampling, search)
-                } else {
-                    self.conclude(sampling, search.smallest())
-                }
-            }
-            LimitStage::Done => return Some(self.limits),
-        };
-        matches!(self.stage, LimitStage::Done).then_some(self.limits)
-    }
-
-    /// The loop where it rests.
-    fn settle(&mut self) -> Linear {
-        let control = &self.control;
-        let rest = equilibrium(control);
-        let linear = Linear::at(control, &rest.position, &rest.integrating);
-        let mut off = rest.position.iter().zip(&control.setpoint.position);
-        self.limits.equilibrium = rest.position;
-        self.kind = if rest.balanced {
-            Rest::Saddle
-        } else if control.is_free() {
-            Rest::Hanging
-        } else if off.all(|(rest, setpoint)| (rest - setpoint).abs() <= AT_SETPOINT) {
-            Rest::Setpoint
-        } else {
-            Rest::Sagging
-        };
-        self.limits.rest = self.kind;
-        linear
-    }
-
-    /// A limit of the pose in which the loop rests.
-    fn at_rest(&self, limit: Option<f64>) -> (Option<f64>, PoseCandidate<N>) {
-        (limit, PoseCandidate::as_it_is(self.limits.equilibrium))
-    }
-
-    /// Looks for a pose that runs away, where there may be one, before all poses are searched.
-    fn search_without_bound(&self) -> LimitStage<N> {
-        let control = &self.control;
-        if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
-            let search = PoseSearch::new(control, Sought::Runaway, self.at_rest(None));
-            LimitStage::Runaway(search)
-        } else {
-            self.search_held(self.at_rest(self.limits.held))
-        }
-    }
-
-    /// Compares the bound with the limit in the pose where it comes nearest to fail. If they agree, no search follows.
-    fn compare(&mut self, &Proven { timestep, pose }: &Proven<N>) -> LimitStage<N> {
-        let control = &self.control;
-        let mut found = self.at_rest(self.limits.held);
-        let linear = Linear::at_pose(control, &pose);
-        let there = largest_timestep(&linear, control.method, Sampling::Held);
-        if let Some(limit) = there
-            && limit > 0.0
-            && found.0.is_none_or(|least| limit < least)
-        {
-            found = (there, PoseCandidate::as_it_is(pose));
-        }
-        self.limits.bound = Some(timestep);
-        if self.limits.held == Some(0.0) {
+        if held == Some(0.0) {
             // Rounding alone can make slow modes seem to grow beside rates a trillion times their own. A proof does not
             // round.
-            self.limits.held = Some(timestep);
-            self.limits.rest = self.kind;
-            found.0 = self.limits.held;
+            (held, least, runs_away) = (bound, bound, false);
         }
-        if found.0.is_some_and(|least| agree(timestep, least)) {
-            return self.conclude(Sampling::Held, found);
-        }
-        self.search_held(found)
+    } else if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
+        let known = (None, here);
+        let (found, pose) = smallest_of_all_poses(control, Sought::Runaway, known).await;
+        runaway = found.map(|_| pose);
     }
-
-    /// Searches all poses, or those without gravity where some pose with it runs away.
-    fn search_held(&self, found: (Option<f64>, PoseCandidate<N>)) -> LimitStage<N> {
-        let sought = match self.runaway {
+    let mut agrees = is_near(bound, least);
+    if !agrees {
+        // All poses, or those without gravity where some pose with it runs away.
+        let sought = match runaway {
             Some(_) => Sought::WeightlessLimit,
             None => Sought::Limit(Sampling::Held),
         };
-        let search = PoseSearch::new(&self.control, sought, found);
-        LimitStage::Poses(Sampling::Held, search)
+        (least, worst) = smallest_of_all_poses(control, sought, (least, worst)).await;
+        agrees = is_near(bound, least);
     }
+    let useful = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
+    let has_no_estimate = method == Method::Euler || control.arm.gravity() == 0.0;
+    let mut limits = Limits {
+        equilibrium,
+        rest: if runs_away { Rest::Unstable } else { kind },
+        held,
+        continuous,
+        minimum_held: least,
+        minimum_continuous: Some(0.0),
+        bound: useful,
+        bound_is_proven: useful.is_some() && has_no_estimate,
+        certified: agrees,
+        worst_pose: None,
+        critical: None,
+        advised: None,
+    };
+    if let Some(pose) = runaway {
+        limits.advised = least.map(|limit| ADVISED_PART * limit);
+        limits.minimum_held = Some(0.0);
+        limits.worst_pose = Some(pose.pose);
+        limits.critical = critical(&pose.linear(&control), method, 0.0);
+        return limits;
+    }
+    limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
+    if let Some(limit) = least {
+        limits.worst_pose = Some(worst.pose);
+        limits.critical = critical(&worst.linear(&control), method, limit);
+    }
+    pause().await;
+    let sought = Sought::Limit(Sampling::Continuous);
+    let found = smallest_of_all_poses(control, sought, (continuous, here)).await;
+    limits.minimum_continuous = found.0;
+    limits
+}
 
-    /// Notes the smallest limit over all poses, and goes on with the next search, if there is one.
-    fn conclude(
-        &mut self,
-        sampling: Sampling,
-        (least, worst): (Option<f64>, PoseCandidate<N>),
-    ) -> LimitStage<N> {
-        let control = &self.control;
-        let limits = &mut self.limits;
-        if sampling == Sampling::Continuous {
-            limits.minimum_continuous = least;
-            return LimitStage::Done;
+/// The bound for all poses, if there is something to prove it with.
+async fn prove<const N: usize>(control: &ControlLoop<N>) -> Option<Proven<N>> {
+    let mut proof = Proof::new(control)?;
+    loop {
+        if let Some(proven) = proof.advance(BOXES) {
+            return Some(proven);
         }
-        if let Some(pose) = self.runaway {
-            limits.advised = least.map(|limit| ADVISED_PART * limit);
-            limits.minimum_held = Some(0.0);
-            limits.minimum_continuous = Some(0.0);
-            limits.worst_pose = Some(pose.pose);
-            limits.critical = critical(&pose.linear(control), control.method, 0.0);
-            return LimitStage::Done;
-        }
-        limits.minimum_held = least;
-        limits.bound = limits
-            .bound
-            .filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
-        limits.bound_is_proven = limits.bound.is_some()
-            && (control.method == Method::Euler || control.arm.gravity() == 0.0);
-        limits.certified =
-            matches!((limits.bound, least), (Some(bound), Some(least)) if agree(bound, least));
-        limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
-        if let Some(limit) = least {
-            limits.worst_pose = Some(worst.pose);
-            limits.critical = critical(&worst.linear(control), control.method, limit);
-        }
-        let known = self.at_rest(self.limits.continuous);
-        let sought = Sought::Limit(Sampling::Continuous);
-        let search = PoseSearch::new(&self.control, sought, known);
-        LimitStage::Poses(Sampling::Continuous, search)
+        pause().await;
     }
 }
 
-/// Whether a bound and the smallest limit found agree. The limit may fall short of the bound a little, since
-/// growth counts only from some size on.
-fn agree(bound: f64, least: f64) -> bool {
-    (least / bound - 1.0).abs() <= AGREEMENT
+/// The pose in which the loop rests, how it does so, and the loop there.
+fn settle<const N: usize>(control: &ControlLoop<N>) -> ([f64; N], Rest, Linear) {
+    let rest = equilibrium(control);
+    let linear = Linear::at(control, &rest.position, &rest.integrating);
+    let mut off = rest.position.iter().zip(&control.setpoint.position);
+    let kind = if rest.balanced {
+        Rest::Saddle
+    } else if control.is_free() {
+        Rest::Hanging
+    } else if off.all(|(rest, setpoint)| (rest - setpoint).abs() <= AT_SETPOINT) {
+        Rest::Setpoint
+    } else {
+        Rest::Sagging
+    };
+    (rest.position, kind, linear)
+}
+
+/// Whether there are a bound and a smallest limit, and they agree. The limit may fall short of the bound a little,
+/// since growth counts only from some size on.
+fn is_near(bound: Option<f64>, least: Option<f64>) -> bool {
+    let both = bound.zip(least);
+    both.is_some_and(|(bound, least)| (least / bound - 1.0).abs() <= AGREEMENT)
 }
 
 /// The limit [`Limits::held`] alone, for the live arm at its present setpoint. Half a millisecond of one core for two

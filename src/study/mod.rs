@@ -11,13 +11,14 @@
 //! | [`fewest`] | the fewest steps with which a run is good enough |
 //! | [`planner`] | the cheapest method and timestep for an allowed error at the end effector |
 //! | [`rollout`] | an offline run with its error against a reference ([`taylor`]) |
+//! | [`paused`] | long computations, a piece at a time |
 //! | [`error_estimate`] | the local error of the step about to be taken |
 //!
 //! Everything steps through [`crate::math`], the live arm's own code.
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
-mod beside;
+pub(crate) mod beside;
 pub mod clocks;
 pub mod continuous;
 pub mod control_loop;
@@ -30,6 +31,7 @@ mod limits;
 pub mod linear;
 pub mod matrix;
 pub mod motion;
+pub mod paused;
 pub mod planner;
 mod poses;
 mod proof;

@@ -8,7 +8,7 @@
 //!
 //! The truth is computed with smaller and smaller steps, until two truths agree to a part of the allowed error. For a
 //! free arm the tolerance becomes smaller instead. Then each method is run beside the truth, as the live arm runs it.
-//! The fewest steps are searched ([`StepSearch`]) with which it stays within the rest of the error after each of them.
+//! The fewest steps are searched ([`fewest`]) with which it stays within the rest of the error after each of them.
 //! The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A run that
 //! could only be dearer than another is not made.
 //!
@@ -20,18 +20,18 @@
 
 use std::f64::consts::PI;
 
-use super::beside::{Beside, FreeMotion, ReferenceRun};
+use super::beside::{FreeMotion, Steppable, largest_distance};
 use super::clocks::clock_limits;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
-use super::fewest::StepSearch;
-use super::limits::LimitSearch;
-use super::taylor::ROUNDING;
+use super::fewest::{StepTrial, fewest};
+use super::limits;
+use super::paused::pause;
+use super::taylor::{ROUNDING, TaylorReference};
 use crate::math::arm::State;
 use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
 use crate::math::shown::{Shown, shown_against};
-use crate::math::simulation::Simulation;
 
 /// Longest time between two comparisons of truths \[s\], and how many there are at least.
 const LONGEST_SPAN: f64 = 0.05;
@@ -132,26 +132,6 @@ pub enum PlanError {
     },
 }
 
-/// The search for a plan, to be paused: no piece takes longer than a millisecond or so of one core (optimised build).
-#[derive(Debug, Clone)]
-pub struct Planning<const N: usize> {
-    task: Task<N>,
-    /// The duration, or the control period \[s\]: timesteps are whole parts of it.
-    whole: f64,
-    /// How many of it there are.
-    count: u64,
-    /// The longest stable timestep of all methods so far \[s\], and whether any was run.
-    longest_stable: f64,
-    has_run: bool,
-    /// How finely the truth is followed.
-    fineness: Fineness,
-    uncertainty: f64,
-    /// Methods that have not been tried, the next one last.
-    methods: Vec<Method>,
-    candidates: Vec<Candidate>,
-    stage: PlanStage<N>,
-}
-
 /// How finely a truth is followed.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
@@ -170,236 +150,207 @@ impl Fineness {
     }
 }
 
-#[derive(Debug, Clone)]
-enum PlanStage<const N: usize> {
-    Comparing(Box<Beside<ReferenceRun<N>, N>>),
-    Limiting(Method, Box<LimitSearch<N>>),
-    /// The search looks for the number of steps in the whole.
-    Running(Method, StepSearch, Box<Beside<Simulation<N>, N>>),
-    Done(Result<Planned, PlanError>),
+/// The most memory that [`plan`] takes, in bytes: a run and its truth, and a search for limits.
+#[must_use]
+pub const fn most_bytes<const N: usize>() -> usize {
+    2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
 }
 
-impl<const N: usize> Planning<N> {
-    /// The most memory that a plan takes, in bytes.
-    pub const MOST_BYTES: usize = size_of::<Self>()
-        + size_of::<Beside<ReferenceRun<N>, N>>()
-        + size_of::<Beside<Simulation<N>, N>>()
-        + LimitSearch::<N>::MOST_BYTES;
+/// Looks for a plan, in pieces.
+///
+/// # Errors
+/// Why there is none.
+pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
+    let Task {
+        control,
+        duration,
+        error,
+        ..
+    } = task;
+    if duration.is_nan() || duration > MAX_DURATION {
+        return Err(PlanError::TooLong { duration });
+    }
+    let truth = Truth::known_to(PART_OF_TRUTH * error, task).await?;
+    let uncertainty = truth.uncertainty;
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let (mut longest_stable, mut has_run) = (0.0_f64, false);
+    for method in Method::ALL.into_iter().rev() {
+        pause().await;
+        let control = control.with_method(method);
+        let most = longest_timestep(&control).await;
+        longest_stable = longest_stable.max(most);
+        let least = ceiling(truth.whole / most * (1.0 - count::ROUNDING));
+        // As many as cost less than the best run so far.
+        let cheapest = candidates.iter().map(|one| one.evaluations).min();
+        let affordable = cheapest.map_or(u64::MAX, |least| {
+            least.saturating_sub(1) / u64::from(method.evaluations())
+        });
+        let affordable = affordable.min(MAX_STEPS) / truth.count;
+        let mut trials = MethodTrials {
+            truth: &truth,
+            control,
+            best: None,
+            has_run: false,
+        };
+        fewest(least, affordable, u64::MAX, &mut trials).await;
+        has_run |= trials.has_run;
+        candidates.extend(trials.best);
+    }
+    if candidates.is_empty() {
+        return Err(if has_run {
+            PlanError::NotFound { error }
+        } else if longest_stable > 0.0 {
+            let timestep = longest_stable;
+            PlanError::TooManySteps { timestep }
+        } else {
+            PlanError::Unstable
+        });
+    }
+    candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
+    Ok(Planned {
+        candidates,
+        uncertainty,
+    })
+}
 
-    /// A plan about to be made.
-    ///
-    /// # Errors
-    /// A duration that is too long.
-    pub fn new(task: Task<N>) -> Result<Self, PlanError> {
-        let Task { duration, .. } = task;
-        if duration.is_nan() || duration > MAX_DURATION {
-            return Err(PlanError::TooLong { duration });
+/// Runs of one method.
+struct MethodTrials<'a, const N: usize> {
+    truth: &'a Truth<N>,
+    control: ControlLoop<N>,
+    /// The last one that was good enough.
+    best: Option<Candidate>,
+    has_run: bool,
+}
+
+impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
+    async fn is_enough(&mut self, steps: u64) -> bool {
+        self.has_run = true;
+        let (truth, method) = (self.truth, self.control.method);
+        let timestep = truth.whole / in_f64(steps);
+        let control = self.control.with_timestep(timestep);
+        let live = Box::new(control.simulation(truth.task.start));
+        let allowed = truth.task.error - truth.uncertainty;
+        let error = truth.off_by(live, steps, allowed).await;
+        let is_enough = error + truth.uncertainty <= truth.task.error;
+        if is_enough {
+            self.best = Some(Candidate {
+                method,
+                timestep,
+                evaluations: steps * truth.count * u64::from(method.evaluations()),
+                error,
+            });
         }
-        let control = &task.control;
-        let (count, whole) = if is_sampled(control) {
+        is_enough
+    }
+}
+
+/// The longest timestep at which a loop is stable \[s\], or is advised for every pose; infinite where nothing limits.
+async fn longest_timestep<const N: usize>(control: &ControlLoop<N>) -> f64 {
+    let most = if control.is_free() {
+        None
+    } else if is_sampled(control) {
+        // It is a whole part of the period, but for rounding.
+        let limit = clock_limits(control).timestep;
+        limit.map(|limit| limit * (1.0 + count::ROUNDING))
+    } else {
+        limits::search_limits(*control).await.advised
+    };
+    most.unwrap_or(f64::INFINITY)
+}
+
+/// The motion that runs are measured from.
+struct Truth<const N: usize> {
+    task: Task<N>,
+    /// The duration, or the control period \[s\]: timesteps are whole parts of it.
+    whole: f64,
+    /// How many of it there are.
+    count: u64,
+    fineness: Fineness,
+    /// How far the motion itself may be off \[m\].
+    uncertainty: f64,
+}
+
+impl<const N: usize> Truth<N> {
+    /// The motion of a task, followed ever more finely until it is known to `enough` \[m\].
+    async fn known_to(enough: f64, task: Task<N>) -> Result<Self, PlanError> {
+        let Task {
+            control, duration, ..
+        } = task;
+        let (count, whole) = if is_sampled(&control) {
             let period = control.period.period;
             (ceiling((duration / period).round()).max(1), period)
         } else {
             (1, duration)
         };
-        let fineness = if task.control.is_free() {
-            // This part of half a turn moves the end effector of the stretched arm by the truth's part of the error.
-            let reach = task.control.arm.reach();
-            let tolerance = PART_OF_TRUTH * task.error / (PI * reach);
+        let fineness = if control.is_free() {
+            // This part of half a turn moves the end effector of the stretched arm by as much.
+            let tolerance = enough / (PI * control.arm.reach());
             // The truth that it is first compared with must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4 * spans(whole, count))
         };
-        let mut planning = Self {
+        let mut truth = Self {
             task,
             whole,
             count,
-            longest_stable: 0.0,
-            has_run: false,
             fineness,
             uncertainty: f64::INFINITY,
-            methods: Method::ALL.to_vec(),
-            candidates: Vec::new(),
-            stage: PlanStage::Done(Err(PlanError::Unknown {
-                uncertainty: f64::INFINITY,
-            })),
         };
-        planning.compare_truths();
-        Ok(planning)
-    }
-
-    /// Goes on by one piece. Returns the plan once it is made.
-    pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
-        match &mut self.stage {
-            PlanStage::Done(answer) => return Some(answer.clone()),
-            PlanStage::Comparing(truths) => {
-                if let Some(apart) = truths.advance() {
-                    self.judge_truths(apart);
-                }
+        loop {
+            let steps = match truth.fineness {
+                Fineness::Steps(steps) => steps,
+                Fineness::Tolerance(_) => spans(whole, count),
+            };
+            let (coarse, _) = truth.motion(steps);
+            truth.fineness = truth.fineness.finer();
+            let apart = truth.off_by(coarse, steps, f64::INFINITY).await;
+            if apart.is_finite() {
+                truth.uncertainty = apart;
             }
-            PlanStage::Limiting(method, search) => {
-                let method = *method;
-                if let Some(limits) = search.advance() {
-                    let most = limits.advised.unwrap_or(f64::INFINITY);
-                    self.begin(method, most);
-                }
+            let can_be_finer = match truth.fineness {
+                Fineness::Steps(steps) => 2 * steps * count <= MAX_STEPS,
+                Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
+            };
+            if apart <= enough {
+                return Ok(truth);
             }
-            PlanStage::Running(method, search, run) => {
-                if let Some(error) = run.advance() {
-                    let (method, search) = (*method, *search);
-                    self.judge(method, search, error);
-                }
+            if !can_be_finer {
+                let uncertainty = truth.uncertainty;
+                return Err(PlanError::Unknown { uncertainty });
             }
         }
-        None
     }
 
-    /// The truth, followed so finely, and how many of its steps make one of a run that takes `steps` steps in the
-    /// whole.
-    fn truth(&self, fineness: Fineness, steps: u64) -> (ReferenceRun<N>, u64) {
+    /// How far a run of `steps` steps in the whole is off at most \[m\]; more than `allowed` ends it.
+    async fn off_by(&self, run: Box<dyn Steppable<N>>, steps: u64, allowed: f64) -> f64 {
+        let arm = &self.task.control.arm;
+        largest_distance(arm, (run, steps * self.count), self.motion(steps), allowed).await
+    }
+
+    /// The motion from its start, and how many of its steps make one of a run that takes `steps` steps in the whole.
+    fn motion(&self, steps: u64) -> (Box<dyn Steppable<N>>, u64) {
         let Task { control, start, .. } = self.task;
-        match fineness {
+        match self.fineness {
             Fineness::Steps(finest) => {
                 let each = finest.div_ceil(steps);
                 let timestep = self.whole / in_f64(steps * each);
+                let control = control.with_method(Method::Rk4).with_timestep(timestep);
                 if is_sampled(&control) {
-                    let control = control.with_method(Method::Rk4).with_timestep(timestep);
-                    let sampled = Box::new(control.simulation(start));
-                    return (ReferenceRun::Sampled(sampled), each);
+                    return (Box::new(control.simulation(start)), each);
                 }
-                let law = ContinuousLoop {
-                    control: control.with_method(Method::Rk4).with_timestep(timestep),
-                    state: start,
-                    integral: [0.0; N],
-                };
-                (ReferenceRun::Law(law), each)
+                let law = ContinuousLoop::new(control, start, [0.0; N]);
+                (Box::new(law), each)
             }
             Fineness::Tolerance(tolerance) => {
-                let timestep = self.whole / in_f64(steps);
-                let motion = FreeMotion::new(control.arm, start, timestep, tolerance);
-                (ReferenceRun::Free(motion), 1)
+                let motion = FreeMotion {
+                    arm: control.arm,
+                    taylor: TaylorReference::within(start, tolerance),
+                    timestep: self.whole / in_f64(steps),
+                };
+                (Box::new(motion), 1)
             }
         }
-    }
-
-    /// Begins to compare the truth with one that is followed more finely.
-    fn compare_truths(&mut self) {
-        let steps = match self.fineness {
-            Fineness::Steps(steps) => steps,
-            Fineness::Tolerance(_) => spans(self.whole, self.count),
-        };
-        let (coarse, _) = self.truth(self.fineness, steps);
-        let (fine, each) = self.truth(self.fineness.finer(), steps);
-        let truths = Beside::new(coarse, steps * self.count, fine, each, f64::INFINITY);
-        self.stage = PlanStage::Comparing(Box::new(truths));
-    }
-
-    /// Goes on with the finer of two truths that came so far apart \[m\], if they are near enough or can't come nearer.
-    fn judge_truths(&mut self, apart: f64) {
-        if apart.is_finite() {
-            self.uncertainty = apart;
-        }
-        self.fineness = self.fineness.finer();
-        let can_be_finer = match self.fineness {
-            Fineness::Steps(steps) => 2 * steps * self.count <= MAX_STEPS,
-            Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
-        };
-        if apart <= PART_OF_TRUTH * self.task.error {
-            self.next_method();
-        } else if can_be_finer {
-            self.compare_truths();
-        } else {
-            let uncertainty = self.uncertainty;
-            self.stage = PlanStage::Done(Err(PlanError::Unknown { uncertainty }));
-        }
-    }
-
-    fn next_method(&mut self) {
-        let Some(method) = self.methods.pop() else {
-            self.conclude();
-            return;
-        };
-        if self.task.control.is_free() {
-            self.begin(method, f64::INFINITY);
-        } else if is_sampled(&self.task.control) {
-            let limits = clock_limits(&self.task.control.with_method(method));
-            let most = limits.timestep.unwrap_or(f64::INFINITY);
-            // It is a whole part of the period, but for rounding.
-            self.begin(method, most * (1.0 + count::ROUNDING));
-        } else {
-            let search = LimitSearch::new(&self.task.control.with_method(method));
-            self.stage = PlanStage::Limiting(method, Box::new(search));
-        }
-    }
-
-    fn conclude(&mut self) {
-        self.candidates
-            .sort_by_key(|one| std::cmp::Reverse(one.evaluations));
-        self.stage = PlanStage::Done(if !self.candidates.is_empty() {
-            Ok(Planned {
-                candidates: std::mem::take(&mut self.candidates),
-                uncertainty: self.uncertainty,
-            })
-        } else if self.has_run {
-            let error = self.task.error;
-            Err(PlanError::NotFound { error })
-        } else if self.longest_stable > 0.0 {
-            let timestep = self.longest_stable;
-            Err(PlanError::TooManySteps { timestep })
-        } else {
-            Err(PlanError::Unstable)
-        });
-    }
-
-    /// Begins to search the fewest steps of a method whose longest stable timestep is `most` \[s\].
-    fn begin(&mut self, method: Method, most: f64) {
-        self.longest_stable = self.longest_stable.max(most);
-        let fewest = ceiling(self.whole / most * (1.0 - count::ROUNDING));
-        // As many as cost less than the best run so far.
-        let cheapest = self.candidates.iter().map(|one| one.evaluations).min();
-        let affordable = cheapest.map_or(u64::MAX, |least| {
-            least.saturating_sub(1) / u64::from(method.evaluations())
-        });
-        self.run(
-            method,
-            StepSearch::new(fewest, affordable.min(MAX_STEPS) / self.count),
-        );
-    }
-
-    /// Makes the next run of a search.
-    fn run(&mut self, method: Method, search: StepSearch) {
-        let Some(steps) = search.wanted() else {
-            return self.next_method();
-        };
-        self.has_run = true;
-        let timestep = self.whole / in_f64(steps);
-        let control = self
-            .task
-            .control
-            .with_method(method)
-            .with_timestep(timestep);
-        let live = control.simulation(self.task.start);
-        let (truth, each) = self.truth(self.fineness, steps);
-        let allowed = self.task.error - self.uncertainty;
-        let run = Beside::new(live, steps * self.count, truth, each, allowed);
-        self.stage = PlanStage::Running(method, search, Box::new(run));
-    }
-
-    /// Takes the error of a run of a search, and goes on with the search.
-    fn judge(&mut self, method: Method, mut search: StepSearch, error: f64) {
-        let is_enough = error + self.uncertainty <= self.task.error;
-        if let Some(steps) = search.wanted().filter(|_| is_enough) {
-            self.candidates.retain(|one| one.method != method);
-            self.candidates.push(Candidate {
-                method,
-                timestep: self.whole / in_f64(steps),
-                evaluations: steps * self.count * u64::from(method.evaluations()),
-                error,
-            });
-        }
-        search.tell(is_enough);
-        self.run(method, search);
     }
 }
 

@@ -23,6 +23,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::control_loop::ControlLoop;
 use super::linear::Linear;
+use super::paused::pause;
 use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 
 /// Directions of the first joint for the pull of gravity; among them hanging and upright.
@@ -72,18 +73,6 @@ impl<const N: usize> PoseCandidate<N> {
     }
 }
 
-/// A climb uphill on the growth, one judgement a move.
-#[derive(Debug, Clone, Copy)]
-struct Climb<const N: usize> {
-    at: PoseCandidate<N>,
-    growth: f64,
-    stride: f64,
-    /// The direction that is tried next, and how many have failed in turn.
-    direction: usize,
-    failed: usize,
-    moves: u32,
-}
-
 /// The object of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sought {
@@ -95,44 +84,74 @@ pub(super) enum Sought {
     Runaway,
 }
 
-#[derive(Debug, Clone)]
-enum PoseStage<const N: usize> {
-    Grid(usize),
-    /// The largest growth of every cell at the smallest limit.
-    Rating(usize, Vec<(PoseCandidate<N>, f64)>),
-    Climbing(Vec<PoseCandidate<N>>, Option<Climb<N>>),
-    Done,
+/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if nothing limits. A pose that runs
+/// away has a limit of zero. There is a pause after every pose.
+pub(super) async fn smallest_of_all_poses<const N: usize>(
+    control: ControlLoop<N>,
+    sought: Sought,
+    known: (Option<f64>, PoseCandidate<N>),
+) -> (Option<f64>, PoseCandidate<N>) {
+    let (smallest, worst) = known;
+    let mut search = PoseSearch {
+        control,
+        sought,
+        smallest,
+        worst,
+    };
+    search.run().await;
+    (search.smallest, search.worst)
 }
 
-/// The smallest of a bound and the limits of all poses, looked for pose by pose, so that it can be paused.
-#[derive(Debug, Clone)]
-pub(super) struct PoseSearch<const N: usize> {
+/// The most memory that a search takes, in bytes: its cells, and those that stand out.
+pub(super) const fn most_bytes<const N: usize>() -> usize {
+    2 * MAX_POSES * size_of::<(PoseCandidate<N>, f64)>()
+}
+
+struct PoseSearch<const N: usize> {
     control: ControlLoop<N>,
     sought: Sought,
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
     /// The pose of that value.
     worst: PoseCandidate<N>,
-    stage: PoseStage<N>,
 }
 
 impl<const N: usize> PoseSearch<N> {
-    /// A search that begins with `bound` \[s\], the limit at `worst`. A pose that runs away has a limit of zero.
-    pub(super) fn new(
-        control: &ControlLoop<N>,
-        sought: Sought,
-        (bound, worst): (Option<f64>, PoseCandidate<N>),
-    ) -> Self {
-        Self {
-            control: *control,
-            sought,
-            smallest: bound,
-            worst,
-            stage: match sought {
-                Sought::Runaway => PoseStage::Rating(0, Vec::new()),
-                Sought::Limit(_) | Sought::WeightlessLimit => PoseStage::Grid(0),
-            },
+    async fn run(&mut self) {
+        if self.sought != Sought::Runaway {
+            for (_, judged) in grid_poses(self.turns()) {
+                self.judge(&judged);
+                pause().await;
+            }
+            if self.smallest.is_none_or(|limit| limit == 0.0) {
+                return;
+            }
         }
+        // The largest growth of every cell at the smallest limit.
+        let mut cells: Vec<(PoseCandidate<N>, f64)> = Vec::new();
+        for (cell, judged) in grid_poses(self.turns()) {
+            let growth = self.growth(&judged);
+            match cells.get_mut(cell) {
+                Some(cell) if growth > cell.1 => *cell = (judged, growth),
+                Some(_) => {}
+                None => cells.push((judged, growth)),
+            }
+            pause().await;
+            if self.is_found() {
+                return;
+            }
+        }
+        for start in summits::<N>(&cells).into_iter().rev() {
+            self.climb(start).await;
+            if self.is_found() {
+                return;
+            }
+        }
+    }
+
+    /// Whether the object of the search is a pose that runs away, and there is one.
+    fn is_found(&self) -> bool {
+        self.sought == Sought::Runaway && self.smallest.is_some()
     }
 
     /// When the law whose limit is sought runs; none if a pose is sought that runs away.
@@ -142,62 +161,6 @@ impl<const N: usize> PoseSearch<N> {
             Sought::WeightlessLimit => Some(Sampling::Held),
             Sought::Runaway => None,
         }
-    }
-
-    /// Judges the loop at one more pose; false once there is none left.
-    pub(super) fn advance(&mut self) -> bool {
-        let is_found = self.sought == Sought::Runaway && self.smallest.is_some();
-        self.stage = match std::mem::replace(&mut self.stage, PoseStage::Done) {
-            _ if is_found => return false,
-            PoseStage::Grid(index) => match self.judged(index) {
-                Some(judged) => {
-                    self.judge(&judged);
-                    PoseStage::Grid(index + 1)
-                }
-                None if self.smallest.is_none_or(|limit| limit == 0.0) => PoseStage::Done,
-                None => PoseStage::Rating(0, Vec::new()),
-            },
-            PoseStage::Rating(index, mut cells) => match self.judged(index) {
-                Some(judged) => {
-                    self.rate(index, judged, &mut cells);
-                    PoseStage::Rating(index + 1, cells)
-                }
-                None => PoseStage::Climbing(summits::<N>(&cells), None),
-            },
-            PoseStage::Climbing(starts, Some(climb)) => {
-                PoseStage::Climbing(starts, self.climb(climb))
-            }
-            PoseStage::Climbing(mut starts, None) => match starts.pop() {
-                Some(start) => {
-                    let climb = self.begin(start);
-                    PoseStage::Climbing(starts, Some(climb))
-                }
-                None => PoseStage::Done,
-            },
-            PoseStage::Done => return false,
-        };
-        true
-    }
-
-    /// The smallest so far \[s\], `None` if nothing limits, and its pose.
-    pub(super) fn smallest(&self) -> (Option<f64>, PoseCandidate<N>) {
-        (self.smallest, self.worst)
-    }
-
-    /// One of the poses of the grid: first without gravity, then, if there is any, with it in every direction.
-    fn judged(&self, index: usize) -> Option<PoseCandidate<N>> {
-        let turns = self.turns();
-        let mut pose = outer_pose::<N>(index / turns)?;
-        let turn = index % turns;
-        if turn > 0
-            && let Some(first) = pose.first_mut()
-        {
-            *first = part_of_turn(turn - 1, DIRECTIONS);
-        }
-        Some(PoseCandidate {
-            pose,
-            has_gravity: turn > 0,
-        })
     }
 
     /// Judgements at one pose of the outer joints. Without gravity the direction of the first joint makes no
@@ -256,64 +219,56 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn rate(
-        &mut self,
-        index: usize,
-        judged: PoseCandidate<N>,
-        cells: &mut Vec<(PoseCandidate<N>, f64)>,
-    ) {
-        let growth = self.growth(&judged);
-        match cells.get_mut(index / self.turns()) {
-            Some(cell) if growth > cell.1 => *cell = (judged, growth),
-            Some(_) => {}
-            None => cells.push((judged, growth)),
-        }
-    }
-
-    fn begin(&mut self, at: PoseCandidate<N>) -> Climb<N> {
-        Climb {
-            at,
-            growth: self.growth(&at),
-            stride: 0.5 * TAU / ratio(grid::<N>(), 1),
-            direction: 0,
-            failed: 0,
-            moves: 0,
-        }
-    }
-
-    /// Makes one move of a climb; none once it is at its top.
-    fn climb(&mut self, mut climb: Climb<N>) -> Option<Climb<N>> {
+    /// Goes uphill on the growth, one judgement a move, as far as it goes.
+    async fn climb(&mut self, mut at: PoseCandidate<N>) {
+        let mut growth = self.growth(&at);
+        let mut stride = 0.5 * TAU / ratio(grid::<N>(), 1);
         // The first joint counts only where there is gravity.
-        let first = usize::from(!climb.at.has_gravity);
+        let first = usize::from(!at.has_gravity);
         let directions = 2 * N.saturating_sub(first);
-        if climb.stride < SMALLEST_STRIDE || climb.moves >= MAX_MOVES || directions == 0 {
-            return None;
-        }
-        climb.moves += 1;
-        let mut next = climb.at;
-        let sign = if climb.direction.is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        };
-        next.pose[first + climb.direction / 2] += sign * climb.stride;
-        let growth = self.growth(&next);
-        if growth > climb.growth {
-            (climb.at, climb.growth, climb.failed) = (next, growth, 0);
-            if growth > NEUTRAL && self.sought != Sought::Runaway {
-                self.judge(&next);
-                climb.growth = self.growth(&next);
+        // The direction that is tried next, and how many have failed in turn.
+        let (mut direction, mut failed) = (0, 0);
+        for _ in 0..MAX_MOVES {
+            if stride < SMALLEST_STRIDE || directions == 0 || self.is_found() {
+                return;
             }
-        } else {
-            climb.direction = (climb.direction + 1) % directions;
-            climb.failed += 1;
-            if climb.failed == directions {
-                climb.failed = 0;
-                climb.stride *= 0.5;
+            pause().await;
+            let sign = if direction % 2 == 0 { 1.0 } else { -1.0 };
+            let mut next = at;
+            next.pose[first + direction / 2] += sign * stride;
+            let growth_there = self.growth(&next);
+            if growth_there > growth {
+                (at, growth, failed) = (next, growth_there, 0);
+                if growth > NEUTRAL && self.sought != Sought::Runaway {
+                    self.judge(&at);
+                    growth = self.growth(&at);
+                }
+            } else {
+                direction = (direction + 1) % directions;
+                failed += 1;
+                if failed == directions {
+                    failed = 0;
+                    stride *= 0.5;
+                }
             }
         }
-        Some(climb)
     }
+}
+
+/// The poses of the grid with the cell of each, `turns` poses to a cell: first without gravity, then, if there is any,
+/// with it in every direction.
+fn grid_poses<const N: usize>(turns: usize) -> impl Iterator<Item = (usize, PoseCandidate<N>)> {
+    (0..).map_while(move |index| {
+        let (cell, turn) = (index / turns, index % turns);
+        let mut pose = outer_pose::<N>(cell)?;
+        if turn > 0
+            && let Some(first) = pose.first_mut()
+        {
+            *first = part_of_turn(turn - 1, DIRECTIONS);
+        }
+        let has_gravity = turn > 0;
+        Some((cell, PoseCandidate { pose, has_gravity }))
+    })
 }
 
 /// Cells that grow no less than all of their neighbours.

@@ -24,7 +24,9 @@
 )]
 
 pub use super::critical::{BEYOND, Critical};
-pub use super::limits::{ADVISED_PART, LimitSearch, Limits, Rest, limit_held, limits};
+pub use super::limits::{
+    ADVISED_PART, Limits, Rest, limit_held, limits, most_bytes, search_limits,
+};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
 use super::slow_modes;
@@ -74,35 +76,13 @@ impl Sampling {
 /// The largest stable timestep of a linear loop \[s\]: see [`Limits`] for `None` and zero.
 #[must_use]
 pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> Option<f64> {
-    let stepping = Stepping::new(linear, method, sampling);
-    stepping.search(&Modes::of(linear))
-}
-
-/// The largest stable control period \[s\] if the effort is held over `substeps` steps of the method.
-#[must_use]
-pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
-    Stepping::held(linear, method, substeps, false).search(&Modes::of(linear))
-}
-
-/// The largest stable control period \[s\] if every effort acts one period late, as over a bus or with a slow
-/// controller. There is no integral in it.
-#[must_use]
-pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
-    Stepping::held(linear, method, substeps, true).search(&Modes::of(linear))
-}
-
-/// The matrix by which one control period \[s\] of `substeps` steps changes a deviation; states as in [`Linear::flow`].
-#[must_use]
-pub fn period_matrix(linear: &Linear, method: Method, substeps: u32, period: f64) -> Matrix {
-    let stepping = Stepping::held(linear, method, substeps, false);
-    stepping.generator(period).shifted_identity(period)
+    Stepping::new(linear, method, sampling).limit()
 }
 
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
 #[must_use]
 pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {
-    let stepping = Stepping::new(linear, method, sampling);
-    stepping.generator(h).shifted_identity(h)
+    Stepping::new(linear, method, sampling).matrix(h)
 }
 
 /// The loop as it would be in continuous time.
@@ -149,7 +129,7 @@ impl Modes {
 }
 
 /// A linear loop, and how it is stepped.
-pub(super) struct Stepping<'a> {
+pub struct Stepping<'a> {
     linear: &'a Linear,
     method: Method,
     sampling: Sampling,
@@ -176,13 +156,27 @@ impl<'a> Stepping<'a> {
         }
     }
 
-    /// The law once in `substeps` steps, at once or one period late.
-    pub(super) fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
+    /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as over a bus
+    /// or with a slow controller. There is no integral in a late one.
+    #[must_use]
+    pub fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
         Self {
             substeps: substeps.max(1),
             delayed,
             ..Self::new(linear, method, Sampling::Held)
         }
+    }
+
+    /// The largest stable period \[s\]: see [`Limits`] for `None` and zero.
+    #[must_use]
+    pub fn limit(&self) -> Option<f64> {
+        self.search(&Modes::of(self.linear))
+    }
+
+    /// The matrix by which one period \[s\] changes a deviation; states as in [`Linear::flow`].
+    #[must_use]
+    pub fn matrix(&self, period: f64) -> Matrix {
+        self.generator(period).shifted_identity(period)
     }
 
     /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].

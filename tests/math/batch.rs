@@ -1,7 +1,6 @@
 //! Arms in the lanes of a register against the same arms alone: every bit of every simulation.
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
 use fastrand::Rng;
 use pendularm::math::arm::{Arm, State};
@@ -132,53 +131,6 @@ fn a_lane_has_the_bits_of_an_arm_that_is_stepped_alone() {
             diverged += compare::<3>(registers, &mut rng, count);
         }
         assert!(diverged > 300, "only {diverged} diverged");
-    }
-}
-
-/// Has every arm seen by an observer that ends some of them, together and alone.
-fn compare_observed<const N: usize>(registers: Registers, rng: &mut Rng, count: usize) -> usize {
-    let mut together: Vec<Simulation<N>> = (0..count).map(|_| any_simulation(rng)).collect();
-    let mut alone = together.clone();
-    let orders: Vec<(u64, usize)> = (0..count)
-        .map(|_| (rng.u64(..60), rng.usize(1..80)))
-        .collect();
-    let see = |seen: &mut Vec<State<N>>, patience: usize, state: &State<N>| {
-        seen.push(*state);
-        if seen.len() == patience {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    };
-    let mut seen = vec![vec![]; count];
-    let arms = together.iter_mut().zip(&mut seen).zip(&orders);
-    registers.advance_with(arms.map(|((arm, seen), &(steps, patience))| {
-        let observe = move |state: &State<N>| see(seen, patience, state);
-        (arm, steps, observe)
-    }));
-    let mut ended = 0;
-    for (((one, other), seen), (steps, patience)) in
-        alone.iter_mut().zip(&together).zip(&seen).zip(orders)
-    {
-        let mut expected = vec![];
-        one.advance_with(steps, |now| see(&mut expected, patience, now.state()));
-        assert_eq!(shown(other), shown(one), "{} lanes", registers.lanes());
-        assert_eq!(format!("{seen:?}"), format!("{expected:?}"));
-        ended += usize::from(seen.len() == patience);
-    }
-    ended
-}
-
-#[test]
-fn an_observer_sees_what_it_sees_of_an_arm_that_is_stepped_alone_and_may_end_it() {
-    let mut rng = Rng::with_seed(2);
-    for registers in Registers::all() {
-        let mut ended = 0;
-        for count in [1, 2, 7, 33, 200, 50] {
-            ended += compare_observed::<2>(registers, &mut rng, count);
-            ended += compare_observed::<3>(registers, &mut rng, count);
-        }
-        assert!(ended > 100, "only {ended} ended");
     }
 }
 

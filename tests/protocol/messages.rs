@@ -5,12 +5,8 @@
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState, KeyValue,
-<<<<<<< HEAD
     Level, Stamp, action_feedback, action_result, call, failure, message_text, publish,
-    publish_raw, respelled, response, response_raw, status,
-=======
-    Level, Stamp, call, failure, message_text, publish, publish_raw, respelled, response, status,
->>>>>>> runtime
+    publish_raw, respelled, response, status,
 };
 use pendularm::protocol::wire::payload::Payload;
 use proptest::prelude::*;

@@ -6,7 +6,8 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::clocks::clock_limits;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::rollout::{Rollout, RolloutRequest};
+use pendularm::study::paused::at_once;
+use pendularm::study::rollout::{RolloutRequest, rollout};
 use pendularm::study::stability::limit_held;
 
 fn control(period: f64, delay: bool) -> ControlLoop<2> {
@@ -110,10 +111,9 @@ fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_orde
             samples: 101,
             reference: true,
         };
-        let mut rollout = Rollout::new(request).unwrap();
-        while rollout.advance(u64::MAX) > 0 {}
-        let method = rollout.deviation().unwrap().largest();
-        (method, rollout.from_ideal().unwrap().known().unwrap())
+        let made = at_once(rollout(request)).unwrap();
+        let method = made.deviation.unwrap().largest();
+        (method, made.from_ideal.unwrap().known().unwrap())
     };
     for (method, order) in [
         (Method::Euler, 1),

@@ -9,15 +9,11 @@ use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::planner::{Candidate, MAX_DURATION, PlanError, Planned, Planning, Task};
+use pendularm::study::paused::at_once;
+use pendularm::study::planner::{self, Candidate, MAX_DURATION, PlanError, Planned, Task};
 
 pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
-    let mut planning = Planning::new(task)?;
-    loop {
-        if let Some(planned) = planning.advance() {
-            return planned;
-        }
-    }
+    at_once(planner::plan(task))
 }
 
 fn swing(duration: f64, error: f64) -> Task<2> {

@@ -6,7 +6,8 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::budget::Budget;
 use pendularm::report::experiments::error::{OUTPUTS, Scene, scenes};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::fewest::StepSearch;
+use pendularm::study::fewest::fewest;
+use pendularm::study::paused::at_once;
 use pendularm::study::planner::Task;
 use pendularm::study::stability::limits;
 
@@ -26,17 +27,13 @@ fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
 }
 
 /// The fewest steps within `error`, between `least` and the first run of ever half the timestep that is within it.
-fn fewest(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
+fn fewest_steps(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
     let is_enough = |steps| scene.run_within(method, steps, error).error <= error;
     let mut most = OUTPUTS;
     while !is_enough(most) {
         most *= 2;
     }
-    let mut search = StepSearch::new(least, most).to_part(256);
-    while let Some(steps) = search.wanted() {
-        search.tell(is_enough(steps));
-    }
-    search.best().unwrap()
+    at_once(fewest(least, most, 256, is_enough)).unwrap()
 }
 
 #[test]
@@ -45,8 +42,8 @@ fn the_timestep_and_the_evaluations_are_runs() {
     let swing = all.iter().find(|scene| scene.name == "swing-2").unwrap();
     let duration = swing.duration;
     let evaluations = |method: Method| {
-        let coarse = fewest(swing, method, 1e-2, 1);
-        let steps = fewest(swing, method, 1e-4, coarse);
+        let coarse = fewest_steps(swing, method, 1e-2, 1);
+        let steps = fewest_steps(swing, method, 1e-4, coarse);
         (steps * u64::from(method.evaluations())) as f64
     };
     let rk4 = evaluations(Method::Rk4);

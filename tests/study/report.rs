@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pendularm::report::{ReportError, ReportOptions, names, run};
+use pendularm::report::{ReportOptions, run};
 
 /// A directory that is gone after the test.
 struct Scratch(PathBuf);
@@ -96,13 +96,4 @@ fn a_kept_section_that_cannot_be_read_is_told_by_its_file() {
     assert!(said.contains("missing field"), "{said}");
     // Before anything is made, which takes minutes.
     assert!(!scratch.0.join("sections/conditioning.json").exists());
-}
-
-#[test]
-fn an_unknown_section_is_refused_with_the_names_of_all() {
-    let scratch = Scratch::new("unknown");
-    let error = run(&quick(&scratch.0, &["colour"])).unwrap_err();
-    assert!(matches!(&error, ReportError::UnknownSection { name } if name == "colour"));
-    assert!(error.to_string().contains(&names()));
-    assert!(!scratch.0.exists());
 }

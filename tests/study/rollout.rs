@@ -6,7 +6,8 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::{estimate, estimate_step};
-use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest};
+use pendularm::study::paused::{Paused, at_once};
+use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout};
 use pendularm::study::taylor::TaylorReference;
 
 fn swing() -> RolloutRequest<2> {
@@ -36,10 +37,7 @@ fn reach() -> RolloutRequest<2> {
 }
 
 fn run<const N: usize>(request: RolloutRequest<N>) -> Rollout<N> {
-    let mut rollout = Rollout::new(request).unwrap();
-    while rollout.advance(u64::MAX) > 0 {}
-    assert!(rollout.is_over());
-    rollout
+    at_once(rollout(request)).unwrap()
 }
 
 /// Halving the timestep divides the error by 2^p. Under control the reference is held over the same steps, so a method
@@ -54,8 +52,8 @@ fn halving_the_timestep_divides_the_error_by_two_to_the_order() {
             // With control every timestep is another loop: its own reference each.
             let error = |timestep| {
                 let control = request.control.with_method(method).with_timestep(timestep);
-                let rollout = run(RolloutRequest { control, ..request });
-                rollout.deviation().unwrap().largest()
+                let made = run(RolloutRequest { control, ..request });
+                made.deviation.unwrap().largest()
             };
             let slope = (error(timestep) / error(0.5 * timestep)).log2();
             assert!((slope / order - 1.0).abs() < 0.15, "{method}: {slope}");
@@ -67,14 +65,14 @@ fn halving_the_timestep_divides_the_error_by_two_to_the_order() {
 #[test]
 fn a_run_has_the_nearest_number_of_steps() {
     let times = |duration, timestep, samples| {
-        let rollout = run(RolloutRequest {
+        let made = run(RolloutRequest {
             control: swing().control.with_timestep(timestep),
             duration,
             samples,
             reference: false,
             ..swing()
         });
-        let in_steps = rollout.times().iter().map(|time| time / timestep);
+        let in_steps = made.times.iter().map(|time| time / timestep);
         in_steps.map(f64::round).collect::<Vec<_>>()
     };
     for (duration, timestep, steps) in [
@@ -111,8 +109,8 @@ fn the_references_agree_to_rounding() {
         ..swing()
     };
     for request in [swing(), reach(), stiff] {
-        let rollout = run(request);
-        let deviation = rollout.deviation().unwrap();
+        let made = run(request);
+        let deviation = made.deviation.unwrap();
         assert_eq!(deviation.uncertainties.len(), 11);
         let uncertainty = deviation.largest_uncertainty();
         assert!(uncertainty < 2e-14, "{uncertainty:e}");
@@ -136,7 +134,7 @@ fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
             samples: 101,
             ..swing()
         };
-        run(request).deviation().unwrap().clone()
+        run(request).deviation.unwrap()
     };
     let tiny = deviation(1e-5, from_rest, 5.0);
     assert!(tiny.largest() > 0.0 && tiny.largest_uncertainty() > 0.0);
@@ -164,7 +162,7 @@ fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
 #[test]
 fn a_run_is_the_simulation_bit_for_bit() {
     let request = reach();
-    let rollout = run(request);
+    let made = run(request);
     let mut live = Simulation::new(request.control.arm, request.control.gains);
     live.set_timestep(request.control.timestep);
     live.set_state(request.start);
@@ -172,58 +170,51 @@ fn a_run_is_the_simulation_bit_for_bit() {
     live.enable(true);
     for k in 1..=10 {
         live.advance(10);
-        assert_eq!(rollout.times()[k], live.time());
-        assert_eq!(rollout.positions()[k], live.state().position);
-        assert_eq!(rollout.velocities()[k], live.state().velocity);
-        assert_eq!(rollout.efforts()[k], *live.effort());
+        assert_eq!(made.times[k], live.time());
+        assert_eq!(made.positions[k], live.state().position);
+        assert_eq!(made.velocities[k], live.state().velocity);
+        assert_eq!(made.efforts[k], *live.effort());
     }
-    assert_eq!(rollout.evaluations(), 400);
+    assert_eq!(made.evaluations, 400);
 }
 
-#[test]
-fn a_run_in_slices_gives_the_same_bits_as_one_made_at_once() {
-    for request in [swing(), reach()] {
-        let whole = run(request);
-        let mut sliced = Rollout::new(request).unwrap();
-        let mut slices = 0;
-        while sliced.advance(100) > 0 {
-            slices += 1;
+/// The run in pieces, and how many they are.
+fn in_pieces(request: RolloutRequest<2>) -> (Rollout<2>, u64) {
+    let mut paused = Paused::new(rollout(request));
+    let mut pieces = 1;
+    loop {
+        if let Some(made) = paused.advance() {
+            return (made.unwrap(), pieces);
         }
-        assert!(slices > 10, "{slices}");
-        assert_eq!(whole.positions(), sliced.positions());
-        assert_eq!(whole.deviation(), sliced.deviation());
+        pieces += 1;
     }
 }
 
-/// Motions so wild that a reference needs tens of thousands of evaluations for one step.
+/// Motions so wild that a reference needs thousands of evaluations for one step: a piece ends within it.
 #[test]
-fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
-    const WORK: u64 = 1000;
-    // A step of the run, one of each reference and one of each ideal loop: 4 evaluations, twice 22 coefficients, and
-    // twice 4 evaluations.
-    const LOOK: u64 = 4 + 2 * 22 + 2 * 4;
+fn a_run_in_short_pieces_gives_the_same_bits_as_one_made_at_once_however_wild_the_motion() {
+    // A piece has 2000 evaluations, and those of the last step: 22 coefficients of a reference at most.
+    const MOST: u64 = 2000 + 22;
     for request in [swing(), reach()] {
         let mut wild = request;
         wild.control.timestep = 0.5;
         wild.duration = 20.0;
         wild.start.velocity = wild.start.velocity.map(|_| 40.0);
-        let mut whole = Rollout::new(wild).unwrap();
-        let all = whole.advance(u64::MAX);
-        assert!(all > 10 * WORK, "{all}");
-        let mut sliced = Rollout::new(wild).unwrap();
-        let mut made = 0;
-        loop {
-            let slice = sliced.advance(WORK);
-            if slice == 0 {
-                break;
-            }
-            assert!(slice <= WORK + LOOK, "{slice}");
-            made += slice;
+        for request in [request, wild] {
+            let (sliced, pieces) = in_pieces(request);
+            assert!(pieces > 2, "{pieces}");
+            assert_eq!(sliced, run(request));
         }
-        assert!(sliced.is_over());
-        assert_eq!(made, all);
-        assert_eq!(whole.positions(), sliced.positions());
-        assert_eq!(whole.deviation(), sliced.deviation());
+        if wild.control.is_free() {
+            let (made, pieces) = in_pieces(wild);
+            let mut reference = TaylorReference::new(wild.start);
+            let is_followed = |_| reference.follow(&wild.control.arm, &[0.0; 2], 0.5);
+            assert!((0..made.steps).all(is_followed));
+            // Four references, one of them in steps half as long. Pieces as long as a step would be 5 for each.
+            let least = 5 * reference.coefficients() / MOST;
+            assert!(least > 5 * made.steps, "{least} in {} steps", made.steps);
+            assert!(pieces >= least, "{pieces} for {least}");
+        }
     }
 }
 
@@ -235,16 +226,16 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
         kd: [0.0; 2],
     };
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::default());
-    let rollout = run(RolloutRequest {
+    let made = run(RolloutRequest {
         control: control.with_method(Method::Euler).with_timestep(0.1),
         duration: 100.0,
         samples: 1001,
         ..swing()
     });
-    assert!(rollout.divergence().is_some());
-    assert!(rollout.times().len() < 1001);
-    assert!(rollout.positions().iter().flatten().all(|q| q.is_finite()));
-    assert!(rollout.deviation().unwrap().errors.len() <= rollout.times().len());
+    assert!(made.divergence.is_some());
+    assert!(made.times.len() < 1001);
+    assert!(made.positions.iter().flatten().all(|q| q.is_finite()));
+    assert!(made.deviation.unwrap().errors.len() <= made.times.len());
 }
 
 #[test]
@@ -252,7 +243,7 @@ fn what_can_not_be_run_is_refused_by_name() {
     let with = |change: &dyn Fn(&mut RolloutRequest<2>)| {
         let mut request = swing();
         change(&mut request);
-        Rollout::new(request).unwrap_err().to_string()
+        at_once(rollout(request)).unwrap_err().to_string()
     };
     type Row<'a> = (&'a dyn Fn(&mut RolloutRequest<2>), &'a str);
     let rows: [Row<'_>; 6] = [

@@ -8,12 +8,11 @@ use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::growth::growth_per_period;
-use pendularm::report::experiments::measure::{growth, growths, measured_limit};
+use pendularm::report::experiments::measure::measured_limit;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
-    Rest, Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix,
-    step_matrix,
+    Rest, Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 use serde::Deserialize;
 
@@ -367,30 +366,6 @@ fn no_parameters_make_a_limit_that_is_no_number() {
     }
 }
 
-/// Cells that grow, die out, escape at once and hardly change, so that most arms end before the last.
-#[test]
-fn a_map_measures_what_each_of_its_cells_measures_alone() {
-    for sampling in Sampling::ALL {
-        for method in Method::ALL {
-            let cells: Vec<_> = (0..40)
-                .map(|cell| {
-                    let gains = Gains {
-                        kp: [1000.0 * f64::from(1 + cell % 7), 250.0],
-                        ..Gains::<2>::default()
-                    };
-                    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
-                        .with_method(method)
-                        .with_timestep(2e-4 * 1.15_f64.powi(cell))
-                })
-                .collect();
-            let alone: Vec<_> = cells.iter().map(|cell| growth(cell, sampling)).collect();
-            assert_eq!(growths(&cells, sampling), alone, "{method}");
-            let escaped = alone.iter().filter(|growth| growth.is_none()).count();
-            assert!((1..40).contains(&escaped), "{method}: {escaped} escaped");
-        }
-    }
-}
-
 /// A joint whose integral is too strong for its damping runs away at some 1.3/s. The damping of the other joint makes a rate of
 /// 1e12/s, and rounding at that rate must not hide the slow growth.
 #[test]
@@ -444,10 +419,11 @@ fn a_deviation_grows_per_control_period_as_the_spectral_radius_says() {
             ControlLoop::new(Arm::default(), Gains::<2>::default(), setpoint).with_method(method);
         let linear = Linear::at_setpoint(&control);
         for substeps in [1, 10] {
-            let limit = largest_period(&linear, method, substeps).unwrap();
+            let stepping = Stepping::held(&linear, method, substeps, false);
+            let limit = stepping.limit().unwrap();
             for part in [0.3, 0.9, 1.01, 1.05] {
                 let period = part * limit;
-                let predicted = period_matrix(&linear, method, substeps, period).spectral_radius();
+                let predicted = stepping.matrix(period).spectral_radius();
                 let measured = growth_per_period(&control.with_timestep(period), substeps).unwrap();
                 // The ratio shows in the swing that is left over 4000 periods.
                 assert!(

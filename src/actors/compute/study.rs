@@ -16,11 +16,11 @@ use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
-use crate::services::study::{GainsWork, PlanWork, Present, RolloutWork, StabilityWork, Work};
 pub use crate::services::study::{
     NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
     RunOffline, SuggestGains, Suggested,
 };
+use crate::services::study::{Present, RolloutWork, Work};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 
@@ -75,7 +75,7 @@ impl<const N: usize> Handler<Call<PredictStability<N>>> for Study<N> {
 
     fn handle(&mut self, call: Call<PredictStability<N>>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| StabilityWork::new(ask, present));
+        self.begin(reply, ctx, |present| ask.work(present));
     }
 }
 
@@ -84,7 +84,7 @@ impl<const N: usize> Handler<Call<RunOffline<N>>> for Study<N> {
 
     fn handle(&mut self, call: Call<RunOffline<N>>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| RolloutWork::new(ask, present));
+        self.begin(reply, ctx, move |present| RolloutWork::new(&ask, present));
     }
 }
 
@@ -93,7 +93,7 @@ impl<const N: usize> Handler<Call<SuggestGains<N>>> for Study<N> {
 
     fn handle(&mut self, call: Call<SuggestGains<N>>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| GainsWork::new(ask, present));
+        self.begin(reply, ctx, |present| ask.work(present));
     }
 }
 
@@ -102,7 +102,7 @@ impl<const N: usize> Handler<Call<PlanRun<N>>> for Study<N> {
 
     fn handle(&mut self, call: Call<PlanRun<N>>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| PlanWork::new(ask, present));
+        self.begin(reply, ctx, |present| ask.work(present));
     }
 }
 

@@ -89,8 +89,8 @@ pub(super) fn stepped<T: Number, const N: usize>(
     let State { position, velocity } = state;
     // The motion does not depend on the time, so none is computed for the stages.
     let (dq, dv) = increment(method, acceleration, h.like(0.0), position, velocity, h);
-    let (position, position_carry) = add(position, &carry.position, &dq);
-    let (velocity, velocity_carry) = add(velocity, &carry.velocity, &dv);
+    let (position, position_carry) = add_carried(position, &carry.position, &dq);
+    let (velocity, velocity_carry) = add_carried(velocity, &carry.velocity, &dv);
     let carry = State {
         position: position_carry,
         velocity: velocity_carry,
@@ -100,7 +100,7 @@ pub(super) fn stepped<T: Number, const N: usize>(
 
 /// `value + carry + increment`, and the carry that rounding leaves for the next step.
 #[inline(always)]
-fn add<T: Number, const N: usize>(
+pub(crate) fn add_carried<T: Number, const N: usize>(
     value: &[T; N],
     carry: &[T; N],
     increment: &[T; N],

@@ -31,6 +31,7 @@ use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
 pub use self::hold::{ControlPeriod, Held, Hold};
+pub(crate) use self::increments::add_carried;
 use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
 pub use self::input::ArmInput;

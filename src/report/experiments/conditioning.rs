@@ -87,7 +87,8 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
     Some(worst)
 }
 
-fn lost(truth: &[DoubleDouble; 3], values: &[f64; 3]) -> f64 {
+/// Decimal digits that the worst of `values` has lost.
+pub(super) fn lost<const N: usize>(truth: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
     let scale = largest(truth.iter().map(|value| value.abs().to_f64()));
     let error = largest_difference(truth, values) / scale;
     (error / (0.5 * f64::EPSILON)).log10().max(0.0)

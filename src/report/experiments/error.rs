@@ -10,11 +10,12 @@
 use super::reference::{DoubleDouble, Law, ReferencePath, largest_difference};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
-use crate::math::dynamics::forward_dynamics;
 use crate::math::expression::Expression;
-use crate::math::integrator::{Method, increment, two_sum};
+use crate::math::integrator::Method;
 use crate::math::particle::{MAX_STEPS, Particle};
-use crate::math::pid::{Gains, Pid, Setpoint};
+use crate::math::pid::{Gains, Setpoint};
+use crate::study::beside::Steppable;
+use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, largest_timestep};
@@ -276,47 +277,13 @@ struct ArmRun<const N: usize> {
 }
 
 impl<const N: usize> ArmRun<N> {
-    /// Takes steps and shows the state after each, until told to stop; `count` is called at every evaluation.
-    fn march(
-        &self,
-        method: Method,
-        steps: u64,
-        mut count: impl FnMut(),
-        mut show: impl FnMut(u64, &State<N>) -> bool,
-    ) {
-        let h = ARM_DURATION / in_f64(steps);
-        let mut pid = Pid::new(self.control.gains);
-        pid.set_setpoint(self.control.setpoint);
-        let law = |position: &[f64; N], velocity: &[f64; N]| {
-            let (position, velocity) = (*position, *velocity);
-            pid.control(&State { position, velocity }, 0.0).effort
-        };
-        let mut state = self.start;
-        let mut carry = State::<N>::rest();
-        for step in 1..=steps {
-            let held = law(&state.position, &state.velocity);
-            let acceleration = |_: f64, q: &[f64; N], v: &[f64; N]| {
-                count();
-                let effort = match self.drive {
-                    Actuation::Continuous => law(q, v),
-                    Actuation::Held => held,
-                };
-                forward_dynamics(&self.control.arm, q, v, &effort)
-            };
-            let State { position, velocity } = &state;
-            let (dq, dv) = increment(method, acceleration, 0.0, position, velocity, h);
-            add(&mut state.position, &mut carry.position, &dq);
-            add(&mut state.velocity, &mut carry.velocity, &dv);
-            if !show(step, &state) {
-                return;
-            }
+    /// The arm before its first step.
+    fn ready(&self, method: Method, timestep: f64) -> Box<dyn Steppable<N>> {
+        let control = self.control.with_method(method).with_timestep(timestep);
+        match self.drive {
+            Actuation::Continuous => Box::new(ContinuousLoop::new(control, self.start, [0.0; N])),
+            Actuation::Held => Box::new(control.simulation(self.start)),
         }
-    }
-}
-
-fn add<const N: usize>(value: &mut [f64; N], carry: &mut [f64; N], increment: &[f64; N]) {
-    for ((value, carry), increment) in value.iter_mut().zip(carry).zip(increment) {
-        (*value, *carry) = two_sum(*value, increment + *carry);
     }
 }
 
@@ -326,37 +293,38 @@ impl<const N: usize> SceneRun for ArmRun<N> {
             steps, timestep, ..
         } = outcome;
         let every = steps.div_ceil(MOST_LOOKS).max(1);
-        let mut evaluations = 0;
-        let count = || evaluations += 1;
-        self.march(method, steps, count, |step, state| {
-            outcome.end = state.position.iter().sum();
-            if !step.is_multiple_of(every) && step < steps {
-                return true;
+        let mut run = self.ready(method, timestep);
+        for step in 1..=steps {
+            let evaluations = run.step();
+            outcome.evaluations += evaluations.unwrap_or(0);
+            outcome.end = run.state().position.iter().sum();
+            if evaluations.is_some() && !step.is_multiple_of(every) && step < steps {
+                continue;
             }
             let exact = self.reference.after(step, timestep);
-            outcome.take(step, largest_difference(&exact, &state.position), most)
-        });
-        RunOutcome {
-            evaluations,
-            ..outcome
+            let error = evaluations.map(|_| largest_difference(&exact, &run.state().position));
+            if !outcome.take(step, error.unwrap_or(f64::NAN), most) {
+                break;
+            }
         }
+        outcome
     }
 
     fn replay(&self, method: Method, steps: u64) -> f64 {
-        if self.drive == Actuation::Continuous {
-            let mut end = f64::NAN;
-            let show = |_, state: &State<N>| {
-                end = state.position.iter().sum();
-                true
-            };
-            self.march(method, steps, || (), show);
-            return end;
-        }
-        let control = self.control.with_method(method);
         let timestep = ARM_DURATION / in_f64(steps);
-        let mut simulation = control.with_timestep(timestep).simulation(self.start);
-        simulation.advance(steps);
-        simulation.state().position.iter().sum()
+        if self.drive == Actuation::Held {
+            let control = self.control.with_method(method).with_timestep(timestep);
+            let mut live = control.simulation(self.start);
+            live.advance(steps);
+            return live.state().position.iter().sum();
+        }
+        let mut run = self.ready(method, timestep);
+        for _ in 0..steps {
+            if run.step().is_none() {
+                break;
+            }
+        }
+        run.state().position.iter().sum()
     }
 
     fn predicted_limit(&self, method: Method) -> Option<f64> {

@@ -13,12 +13,11 @@
     reason = "indices run over 0..N and 0..2N of arrays of these lengths"
 )]
 
-use std::ops::ControlFlow;
-
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{gravity_load, mass_matrix};
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation, batch};
+use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation};
+use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Equilibrium, equilibrium, gravity_gradient};
@@ -91,57 +90,40 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
 }
 
 /// Largest energy of the deviation in the last eighth of the periods, per largest in the second eighth. In the first,
-/// modes die out that say nothing about the last to do so. `None` once the deviation has escaped.
+/// modes die out that say nothing about the last to do so. Zero once the deviation has died, `None` once it has
+/// escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
-    growths(&[*control], sampling).pop().flatten()
-}
-
-/// The [`growth`] of each of the loops. Arms whose efforts are held are stepped side by side.
-#[must_use]
-pub fn growths<const N: usize>(
-    controls: &[ControlLoop<N>],
-    sampling: Sampling,
-) -> Vec<Option<f64>> {
-    let watched = controls.iter().map(|control| {
-        let rest = equilibrium(control);
-        let start = nudged(control, &rest.position);
-        let energy = energy_about(control, &rest.position);
-        (control, rest, start, energy)
-    });
-    if sampling == Sampling::Continuous {
-        // No live arm, which is all that lanes know to step.
-        let growths = watched.map(|(control, rest, state, energy)| {
-            let mut whole = ContinuousLoop {
-                control: *control,
-                state,
-                integral: rest.integral,
-            };
-            let mut watch = Watch::new(1);
-            while watch.seen < STEPS {
-                let taken = whole.step();
-                if watch
-                    .see(|| energy(&whole.state).filter(|_| taken))
-                    .is_break()
-                {
-                    break;
-                }
-            }
-            watch.growth()
-        });
-        return growths.collect();
+    const WINDOW: u64 = STEPS / 8;
+    let rest = equilibrium(control);
+    let start = nudged(control, &rest.position);
+    let energy_of = energy_about(control, &rest.position);
+    let (mut run, every): (Box<dyn Steppable<N>>, u64) = match sampling {
+        Sampling::Held => {
+            let every = control.period.steps(control.timestep);
+            (Box::new(live_at(control, &rest, start)), every)
+        }
+        Sampling::Continuous => {
+            let run = ContinuousLoop::new(*control, start, rest.integral);
+            (Box::new(run), 1)
+        }
+    };
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    for period in 0..STEPS {
+        for _ in 0..every {
+            run.step()?;
+        }
+        let energy = energy_of(run.state())?;
+        if energy == 0.0 {
+            return Some(0.0);
+        }
+        if period / WINDOW == 1 {
+            early = early.max(energy);
+        } else if period >= STEPS - WINDOW {
+            late = late.max(energy);
+        }
     }
-    let watched = watched.map(|(control, rest, start, energy)| {
-        let steps = control.period.steps(control.timestep);
-        (live_at(control, &rest, start), energy, Watch::new(steps))
-    });
-    let mut watched: Vec<_> = watched.collect();
-    batch::advance_with(watched.iter_mut().map(|(live, energy, watch)| {
-        let steps = STEPS * watch.every;
-        let observe = |state: &State<N>| watch.see(|| energy(state));
-        (live, steps, observe)
-    }));
-    watched.iter().map(|(_, _, watch)| watch.growth()).collect()
+    Some(late / early)
 }
 
 /// The energy of a deviation from `rest` \[J\], zero below [`DEAD`]; `None` beyond [`ESCAPED`].
@@ -240,63 +222,4 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
         }
     }
     None
-}
-
-/// The energies of a deviation at the end of every control period, as they come.
-#[derive(Debug)]
-struct Watch {
-    /// Steps of a period, and those taken in it so far.
-    every: u64,
-    in_period: u64,
-    /// Periods seen.
-    seen: u64,
-    /// Largest of the second eighth of [`STEPS`], and of the last.
-    early: f64,
-    late: f64,
-    has_died: bool,
-}
-
-impl Watch {
-    fn new(every: u64) -> Self {
-        Self {
-            every,
-            in_period: 0,
-            seen: 0,
-            early: 0.0,
-            late: 0.0,
-            has_died: false,
-        }
-    }
-
-    /// Takes in the energy after another step, until one is zero or missing.
-    fn see(&mut self, energy: impl FnOnce() -> Option<f64>) -> ControlFlow<()> {
-        const WINDOW: u64 = STEPS / 8;
-        self.in_period += 1;
-        if self.in_period < self.every {
-            return ControlFlow::Continue(());
-        }
-        self.in_period = 0;
-        let Some(energy) = energy() else {
-            return ControlFlow::Break(());
-        };
-        if energy == 0.0 {
-            self.has_died = true;
-            return ControlFlow::Break(());
-        }
-        if self.seen / WINDOW == 1 {
-            self.early = self.early.max(energy);
-        } else if self.seen >= STEPS - WINDOW {
-            self.late = self.late.max(energy);
-        }
-        self.seen += 1;
-        ControlFlow::Continue(())
-    }
-
-    /// The largest late energy per largest early one; zero if one was zero, `None` if one was missing.
-    fn growth(&self) -> Option<f64> {
-        if self.has_died {
-            return Some(0.0);
-        }
-        (self.seen == STEPS).then(|| self.late / self.early)
-    }
 }

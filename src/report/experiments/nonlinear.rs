@@ -15,14 +15,12 @@
 )]
 
 use std::f64::consts::FRAC_PI_2;
-use std::ops::ControlFlow;
 
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, potential_energy};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{Simulation, batch, state_after};
+use crate::math::simulation::state_after;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{Complex, Matrix};
 
@@ -48,34 +46,13 @@ pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> 
         .with_timestep(timestep)
 }
 
-/// Whether each of the moves, stepped side by side, arrives and is there at its end.
+/// Whether a move arrives and is there at its end.
 #[must_use]
-pub fn arrive(controls: &[ControlLoop<2>]) -> Vec<bool> {
-    let moves = controls.iter();
-    let mut moves: Vec<_> = moves
-        .map(|control| control.simulation(State::rest()))
-        .collect();
-    batch::advance(moves.iter_mut().map(|live| {
-        let steps = first_step_from(MOVE, live.timestep());
-        (live, steps)
-    }));
-    let arrived = |(live, control): (&Simulation<2>, &ControlLoop<2>)| {
-        let (position, setpoint) = (live.state().position, control.setpoint.position);
-        live.divergence().is_none() && (0..2).all(|i| (position[i] - setpoint[i]).abs() <= ARRIVED)
-    };
-    moves.iter().zip(controls).map(arrived).collect()
-}
-
-/// The first step that does not begin before `time` \[s\], in steps of `timestep` \[s\].
-fn first_step_from(time: f64, timestep: f64) -> u64 {
-    let mut steps = 0;
-    for bit in (0..u64::BITS / 2).rev() {
-        let more = steps | 1 << bit;
-        if in_f64(more - 1) * timestep < time {
-            steps = more;
-        }
-    }
-    steps
+pub fn arrives(control: &ControlLoop<2>) -> bool {
+    let mut live = control.simulation(State::rest());
+    while live.time() < MOVE && live.step() {}
+    let (position, setpoint) = (live.state().position, control.setpoint.position);
+    live.divergence().is_none() && (0..2).all(|i| (position[i] - setpoint[i]).abs() <= ARRIVED)
 }
 
 /// A free swing of a 2-link arm from the horizontal, turning at `spin` \[rad/s\].
@@ -87,31 +64,19 @@ pub fn spun(spin: f64) -> State<2> {
     }
 }
 
-/// Whether each of the free swings, stepped side by side, keeps its energy above that of the hanging arm to a factor of
-/// [`ENERGY_FACTOR`] for [`SWING`].
+/// Whether a free swing keeps its energy above that of the hanging arm to a factor of [`ENERGY_FACTOR`] for [`SWING`].
 #[must_use]
-pub fn are_carried(swings: &[(ControlLoop<2>, State<2>)]) -> Vec<bool> {
-    let mut watched: Vec<_> = swings
-        .iter()
-        .map(|(control, start)| (control.simulation(*start), true))
-        .collect();
-    batch::advance_with(watched.iter_mut().map(|(live, carried)| {
-        let (arm, steps) = (*live.arm(), first_step_from(SWING, live.timestep()));
-        let lowest = potential_energy(&arm, &[-FRAC_PI_2, 0.0]);
-        let first = energy(&arm, live.state()) - lowest;
-        let kept = first / ENERGY_FACTOR..=first * ENERGY_FACTOR;
-        let observe = move |state: &State<2>| {
-            *carried = kept.contains(&(energy(&arm, state) - lowest));
-            if *carried {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
-        };
-        (live, steps, observe)
-    }));
-    let holds = |(live, carried): &(Simulation<2>, bool)| *carried && live.divergence().is_none();
-    watched.iter().map(holds).collect()
+pub fn is_carried(control: &ControlLoop<2>, start: State<2>) -> bool {
+    let arm = &control.arm;
+    let lowest = potential_energy(arm, &[-FRAC_PI_2, 0.0]);
+    let first = energy(arm, &start) - lowest;
+    let kept = first / ENERGY_FACTOR..=first * ENERGY_FACTOR;
+    let mut live = control.simulation(start);
+    let mut is_kept = true;
+    while live.time() < SWING && is_kept {
+        is_kept = live.step() && kept.contains(&(energy(arm, live.state()) - lowest));
+    }
+    is_kept
 }
 
 /// A swing of the free default arm that comes back to its start. It goes from rest, both links to one side, through

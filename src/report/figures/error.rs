@@ -3,7 +3,7 @@
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
 //! nothing is interpolated between two runs.
 
-use super::fit::{fewest, slope, worst};
+use super::fit::{fewest_of, slope, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
@@ -12,7 +12,6 @@ use crate::report::svg::{
     Axis, Curve, Key, Mark, Plot, Point, Unit, number, power, scientific, seconds,
 };
 use crate::report::timing::{Effort, Timing, time};
-use crate::study::fewest::StepSearch;
 
 /// Errors between which a slope is fitted \[rad\]: above, higher orders still show; below, rounding does.
 const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
@@ -82,8 +81,8 @@ impl Data {
                         *of == method && it.error <= target && it.steps <= MOST_SEARCHED
                     });
                 let fewest = enough.and_then(|(_, outcome)| {
-                    fewest(
-                        StepSearch::new(least, outcome.steps).to_part(RESOLUTION),
+                    fewest_of(
+                        (least, outcome.steps, RESOLUTION),
                         |steps| scene.run_within(method, steps, target),
                         |outcome| outcome.error <= target,
                     )

@@ -3,20 +3,24 @@
 //! **Invariant:** there is one more edge than cells, and a cell is measured between two of them.
 
 use crate::math::count::length_in_f64;
-use crate::study::fewest::StepSearch;
+use crate::study::fewest::fewest;
+use crate::study::paused::at_once;
 
-/// The run with the fewest steps among the runs of a search that are good enough.
-pub(super) fn fewest<R: Copy>(
-    mut search: StepSearch,
+/// The run with the fewest steps among those of a search that are good enough; see [`fewest`] for its numbers.
+pub(super) fn fewest_of<R: Copy>(
+    (first, most, part): (u64, u64, u64),
     run: impl Fn(u64) -> R,
     is_enough: impl Fn(&R) -> bool,
 ) -> Option<R> {
     let mut best = None;
-    while let Some(steps) = search.wanted() {
+    at_once(fewest(first, most, part, |steps| {
         let made = run(steps);
-        search.tell(is_enough(&made));
-        best = Some(made).filter(&is_enough).or(best);
-    }
+        let is_enough = is_enough(&made);
+        if is_enough {
+            best = Some(made);
+        }
+        is_enough
+    }));
     best
 }
 

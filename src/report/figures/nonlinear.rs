@@ -5,7 +5,7 @@
 use super::fit::{centres, edges};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
-use crate::report::experiments::nonlinear::{PeriodicSwing, are_carried, arrive, move_of, spun};
+use crate::report::experiments::nonlinear::{PeriodicSwing, arrives, is_carried, move_of, spun};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Panel, Plot, Unit, number};
 use crate::study::control_loop::ControlLoop;
@@ -40,32 +40,26 @@ pub(super) fn make(section: &mut Section) {
     let columns = section.choose(32, 12);
     let mut panels = Vec::new();
     // Moves are limited by the pose with the smallest limit, and by their own speed.
-    let moved = map(&MOVES, columns, &mut panels, |method, amplitudes, steps| {
+    let moved = map(&MOVES, columns, &mut panels, |method| {
         let smallest = limits(&move_of(1.0, method, 1e-3)).trusted();
-        let cells = amplitudes.iter().flat_map(|amplitude| {
-            let steps = steps.iter();
-            steps.map(|h| move_of(*amplitude, method, *h))
-        });
-        let predicted = amplitudes.iter().map(|amplitude| {
-            let motion = Motion::ahead(&move_of(*amplitude, method, 1e-3), &State::rest());
+        let predicted = move |amplitude| {
+            let motion = Motion::ahead(&move_of(amplitude, method, 1e-3), &State::rest());
             motion.timestep.min(smallest.unwrap_or(f64::INFINITY))
-        });
-        (predicted.collect(), arrive(&cells.collect::<Vec<_>>()))
+        };
+        let holds = move |amplitude, h| arrives(&move_of(amplitude, method, h));
+        (predicted, holds)
     });
     // Free swings are limited by the frequency of small ones, and by their speed. A method that lets small swings grow
     // at every timestep is limited by the speed alone: in four seconds little comes of that growth.
-    let carried = map(&SWINGS, columns, &mut panels, |method, speeds, steps| {
+    let carried = map(&SWINGS, columns, &mut panels, |method| {
         let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
         let small = limit_held(&free).filter(|limit| *limit > 0.0);
-        let cells = speeds.iter().flat_map(|spin| {
-            let steps = steps.iter();
-            steps.map(|h| (free.with_timestep(*h), spun(*spin)))
-        });
-        let predicted = speeds.iter().map(|spin| {
-            let motion = Motion::ahead(&free, &spun(*spin));
+        let predicted = move |spin| {
+            let motion = Motion::ahead(&free, &spun(spin));
             motion.timestep.min(small.unwrap_or(f64::INFINITY))
-        });
-        (predicted.collect(), are_carried(&cells.collect::<Vec<_>>()))
+        };
+        let holds = move |spin, h| is_carried(&free.with_timestep(h), spun(spin));
+        (predicted, holds)
     });
     let swings = "swings of every speed keep their energy to a factor of two for 4 s";
     for (motions, (cells, lost)) in [
@@ -92,41 +86,45 @@ pub(super) fn make(section: &mut Section) {
     );
 }
 
-/// A panel for each method. Returns how many cells lie within the advised part of the limit, and how many of them fail.
-fn map(
+/// A panel for each method, for which `measure` has two functions of the kind's value: the predicted limit \[s\], and
+/// whether a timestep holds. Returns how many cells lie within the advised part of the limit, and how many of them
+/// fail.
+fn map<P: Fn(f64) -> f64, H: Fn(f64, f64) -> bool>(
     kind: &Kind,
     columns: usize,
     panels: &mut Vec<Panel>,
-    measure: impl Fn(Method, &[f64], &[f64]) -> (Vec<f64>, Vec<bool>),
+    measure: impl Fn(Method) -> (P, H),
 ) -> (usize, usize) {
     let mut counts = (0, 0);
     let edges = [kind.steps, kind.values].map(|ends| edges(ends, columns));
     let [steps, values] = edges.each_ref().map(|edges| centres(edges));
     for method in Method::ALL {
-        let (limits, holds) = measure(method, &values, &steps);
-        for (limit, row) in limits.iter().zip(holds.chunks(columns)) {
-            let within = steps
-                .iter()
-                .zip(row)
-                .filter(|(h, _)| **h <= ADVISED * limit);
-            for (_, holds) in within {
+        let (predicted, holds) = measure(method);
+        let (mut line, mut rows) = (Vec::new(), Vec::new());
+        for value in &values {
+            let limit = predicted(*value);
+            if limit <= kind.steps.1 {
+                line.push((limit, *value));
+            }
+            let row: Vec<bool> = steps.iter().map(|h| holds(*value, *h)).collect();
+            let within = steps.iter().zip(&row);
+            for (_, holds) in within.filter(|(h, _)| **h <= ADVISED * limit) {
                 counts.0 += 1;
                 counts.1 += usize::from(!holds);
             }
+            rows.push(
+                row.iter()
+                    .map(|holds| if *holds { "yes" } else { "no" })
+                    .collect(),
+            );
         }
         let mut plot = Plot::new(
             format!("{method}, {}", kind.name),
             Axis::log("timestep", Unit::Seconds, kind.steps),
             Axis::log(kind.label, Unit::Number, kind.values),
         );
-        let class = |holds: &bool| if *holds { "yes" } else { "no" };
-        let rows = holds.chunks(columns);
-        plot.heat = Some(Heat {
-            edges: edges.clone(),
-            rows: rows.map(|row| row.iter().map(class).collect()).collect(),
-        });
-        let line = limits.into_iter().zip(values.iter().copied());
-        let line = line.filter(|(limit, _)| *limit <= kind.steps.1);
+        let edges = edges.clone();
+        plot.heat = Some(Heat { edges, rows });
         plot.curves
             .push(Curve::line(Key::line("ink", "predicted limit"), line));
         for (class, label) in [("yes", "arrives, or keeps its energy"), ("no", "does not")] {

@@ -10,7 +10,7 @@ use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::report::experiments::growth::growth_per_period;
-use crate::report::experiments::measure::{STEPS, decays, growths, measured_limit, stiffened};
+use crate::report::experiments::measure::{STEPS, decays, growth, measured_limit, stiffened};
 use crate::report::section::{Cell, Section, Table, by_method};
 use crate::report::svg::{
     Axis, Curve, Key, Mark, Marker, Panel, Plot, Point, Unit, number, seconds,
@@ -18,7 +18,7 @@ use crate::report::svg::{
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{
-    Sampling, largest_period, largest_timestep, limit_held, limits, period_matrix, step_matrix,
+    Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 
 pub(super) fn make(section: &mut Section) {
@@ -209,17 +209,14 @@ fn map(section: &mut Section) {
     let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
     for (method, sampling) in all.into_iter().flatten() {
         let control = |factor| stiffened(factor).with_method(method);
-        let all = factors.iter().flat_map(|factor| {
-            let timesteps = timesteps.iter();
-            timesteps.map(|h| control(*factor).with_timestep(*h))
-        });
-        let growth = growths(&all.collect::<Vec<_>>(), sampling);
         let (mut predicted, mut measured) = (Vec::new(), Vec::new());
-        for (factor, growth) in factors.iter().zip(growth.chunks(columns)) {
+        for factor in &factors {
+            let growth = |h: &f64| growth(&control(*factor).with_timestep(*h), sampling);
+            let growth: Vec<Option<f64>> = timesteps.iter().map(growth).collect();
             let linear = Linear::at_setpoint(&control(*factor));
             let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
             predicted.push((limit, *factor));
-            for (h, growth) in timesteps.iter().zip(growth) {
+            for (h, growth) in timesteps.iter().zip(&growth) {
                 // The watch is too short to tell where the slowest mode changes its energy by less than a factor e.
                 // Measurements have no part in this.
                 let radius = step_matrix(&linear, method, sampling, *h).spectral_radius();
@@ -446,7 +443,8 @@ impl Growth {
             .push(Mark::Horizontal(1.0, "ink", "unstable above"));
         for (turn, (substeps, label, class, marker)) in (0..).zip(SUBSTEPS) {
             let predicted = |substeps, period| {
-                period_matrix(&linear, method, substeps, period).spectral_radius()
+                let stepping = Stepping::held(&linear, method, substeps, false);
+                stepping.matrix(period).spectral_radius()
             };
             let curve = (0..=200).map(|index| along(index, 200));
             let curve = curve.map(|period| (period, predicted(substeps, period)));
@@ -458,7 +456,7 @@ impl Growth {
             ));
             // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
             let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
-            let limit = largest_period(&linear, method, substeps);
+            let limit = Stepping::held(&linear, method, substeps, false).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
             let steep =
                 around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * f64::from(turn)));

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a run that would take too many steps is shown as a prediction, and said to be one.
 
-use super::fit::{fewest, worst};
+use super::fit::{fewest_of, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
@@ -11,7 +11,6 @@ use crate::report::svg::{
     Axis, Curve, Key, Marker, Panel, Plot, Point, Unit, number, power, scientific, seconds,
 };
 use crate::report::timing::{Effort, time};
-use crate::study::fewest::StepSearch;
 
 /// The error that is to be kept \[rad\].
 const TARGET: f64 = 1e-4;
@@ -85,8 +84,8 @@ pub(super) fn make(section: &mut Section) {
 /// The run within the error with the fewest steps, found to a part of [`RESOLUTION`].
 fn cheapest(scene: &StiffScene, solver: Solver, most: u64) -> Option<StiffRun> {
     // A run is compared at the outputs: its steps are a multiple of them.
-    fewest(
-        StepSearch::new(1, most / OUTPUTS).to_part(RESOLUTION),
+    fewest_of(
+        (1, most / OUTPUTS, RESOLUTION),
         |steps| scene.run(solver, OUTPUTS * steps),
         |run| run.error <= TARGET,
     )

@@ -2,13 +2,11 @@
 //!
 //! **Invariant:** every answer has been run, and the arm hears of none.
 
-use std::time::Duration;
-
 use bytes::Bytes;
 use serde::Serialize;
 
 use super::reading::{taken, with_period};
-use super::{Present, Work};
+use super::{Present, StudyWork};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -20,9 +18,10 @@ use crate::services::arm::{SetGains, SetParams};
 use crate::services::field_by_field::FieldByField as _;
 use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::ControlLoop;
-use crate::study::gains::{GainsError, GainsRequirements, GainsSearch, SuggestedGains};
+use crate::study::gains::{self, GainsError, GainsRequirements, SuggestedGains, search_gains};
 use crate::study::linear::no_control;
-use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
+use crate::study::paused::Paused;
+use crate::study::planner::{self, Candidate, PlanError, Planned, Task, plan};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -234,53 +233,28 @@ const DEFAULT_MOVE: f64 = 4.0;
 
 // ---- gains ----------------------------------------------------------------------------------------------------------
 
-/// A search for gains on its way.
-pub enum GainsWork<const N: usize> {
-    /// Not begun.
-    Asked(Box<(SuggestGains<N>, Present<N>)>),
-    /// A search, and the timestep that the gains are for.
-    Searching(Box<GainsSearch<N>>, f64),
-}
-
-impl<const N: usize> GainsWork<N> {
-    /// The work that `ask` asks for, of an arm that is `present` so.
+impl<const N: usize> SuggestGains<N> {
+    /// The work that this asks for, of an arm that is `present` so.
     #[must_use]
-    pub fn new(ask: SuggestGains<N>, present: Present<N>) -> Self {
-        Self::Asked(Box::new((ask, present)))
-    }
-}
-
-impl<const N: usize> Work<Result<Suggested<N>, NotSuggested>> for GainsWork<N> {
-    fn most_bytes(&self) -> usize {
-        GainsSearch::<N>::MOST_BYTES
-    }
-
-    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<Suggested<N>, NotSuggested>> {
-        match self {
-            Self::Asked(asked) => match begin_search(&asked.0, &asked.1.control) {
-                Ok((search, timestep)) => {
-                    *self = Self::Searching(Box::new(search), timestep);
-                    None
-                }
-                Err(why) => Some(Err(why)),
-            },
-            Self::Searching(search, timestep) => {
-                let timestep = *timestep;
-                let found = search.advance()?;
-                Some(match found {
-                    Ok(found) => Ok(Suggested { found, timestep }),
-                    Err(why) => Err(why.into()),
-                })
-            }
+    pub fn work(self, present: Present<N>) -> StudyWork<Result<Suggested<N>, NotSuggested>> {
+        let computation = Paused::new(async move {
+            let (control, requirements) = demands(&self, &present.control)?;
+            let found = search_gains(control, requirements).await?;
+            let timestep = control.timestep;
+            Ok(Suggested { found, timestep })
+        });
+        StudyWork {
+            most_bytes: gains::most_bytes::<N>(),
+            computation,
         }
     }
 }
 
-/// Begins the search, with the present settings where the question leaves something out.
-fn begin_search<const N: usize>(
+/// The loop and the demands on its gains, with the present settings where the question leaves something out.
+fn demands<const N: usize>(
     ask: &SuggestGains<N>,
     present: &ControlLoop<N>,
-) -> Result<(GainsSearch<N>, f64), NotSuggested> {
+) -> Result<(ControlLoop<N>, GainsRequirements), ArmError> {
     let arm = match &ask.params {
         None => present.arm,
         Some(params) => params.applied_to(&present.arm)?,
@@ -296,65 +270,32 @@ fn begin_search<const N: usize>(
         settling_time: ask.settling_time.unwrap_or(DEFAULT_SETTLING),
         margin: ask.margin.unwrap_or(DEFAULT_MARGIN),
     };
-    Ok((GainsSearch::new(&control, requirements)?, control.timestep))
+    Ok((control, requirements))
 }
 
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
-/// A plan on its way.
-pub enum PlanWork<const N: usize> {
-    /// Not begun.
-    Asked(Box<(PlanRun<N>, Present<N>)>),
-    /// A planning. Under control it has the period, which is 0 where that is planned too.
-    Planning(Box<Planning<N>>, Option<f64>),
-}
-
-impl<const N: usize> PlanWork<N> {
-    /// The work that `ask` asks for, of an arm that is `present` so.
+impl<const N: usize> PlanRun<N> {
+    /// The work that this asks for, of an arm that is `present` so.
     #[must_use]
-    pub fn new(ask: PlanRun<N>, present: Present<N>) -> Self {
-        Self::Asked(Box::new((ask, present)))
-    }
-}
-
-impl<const N: usize> Work<Result<PlannedRun, NotPlanned>> for PlanWork<N> {
-    fn most_bytes(&self) -> usize {
-        Planning::<N>::MOST_BYTES
-    }
-
-    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<PlannedRun, NotPlanned>> {
-        match self {
-            Self::Asked(asked) => match begin_plan(&asked.0, &asked.1) {
-                Ok((planning, period)) => {
-                    *self = Self::Planning(Box::new(planning), period);
-                    None
-                }
-                Err(why) => Some(Err(why)),
-            },
-            Self::Planning(planning, period) => {
-                let period = *period;
-                let planned = planning.advance()?;
-                Some(planned.map_err(NotPlanned::from).and_then(|planned| {
-                    let best = *planned.best().ok_or(NotPlanned::Nothing)?;
-                    Ok(PlannedRun {
-                        best,
-                        planned,
-                        control_period: period
-                            .map(|period| if period > 0.0 { period } else { best.timestep }),
-                    })
-                }))
-            }
+    pub fn work(self, present: Present<N>) -> StudyWork<Result<PlannedRun, NotPlanned>> {
+        let computation = Paused::new(async move {
+            let task = task(&self, &present)?;
+            let planned = plan(task).await?;
+            let best = *planned.best().ok_or(NotPlanned::Nothing)?;
+            let period = task.control.period.period;
+            let period = if period > 0.0 { period } else { best.timestep };
+            Ok(PlannedRun {
+                best,
+                planned,
+                control_period: (!task.control.is_free()).then_some(period),
+            })
+        });
+        StudyWork {
+            most_bytes: planner::most_bytes::<N>(),
+            computation,
         }
     }
-}
-
-fn begin_plan<const N: usize>(
-    ask: &PlanRun<N>,
-    present: &Present<N>,
-) -> Result<(Planning<N>, Option<f64>), NotPlanned> {
-    let task = task(ask, present)?;
-    let period = (!task.control.is_free()).then_some(task.control.period.period);
-    Ok((Planning::new(task)?, period))
 }
 
 /// The run that is to be planned, with the present settings and state where the question leaves something out.

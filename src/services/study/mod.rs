@@ -11,13 +11,12 @@ mod stability;
 
 use std::time::Duration;
 
-pub use self::advice::{
-    GainsWork, NotPlanned, NotSuggested, PlanRun, PlanWork, PlannedRun, SuggestGains, Suggested,
-};
+pub use self::advice::{NotPlanned, NotSuggested, PlanRun, PlannedRun, SuggestGains, Suggested};
 pub use self::rollout::{NotRun, Ran, RolloutWork, RunOffline};
-pub use self::stability::{PredictStability, Predicted, StabilityWork};
+pub use self::stability::{PredictStability, Predicted};
 use crate::math::arm::State;
 use crate::study::control_loop::ControlLoop;
+use crate::study::paused::Paused;
 
 /// The longest number and the comma behind it, and the number itself while the answer is computed.
 pub(crate) const NUMBER_BYTES: usize = 25 + 8;
@@ -30,6 +29,22 @@ pub trait Work<T>: Send {
     /// Does a piece, which is a fraction of a slice. Returns the answer after the last one. `clock` tells what work
     /// costs: only differences mean something.
     fn advance(&mut self, clock: fn() -> Duration) -> Option<T>;
+}
+
+/// A computation of the study, which needs no clock.
+pub struct StudyWork<T> {
+    most_bytes: usize,
+    computation: Paused<T>,
+}
+
+impl<T> Work<T> for StudyWork<T> {
+    fn most_bytes(&self) -> usize {
+        self.most_bytes
+    }
+
+    fn advance(&mut self, _: fn() -> Duration) -> Option<T> {
+        self.computation.advance()
+    }
 }
 
 /// The arm's settings at one instant.

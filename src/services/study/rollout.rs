@@ -23,7 +23,10 @@ use crate::services::field_by_field::FieldByField as _;
 use crate::services::{Address, Ask, Callable, ResponseWriter, Streamed};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
-use crate::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
+use crate::study::paused::Paused;
+use crate::study::rollout::{
+    MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout,
+};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -143,12 +146,12 @@ impl<const N: usize> RolloutWriter<N> {
     }
 
     fn finish(&mut self) -> Bytes {
-        let method = self.run.known(self.run.deviation());
-        let sampling = self.run.known(self.run.from_ideal());
+        let method = self.run.known(self.run.deviation.as_ref());
+        let sampling = self.run.known(self.run.from_ideal.as_ref());
         let writer = &mut self.writer;
         writer.raw(&format!(
             "],\"evaluations\":{},\"wall_time\":",
-            self.run.evaluations()
+            self.run.evaluations
         ));
         writer.number(self.took.as_secs_f64());
         for (name, value) in [
@@ -173,7 +176,7 @@ impl<const N: usize> ResponseWriter for RolloutWriter<N> {
         if self.entry == 0 {
             self.writer.raw(head);
         }
-        let samples = self.run.times().len();
+        let samples = self.run.times.len();
         let end = samples.min(self.entry + SAMPLES_PER_LOOK);
         for entry in self.entry..end {
             if entry > 0 {
@@ -181,11 +184,11 @@ impl<const N: usize> ResponseWriter for RolloutWriter<N> {
             }
             let run = &self.run;
             match self.column {
-                0 => number(&mut self.writer, run.times().get(entry)),
-                1 => row(&mut self.writer, run.positions().get(entry)),
-                2 => row(&mut self.writer, run.velocities().get(entry)),
-                3 => row(&mut self.writer, run.efforts().get(entry)),
-                _ => number(&mut self.writer, run.energy().get(entry)),
+                0 => number(&mut self.writer, run.times.get(entry)),
+                1 => row(&mut self.writer, run.positions.get(entry)),
+                2 => row(&mut self.writer, run.velocities.get(entry)),
+                3 => row(&mut self.writer, run.efforts.get(entry)),
+                _ => number(&mut self.writer, run.energy.get(entry)),
             }
         }
         self.entry = end;
@@ -214,105 +217,75 @@ fn row<const N: usize>(writer: &mut StreamedResponse, values: Option<&[f64; N]>)
 const DEFAULT_DURATION: f64 = 10.0;
 /// Samples of a run unless it is said, if there are as many steps: enough for a smooth curve.
 const DEFAULT_SAMPLES: u64 = 1001;
-/// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
-const EVALUATIONS_PER_LOOK: u64 = 2000;
 /// Numbers in a sample of the answer beside those of the joints, and as many again for brackets and commas.
 const COLUMNS: usize = 5;
 
 /// A run on its way.
-pub enum RolloutWork<const N: usize> {
-    /// Not begun.
-    Asked(Box<(RunOffline<N>, Present<N>)>),
-    /// The run by itself.
-    Running(Box<Timed<N>>),
-    /// The run beside a reference.
-    Comparing(Box<Ran<N>>),
-    /// The run has been given away.
-    Done,
-}
-
-/// A run by itself, with the time that it took so far.
-pub struct Timed<const N: usize> {
-    ran: Ran<N>,
-    /// The run to be made again beside a reference, if that is wanted.
-    again: Option<RolloutRequest<N>>,
+pub struct RolloutWork<const N: usize> {
+    most_bytes: usize,
+    /// The run by itself; none once it is made.
+    alone: Option<Paused<Result<Rollout<N>, NotRun>>>,
+    /// The time that it took so far.
+    took: Duration,
+    /// The same run beside a reference, if that is wanted.
+    compared: Option<Paused<Result<Rollout<N>, NotRun>>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
     /// The work that `ask` asks for, of an arm that is `present` so.
     #[must_use]
-    pub fn new(ask: RunOffline<N>, present: Present<N>) -> Self {
-        Self::Asked(Box::new((ask, present)))
+    pub fn new(ask: &RunOffline<N>, present: Present<N>) -> Self {
+        let samples = usize::try_from(ask.samples.unwrap_or(DEFAULT_SAMPLES));
+        let is_compared = ask.reference.unwrap_or(false);
+        let run = |reference: bool| {
+            let ask = ask.clone();
+            Paused::new(async move {
+                let request = request(&ask, &present, reference)?;
+                Ok(rollout(request).await?)
+            })
+        };
+        Self {
+            most_bytes: samples
+                .unwrap_or(usize::MAX)
+                .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES)
+                .saturating_add(most_bytes::<N>()),
+            alone: Some(run(false)),
+            took: Duration::ZERO,
+            compared: is_compared.then(|| run(true)),
+        }
     }
 }
 
 impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
     fn most_bytes(&self) -> usize {
-        let Self::Asked(asked) = self else {
-            return 0;
-        };
-        let samples = asked.0.samples.unwrap_or(DEFAULT_SAMPLES);
-        usize::try_from(samples)
-            .unwrap_or(usize::MAX)
-            .saturating_mul((3 * N + COLUMNS) * NUMBER_BYTES)
-            .saturating_add(size_of::<Rollout<N>>())
+        self.most_bytes
     }
 
     fn advance(&mut self, clock: fn() -> Duration) -> Option<Result<Box<Ran<N>>, NotRun>> {
-        *self = match std::mem::replace(self, Self::Done) {
-            Self::Asked(asked) => match begin(&asked.0, &asked.1) {
-                Ok(timed) => Self::Running(Box::new(timed)),
-                Err(why) => return Some(Err(why)),
-            },
-            Self::Running(mut timed) => {
-                let began = clock();
-                let steps = timed.ran.run.advance(EVALUATIONS_PER_LOOK);
-                timed.ran.took += clock().saturating_sub(began);
-                let Timed { ran, again } = *timed;
-                if steps > 0 {
-                    Self::Running(Box::new(Timed { ran, again }))
-                } else if let Some(Ok(run)) = again.map(Rollout::new) {
-                    Self::Comparing(Box::new(Ran { run, ..ran }))
-                } else {
-                    return Some(Ok(Box::new(ran)));
-                }
-            }
-            Self::Comparing(mut ran) => {
-                if ran.run.advance(EVALUATIONS_PER_LOOK) == 0 {
-                    return Some(Ok(ran));
-                }
-                Self::Comparing(ran)
-            }
-            Self::Done => {
-                debug_assert!(false, "the run has been given away");
+        let run = if let Some(alone) = &mut self.alone {
+            let began = clock();
+            let run = alone.advance();
+            self.took += clock().saturating_sub(began);
+            let run = run?;
+            self.alone = None;
+            if run.is_ok() && self.compared.is_some() {
                 return None;
             }
+            run
+        } else {
+            self.compared.as_mut()?.advance()?
         };
-        None
+        let took = self.took;
+        Some(run.map(|run| Box::new(Ran { run, took })))
     }
-}
-
-/// Makes the run, which checks what concerns several fields.
-fn begin<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Timed<N>, NotRun> {
-    let request = request(ask, present)?;
-    let alone = RolloutRequest {
-        reference: false,
-        ..request
-    };
-    Ok(Timed {
-        ran: Ran {
-            run: Rollout::new(alone)?,
-            took: Duration::ZERO,
-        },
-        again: request.reference.then_some(request),
-    })
 }
 
 /// The request for the run, with the present settings where the question leaves something out.
 fn request<const N: usize>(
     ask: &RunOffline<N>,
     present: &Present<N>,
-) -> Result<RolloutRequest<N>, NotRun> {
+    reference: bool,
+) -> Result<RolloutRequest<N>, ArmError> {
     let control = &present.control;
     let arm = match &ask.params {
         None => control.arm,
@@ -336,6 +309,6 @@ fn request<const N: usize>(
         },
         duration: ask.duration.unwrap_or(DEFAULT_DURATION),
         samples: ask.samples.unwrap_or(DEFAULT_SAMPLES),
-        reference: ask.reference.unwrap_or(false),
+        reference,
     })
 }

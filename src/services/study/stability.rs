@@ -6,13 +6,11 @@
 //!
 //! **Invariant:** a limit is given only where something limits, and is 0 where no timestep is stable.
 
-use std::time::Duration;
-
 use bytes::Bytes;
 use serde::Serialize;
 
 use super::reading::{taken, with_period};
-use super::{Present, Work};
+use super::{Present, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -25,7 +23,8 @@ use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::{FREE_SECONDS, Motion};
-use crate::study::stability::{LimitSearch, Limits};
+use crate::study::paused::Paused;
+use crate::study::stability::{Limits, most_bytes, search_limits};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -150,51 +149,22 @@ impl StabilityValues {
 
 // ---- work -----------------------------------------------------------------------------------------------------------
 
-/// A prediction on its way.
-pub enum StabilityWork<const N: usize> {
-    /// Not begun.
-    Asked(Box<(PredictStability<N>, Present<N>)>),
-    /// The search, and the other parts of the answer.
-    Searching(Box<LimitSearch<N>>, ClockLimits, Motion, bool),
-}
-
-impl<const N: usize> StabilityWork<N> {
-    /// The work that `ask` asks for, of an arm that is `present` so.
+impl<const N: usize> PredictStability<N> {
+    /// The work that this asks for, of an arm that is `present` so.
     #[must_use]
-    pub fn new(ask: PredictStability<N>, present: Present<N>) -> Self {
-        Self::Asked(Box::new((ask, present)))
-    }
-}
-
-impl<const N: usize> Work<Result<Box<Predicted<N>>, ArmError>> for StabilityWork<N> {
-    fn most_bytes(&self) -> usize {
-        LimitSearch::<N>::MOST_BYTES
-    }
-
-    fn advance(&mut self, _: fn() -> Duration) -> Option<Result<Box<Predicted<N>>, ArmError>> {
-        match self {
-            Self::Asked(asked) => {
-                let (ask, present) = &**asked;
-                match control_loop(ask, &present.control) {
-                    Ok(control) => {
-                        let search = LimitSearch::new(&control);
-                        let motion = Motion::ahead(&control, &present.state);
-                        let (clocks, is_free) = (clock_limits(&control), control.is_free());
-                        *self = Self::Searching(Box::new(search), clocks, motion, is_free);
-                        None
-                    }
-                    Err(why) => Some(Err(why)),
-                }
-            }
-            Self::Searching(search, clocks, motion, is_free) => {
-                let limits = search.advance()?;
-                Some(Ok(Box::new(Predicted {
-                    limits,
-                    clocks: *clocks,
-                    motion: *motion,
-                    is_free: *is_free,
-                })))
-            }
+    pub fn work(self, present: Present<N>) -> StudyWork<Result<Box<Predicted<N>>, ArmError>> {
+        let computation = Paused::new(async move {
+            let control = control_loop(&self, &present.control)?;
+            Ok(Box::new(Predicted {
+                motion: Motion::ahead(&control, &present.state),
+                clocks: clock_limits(&control),
+                is_free: control.is_free(),
+                limits: search_limits(control).await,
+            }))
+        });
+        StudyWork {
+            most_bytes: most_bytes::<N>(),
+            computation,
         }
     }
 }

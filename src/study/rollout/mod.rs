@@ -10,8 +10,7 @@
 //! that grows. Two may come near each other by chance; four hardly do, so that `SPREAD` times the largest distance
 //! between any two of them holds the truth.
 //!
-//! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
-//! as one made at once.
+//! **Invariant:** steps, samples and work are bounded when a run is made.
 
 #![allow(
     clippy::indexing_slicing,
@@ -24,7 +23,9 @@ mod request;
 pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
 
 use self::ideal::Ideal;
+use super::control_loop::ControlLoop;
 use super::matrix::largest;
+use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
@@ -75,242 +76,133 @@ impl Deviation {
     }
 }
 
-/// A run in progress, with its samples so far.
-#[derive(Debug, Clone)]
+/// A run with its samples. It ends early where a step led out of the finite numbers.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rollout<const N: usize> {
-    simulation: Simulation<N>,
-    steps: u64,
-    samples: u64,
-    references: Option<[Reference<N>; REFERENCES]>,
-    /// The loop whose law acts at every instant, twice: in longer and in shorter steps.
-    ideals: Option<[Ideal<N>; 2]>,
-    times: Vec<f64>,
-    positions: Vec<[f64; N]>,
-    velocities: Vec<[f64; N]>,
-    efforts: Vec<[f64; N]>,
-    energy: Vec<f64>,
-    deviation: Deviation,
-    from_ideal: Deviation,
+    /// Times of the samples \[s\].
+    pub times: Vec<f64>,
+    /// Joint positions of the samples \[rad\].
+    pub positions: Vec<[f64; N]>,
+    /// Joint velocities of the samples \[rad/s\].
+    pub velocities: Vec<[f64; N]>,
+    /// Efforts of the steps that led to the samples \[N m\]; zeros at the start.
+    pub efforts: Vec<[f64; N]>,
+    /// Kinetic plus potential energy of the samples \[J\].
+    pub energy: Vec<f64>,
+    /// Steps made.
+    pub steps: u64,
+    /// How often the run itself, without its references, has evaluated the dynamics.
+    pub evaluations: u64,
+    /// Errors against the reference, if one was asked for.
+    pub deviation: Option<Deviation>,
+    /// Errors of the method, and of holding the effort, against the loop whose law acts at every instant. There are
+    /// some if there is a law and a reference was asked for.
+    pub from_ideal: Option<Deviation>,
+    /// The place at which a step led out of the finite numbers, if one did.
+    pub divergence: Option<Divergence>,
+}
+
+/// The most memory that [`rollout`] takes beside its samples, in bytes.
+#[must_use]
+pub const fn most_bytes<const N: usize>() -> usize {
+    size_of::<[Reference<N>; REFERENCES]>() + size_of::<[Ideal<N>; 2]>()
+}
+
+/// Makes a run, in pieces; its start is its first sample.
+///
+/// # Errors
+/// The first value of the request that is out of bounds.
+pub async fn rollout<const N: usize>(
+    request: RolloutRequest<N>,
+) -> Result<Rollout<N>, RolloutError> {
+    let RolloutRequest { control, start, .. } = request;
+    let steps = request.steps()?;
+    let samples = request.samples.min(steps + 1);
+    let intervals = samples.saturating_sub(1).max(1);
+    let mut run = control.simulation(start);
+    // On the heap, so that a run that has not begun takes no room for them.
+    let references = |index| Reference::new(&control, start, index);
+    let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
+        .reference
+        .then(|| Box::new(std::array::from_fn(references)));
+    let mut ideals = (request.reference && !control.is_free())
+        .then(|| [1, 2].map(|cuts| Ideal::new(&control, start, cuts)));
+    let mut made = Rollout {
+        deviation: references.as_ref().map(|_| Deviation::default()),
+        from_ideal: ideals.as_ref().map(|_| Deviation::default()),
+        ..Rollout::default()
+    };
+    let mut piece = PieceWork::default();
+    let evaluations = u64::from(control.method.evaluations());
+    for index in 0..samples {
+        // The step nearest to the sample's place, of places that are spread evenly; at most 1e5 times 1e7.
+        let due = (2 * index * steps + intervals) / (2 * intervals);
+        while run.steps() < due && run.divergence().is_none() {
+            let ahead = due - run.steps();
+            let taken = run.advance(ahead.min(stride(&request)));
+            piece.spend(taken * evaluations).await;
+            for reference in references.as_deref_mut().into_iter().flatten() {
+                reference.follow(taken, &mut piece).await;
+            }
+            for ideal in ideals.iter_mut().flatten() {
+                ideal.follow(taken, &mut piece).await;
+            }
+        }
+        if run.divergence().is_some() {
+            break;
+        }
+        made.sample(&run, references.as_deref(), ideals.as_ref());
+    }
+    made.steps = run.steps();
+    made.evaluations = run.steps() * evaluations;
+    made.divergence = run.divergence();
+    Ok(made)
+}
+
+/// Steps that are made in one go: one if references have to look at every step, else those of [`MAX_SPAN`] at most, so
+/// that a reference is not asked for longer spans, and a piece is short.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "bounded below by 1 and above by 1000"
+)]
+fn stride<const N: usize>(request: &RolloutRequest<N>) -> u64 {
+    if request.reference && !request.control.is_free() {
+        1
+    } else {
+        (MAX_SPAN / request.control.timestep).clamp(1.0, 1000.0) as u64
+    }
 }
 
 impl<const N: usize> Rollout<N> {
-    /// A run that is about to make its first step; the start is its first sample.
-    ///
-    /// # Errors
-    /// The first value that is out of bounds.
-    pub fn new(request: RolloutRequest<N>) -> Result<Self, RolloutError> {
-        let steps = request.check()?;
-        let simulation = request.control.simulation(request.start);
-        let references = request.reference.then(|| {
-            std::array::from_fn(|index| Reference {
-                arm: neighbour(&request.control.arm, index),
-                taylor: TaylorReference::new(request.start).cut(if index == 1 { 2 } else { 1 }),
-                pid: simulation.pid().clone(),
-                hold: Hold::new(
-                    Held {
-                        period: request.control.period,
-                        ..Held::default()
-                    },
-                    request.control.timestep,
-                ),
-                lost: false,
-                behind: 0,
-                stretch: 0.0,
-                begun: false,
-                effort: [0.0; N],
-            })
-        });
-        let mut rollout = Self {
-            simulation,
-            steps,
-            samples: request.samples.min(steps + 1),
-            references,
-            ideals: (request.reference && !request.control.is_free())
-                .then(|| [1, 2].map(|cuts| Ideal::new(&request.control, request.start, cuts))),
-            times: vec![],
-            positions: vec![],
-            velocities: vec![],
-            efforts: vec![],
-            energy: vec![],
-            deviation: Deviation::default(),
-            from_ideal: Deviation::default(),
-        };
-        rollout.sample();
-        Ok(rollout)
-    }
-
-    /// Goes on until about `work` evaluations of the dynamics are made; a coefficient of a reference counts as one.
-    /// Returns how many they were: 0 once the run is over.
-    pub fn advance(&mut self, work: u64) -> u64 {
-        let before = self.all_evaluations();
-        let bound = before.saturating_add(work.max(1));
-        while !self.is_over() {
-            if !self.is_behind() {
-                // The run goes to the next sample, or, if a reference has to look at every step, so far that the work
-                // stays in bounds.
-                let ahead = self.next_sample().saturating_sub(self.simulation.steps());
-                let wanted = ahead.min(self.stride()).max(1);
-                let taken = self.simulation.advance(wanted);
-                let timestep = self.simulation.timestep();
-                for reference in self.references.iter_mut().flatten() {
-                    reference.fall_behind(timestep, taken);
-                }
-                for ideal in self.ideals.iter_mut().flatten() {
-                    ideal.fall_behind(taken);
-                }
-            }
-            let mut left = bound.saturating_sub(self.all_evaluations());
-            for reference in self.references.iter_mut().flatten() {
-                left = left.saturating_sub(reference.follow(left));
-            }
-            for ideal in self.ideals.iter_mut().flatten() {
-                left = left.saturating_sub(ideal.follow(left));
-            }
-            let at_sample = self.simulation.steps() == self.next_sample();
-            if at_sample && !self.is_behind() && self.simulation.divergence().is_none() {
-                self.sample();
-            }
-            if self.all_evaluations() >= bound {
-                break;
-            }
-        }
-        self.all_evaluations() - before
-    }
-
-    /// Whether a reference has not come to where the run is.
-    fn is_behind(&self) -> bool {
-        let mut references = self.references.iter().flatten();
-        references.any(|one| one.behind > 0) || self.ideals.iter().flatten().any(Ideal::is_behind)
-    }
-
-    /// Steps that are made in one go: a reference without control is asked for spans of [`MAX_SPAN`] at most, and
-    /// nothing runs for longer than a slice may last. It depends on the request
-    /// alone, so that slices don't change bits.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "bounded below by 1 and above by 1000"
-    )]
-    fn stride(&self) -> u64 {
-        if self.references.is_some() && self.simulation.pid().is_enabled() {
-            1
-        } else {
-            (MAX_SPAN / self.simulation.timestep()).clamp(1.0, 1000.0) as u64
-        }
-    }
-
-    /// The step at which the next sample is due: the one nearest to its place. The places are spread evenly, start and
-    /// end among them.
-    fn next_sample(&self) -> u64 {
-        let index = self.times.len() as u64;
-        let intervals = self.samples.saturating_sub(1).max(1);
-        // At most 1e5 times 1e7.
-        (2 * index * self.steps + intervals) / (2 * intervals)
-    }
-
-    fn sample(&mut self) {
-        let state = *self.simulation.state();
-        self.times.push(self.simulation.time());
+    fn sample(
+        &mut self,
+        run: &Simulation<N>,
+        references: Option<&[Reference<N>; REFERENCES]>,
+        ideals: Option<&[Ideal<N>; 2]>,
+    ) {
+        let state = run.state();
+        self.times.push(run.time());
         self.positions.push(state.position);
         self.velocities.push(state.velocity);
-        self.efforts.push(*self.simulation.effort());
-        self.energy.push(energy(self.simulation.arm(), &state));
-        let last_digit = last_digit(&state);
-        if let Some(references) = &self.references
-            && references.iter().all(|one| !one.lost)
+        self.efforts.push(*run.effort());
+        self.energy.push(energy(run.arm(), state));
+        let last_digit = last_digit(state);
+        if let (Some(deviation), Some(references)) = (&mut self.deviation, references)
+            && references.iter().all(|one| !one.is_lost)
         {
             let states = references.each_ref().map(|one| one.taylor.state());
             let spread = SPREAD * largest_distance(&states);
-            self.deviation.errors.push(apart(&state, states[0]));
-            self.deviation.uncertainties.push(spread.max(last_digit));
+            deviation.errors.push(apart(state, states[0]));
+            deviation.uncertainties.push(spread.max(last_digit));
         }
-        if let Some([first, second]) = &self.ideals
+        if let (Some(deviation), Some([first, second])) = (&mut self.from_ideal, ideals)
             && let (Some(first), Some(second)) = (first.state(), second.state())
         {
             let uncertainty = apart(first, second).max(last_digit);
-            self.from_ideal.errors.push(apart(&state, second));
-            self.from_ideal.uncertainties.push(uncertainty);
+            deviation.errors.push(apart(state, second));
+            deviation.uncertainties.push(uncertainty);
         }
-    }
-
-    /// Whether all steps are made, or the run has diverged, and the references have come as far.
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        let is_last = self.simulation.steps() >= self.steps;
-        (is_last || self.simulation.divergence().is_some()) && !self.is_behind()
-    }
-
-    /// Steps made.
-    #[must_use]
-    pub fn done(&self) -> u64 {
-        self.simulation.steps()
-    }
-
-    /// Steps of the whole run.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// How often the run itself, without its references, has evaluated the dynamics.
-    #[must_use]
-    pub fn evaluations(&self) -> u64 {
-        self.simulation.steps() * u64::from(self.simulation.method().evaluations())
-    }
-
-    fn all_evaluations(&self) -> u64 {
-        let references = self.references.iter().flatten();
-        self.evaluations()
-            + references.map(|one| one.taylor.coefficients()).sum::<u64>()
-            + self
-                .ideals
-                .iter()
-                .flatten()
-                .map(Ideal::evaluations)
-                .sum::<u64>()
-    }
-
-    /// Times of the samples \[s\].
-    #[must_use]
-    pub fn times(&self) -> &[f64] {
-        &self.times
-    }
-
-    /// Joint positions of the samples \[rad\].
-    #[must_use]
-    pub fn positions(&self) -> &[[f64; N]] {
-        &self.positions
-    }
-
-    /// Joint velocities of the samples \[rad/s\].
-    #[must_use]
-    pub fn velocities(&self) -> &[[f64; N]] {
-        &self.velocities
-    }
-
-    /// Efforts of the steps that led to the samples \[N m\]; zeros at the start.
-    #[must_use]
-    pub fn efforts(&self) -> &[[f64; N]] {
-        &self.efforts
-    }
-
-    /// Kinetic plus potential energy of the samples \[J\].
-    #[must_use]
-    pub fn energy(&self) -> &[f64] {
-        &self.energy
-    }
-
-    /// Errors against the reference, if one was asked for.
-    #[must_use]
-    pub fn deviation(&self) -> Option<&Deviation> {
-        self.references.as_ref().map(|_| &self.deviation)
-    }
-
-    /// Errors of the method, and of holding the effort, against the loop whose law acts at every instant. There are
-    /// some if there is a law and a reference was asked for.
-    #[must_use]
-    pub fn from_ideal(&self) -> Option<&Deviation> {
-        self.ideals.as_ref().map(|_| &self.from_ideal)
     }
 
     /// The largest error of a deviation of this run and its uncertainty \[rad\], where they are known for all samples.
@@ -323,75 +215,60 @@ impl<const N: usize> Rollout<N> {
             whole.map(Deviation::largest_uncertainty),
         )
     }
-
-    /// The place at which a step led out of the finite numbers, if one did; the samples end before.
-    #[must_use]
-    pub fn divergence(&self) -> Option<Divergence> {
-        self.simulation.divergence()
-    }
 }
 
 /// The motion that the run ought to have.
-#[derive(Debug, Clone)]
 struct Reference<const N: usize> {
     arm: Arm<N>,
     taylor: TaylorReference<N>,
     pid: Pid<N>,
     hold: Hold<N>,
+    /// Length of a step of the run \[s\].
+    timestep: f64,
     /// Whether the motion was too wild to be followed.
-    lost: bool,
-    /// Stretches that are left to come to where the run is, each under one effort: steps under control, or all of them
-    /// at once.
-    behind: u64,
-    /// Length of each \[s\].
-    stretch: f64,
-    /// Whether the stretch is being followed.
-    begun: bool,
-    /// The effort that drives the arm in it \[N m\].
-    effort: [f64; N],
+    is_lost: bool,
 }
 
 impl<const N: usize> Reference<N> {
-    /// Notes that the run has gone on by `steps` steps of `timestep` \[s\]: one at a time if there is a law to obey,
-    /// else all at once.
-    fn fall_behind(&mut self, timestep: f64, steps: u64) {
-        if self.lost || steps == 0 {
-            return;
-        }
-        (self.behind, self.stretch) = if self.pid.is_enabled() {
-            (steps, timestep)
-        } else {
-            (1, in_f64(steps) * timestep)
+    fn new(control: &ControlLoop<N>, start: State<N>, index: usize) -> Self {
+        let held = Held {
+            period: control.period,
+            ..Held::default()
         };
+        Self {
+            arm: neighbour(&control.arm, index),
+            taylor: TaylorReference::new(start).cut(if index == 1 { 2 } else { 1 }),
+            pid: control.simulation(start).pid().clone(),
+            hold: Hold::new(held, control.timestep),
+            timestep: control.timestep,
+            is_lost: false,
+        }
     }
 
-    /// Follows the run with about `work` coefficients at most, and says with how many.
-    fn follow(&mut self, work: u64) -> u64 {
-        let before = self.taylor.coefficients();
-        let bound = before.saturating_add(work);
-        while self.behind > 0 {
-            if !self.begun {
-                if self.pid.is_enabled() {
-                    let state = self.taylor.state();
-                    let (control, held) = self.hold.begin_step(&self.pid, state);
-                    self.effort = control.effort;
-                    self.pid.commit(control.integral);
-                    self.hold.commit(held);
-                }
-                self.taylor.begin(self.stretch);
-                self.begun = true;
+    /// Goes on by so many steps of the run: one after the other if there is a law to obey, else all at once.
+    async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
+        let has_law = self.pid.is_enabled();
+        let (stretches, stretch) = if has_law || steps == 0 {
+            (steps, self.timestep)
+        } else {
+            (1, in_f64(steps) * self.timestep)
+        };
+        for _ in 0..stretches {
+            if self.is_lost {
+                return;
             }
-            match self.taylor.go_on(&self.arm, &self.effort, bound) {
-                None => break,
-                Some(false) => {
-                    self.lost = true;
-                    self.behind = 0;
-                }
-                Some(true) => self.behind -= 1,
+            let mut effort = [0.0; N];
+            if has_law {
+                let (control, held) = self.hold.begin_step(&self.pid, self.taylor.state());
+                effort = control.effort;
+                self.pid.commit(control.integral);
+                self.hold.commit(held);
             }
-            self.begun = false;
+            let followed = self
+                .taylor
+                .follow_in_pieces(&self.arm, &effort, stretch, piece);
+            self.is_lost = !followed.await;
         }
-        self.taylor.coefficients() - before
     }
 }
 

@@ -95,7 +95,7 @@ impl<const N: usize> RolloutRequest<N> {
         clippy::cast_sign_loss,
         reason = "the quotient is checked to lie between 1 and MAX_STEPS"
     )]
-    pub(super) fn check(&self) -> Result<u64, RolloutError> {
+    pub fn steps(&self) -> Result<u64, RolloutError> {
         let ControlLoop {
             gains: Gains { kp, ki, kd },
             setpoint,

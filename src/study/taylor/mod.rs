@@ -14,6 +14,7 @@
 pub(crate) mod series;
 
 use super::matrix::largest;
+use super::paused::{PieceWork, at_once};
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::dynamics::forward_dynamics;
@@ -138,8 +139,6 @@ struct Ahead {
     span: f64,
     /// How much of it is left \[s\], and what rounding took from that.
     rest: (f64, f64),
-    /// Coefficients after which it is given up.
-    bound: u64,
 }
 
 impl<T: Precision, const N: usize> Taylor<T, N> {
@@ -169,7 +168,6 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         self.ahead = Ahead {
             span,
             rest: (span, 0.0),
-            bound: self.coefficients.saturating_add(MAX_COEFFICIENTS),
         };
     }
 
@@ -180,7 +178,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
 
     /// Goes on with the span by a step.
     pub(crate) fn step(&mut self, arm: &Arm<N>, drive: &impl Drive<T, N>) {
-        let Ahead { span, rest, .. } = self.ahead;
+        let Ahead { span, rest } = self.ahead;
         let whole = (span / self.cuts).min(rest.0);
         let (position, velocity) = (self.position, self.velocity);
         let effort = drive.efforts(&position, &velocity);
@@ -348,34 +346,29 @@ impl<const N: usize> TaylorReference<N> {
     /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere
     /// on the way.
     pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
-        self.begin(span);
-        self.go_on(arm, effort, u64::MAX).unwrap_or(false)
+        at_once(self.follow_in_pieces(arm, effort, span, &mut PieceWork::default()))
     }
 
-    /// Begins a span \[s\], to be followed by [`TaylorReference::go_on`].
-    pub(super) fn begin(&mut self, span: f64) {
-        self.taylor.begin(span);
-    }
-
-    /// Continues the span until it has computed `coefficients` in all, or a few more. `None` while it is not over,
-    /// `false` if the motion could not be followed.
-    pub(super) fn go_on(
+    /// Does what [`TaylorReference::follow`] does, in pieces.
+    pub(super) async fn follow_in_pieces(
         &mut self,
         arm: &Arm<N>,
         effort: &[f64; N],
-        coefficients: u64,
-    ) -> Option<bool> {
+        span: f64,
+        piece: &mut PieceWork,
+    ) -> bool {
+        let bound = self.coefficients().saturating_add(MAX_COEFFICIENTS);
+        self.taylor.begin(span);
         while self.taylor.rest().0 > 0.0 {
-            if self.coefficients() > self.taylor.ahead.bound || !self.state.is_finite() {
-                return Some(false);
+            if self.coefficients() > bound || !self.state.is_finite() {
+                return false;
             }
-            if self.coefficients() >= coefficients {
-                return None;
-            }
+            let before = self.coefficients();
             self.taylor.step(arm, effort);
             self.state.position = self.taylor.position;
             self.state.velocity = self.taylor.velocity;
+            piece.spend(self.coefficients() - before).await;
         }
-        Some(self.state.is_finite())
+        self.state.is_finite()
     }
 }

@@ -130,12 +130,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
             settling_time: 4.0,
             margin: 1.25,
         };
-        let mut search = GainsSearch::new(&control, requirements).unwrap();
-        let found = loop {
-            if let Some(found) = search.advance() {
-                break found.unwrap();
-            }
-        };
+        let found = at_once(search_gains(control, requirements)).unwrap();
         let suggested = bench.ask(SuggestGains::default()).await.unwrap();
         assert_eq!(suggested.found, found);
         assert_eq!(suggested.timestep, control.timestep);
@@ -148,12 +143,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
             duration: 4.0,
             error: 0.05,
         };
-        let mut planning = Planning::new(task).unwrap();
-        let planned = loop {
-            if let Some(planned) = planning.advance() {
-                break planned.unwrap();
-            }
-        };
+        let planned = at_once(plan(task)).unwrap();
         let run = bench.ask(plan_with(0.05)).await.unwrap();
         assert_eq!(run.planned, planned);
         assert_eq!(run.control_period, Some(run.best.timestep));

@@ -75,10 +75,10 @@ fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
         live.set_method(Method::Midpoint);
         live.set_timestep(0.002);
         live.advance(5000);
-        assert_eq!(run.times().len(), 1001);
-        assert_eq!(run.times()[1000], live.time());
-        assert_eq!(run.positions()[1000], live.state().position);
-        assert_eq!(run.positions()[0], [0.0; 3]);
-        assert_eq!(run.evaluations(), 10_000);
+        assert_eq!(run.times.len(), 1001);
+        assert_eq!(run.times[1000], live.time());
+        assert_eq!(run.positions[1000], live.state().position);
+        assert_eq!(run.positions[0], [0.0; 3]);
+        assert_eq!(run.evaluations, 10_000);
     });
 }

@@ -81,13 +81,8 @@ fn a_message_that_does_not_end_is_given_up_after_a_minute() {
     });
 }
 
-<<<<<<< HEAD
-/// In the first case one read brings a message, a ping, and the first bytes of a message that does not end. In the
-/// second case a message comes alone, in parts. After it the client may be silent.
-=======
-/// One read brings a message, a ping, and the first bytes of the message that does not end: the minute begins with the
-/// next byte. Or it brings a message alone, in parts, after which the client may be silent.
->>>>>>> runtime
+/// In the first case one read brings a message, a ping, and the first bytes of a message that does not end: its minute
+/// begins with the next byte. In the second case a message comes alone, in parts. After it the client may be silent.
 #[test]
 fn a_message_that_begins_behind_another_has_its_minute_too() {
     in_virtual_time(async {

@@ -6,7 +6,8 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::gains::{GainsError, GainsRequirements, GainsSearch, MOVES, SETTLED};
+use pendularm::study::gains::{GainsError, GainsRequirements, MOVES, SETTLED, search_gains};
+use pendularm::study::paused::at_once;
 use pendularm::study::stability::limits;
 
 use super::{Dice, Tally, cases, property, run, tells};
@@ -25,9 +26,7 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
         settling_time: 4.0,
         margin: 1.0 + dice.0.f64(),
     };
-    let mut search = GainsSearch::new(&free, requirements).unwrap();
-    let answer = std::iter::repeat_with(|| search.advance()).find_map(|answer| answer);
-    let Some(Ok(found)) = answer else {
+    let Ok(found) = at_once(search_gains(free, requirements)) else {
         tally.open += 1;
         return;
     };
@@ -66,11 +65,7 @@ fn gains_for_random_arms_hold_on_other_moves() {
 }
 
 fn refusal(control: &ControlLoop<2>, requirements: GainsRequirements) -> GainsError {
-    let searched = GainsSearch::new(control, requirements).and_then(|mut search| {
-        let mut answers = std::iter::repeat_with(|| search.advance());
-        answers.find_map(|answer| answer).unwrap()
-    });
-    searched.unwrap_err()
+    at_once(search_gains(*control, requirements)).unwrap_err()
 }
 
 #[test]

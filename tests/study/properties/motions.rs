@@ -8,8 +8,9 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::planner::{Planning, Task};
-use pendularm::study::rollout::{Rollout, RolloutRequest};
+use pendularm::study::paused::at_once;
+use pendularm::study::planner::{Task, plan};
+use pendularm::study::rollout::{RolloutRequest, rollout};
 
 use super::{Dice, Tally, cases, property, run, tells};
 
@@ -35,9 +36,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         duration,
         error,
     };
-    let mut planning = Planning::new(task).unwrap();
-    let planned = std::iter::repeat_with(|| planning.advance()).find_map(|planned| planned);
-    let Some(Ok(planned)) = planned else {
+    let Ok(planned) = at_once(plan(task)) else {
         tally.open += 1;
         return;
     };
@@ -75,21 +74,20 @@ fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Ta
         samples: 5,
         reference: true,
     };
-    let mut rollout = Rollout::new(request).unwrap();
-    while rollout.advance(u64::MAX) > 0 {}
-    let (Some(error), Some(uncertainty)) = rollout.known(rollout.deviation()) else {
+    let made = at_once(rollout(request)).unwrap();
+    let (Some(error), Some(uncertainty)) = made.known(made.deviation.as_ref()) else {
         tally.open += 1;
         return;
     };
     let mut before = 0.0;
-    let times = &rollout.times()[1..];
+    let times = &made.times[1..];
     let intervals: Vec<f64> = times
         .iter()
         .map(|time| time - std::mem::replace(&mut before, *time))
         .collect();
     let truth = ReferenceMotion::between(&arm, &start, &Law::FREE, &intervals);
     let off = (0..truth.samples.len()).map(|index| {
-        let position = &rollout.positions()[index + 1];
+        let position = &made.positions[index + 1];
         truth.angle_error(index, position).unwrap()
     });
     let off = off.fold(0.0, f64::max);

@@ -12,9 +12,7 @@ use pendularm::services::arm::{
     Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
-use pendularm::services::study::{
-    GainsWork, PlanRun, PlanWork, PredictStability, RunOffline, StabilityWork, SuggestGains, Work,
-};
+use pendularm::services::study::{PlanRun, PredictStability, RunOffline, SuggestGains, Work};
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
 use pendularm::services::{Address, Answered, Callable, NoService};
 
@@ -77,12 +75,17 @@ impl<const N: usize> Kernel<N> {
                 self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
             }
             Service::Stability => {
-                self.compute_short::<PredictStability<N>, _>(own, &args, to, StabilityWork::new);
+                self.compute_short::<PredictStability<N>, _>(
+                    own,
+                    &args,
+                    to,
+                    PredictStability::work,
+                );
             }
             Service::SuggestGains => {
-                self.compute_short::<SuggestGains<N>, _>(own, &args, to, GainsWork::new);
+                self.compute_short::<SuggestGains<N>, _>(own, &args, to, SuggestGains::work);
             }
-            Service::Plan => self.compute_short::<PlanRun<N>, _>(own, &args, to, PlanWork::new),
+            Service::Plan => self.compute_short::<PlanRun<N>, _>(own, &args, to, PlanRun::work),
             Service::Rollout => match RunOffline::<N>::read(own, &args) {
                 Ok(ask) => {
                     let work = Repeated::new(ask, self.arm.present());

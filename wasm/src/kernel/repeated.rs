@@ -24,14 +24,13 @@ pub(super) struct Repeated<const N: usize> {
 
 impl<const N: usize> Repeated<N> {
     pub(super) fn new(ask: RunOffline<N>, present: Present<N>) -> Self {
-        let alone = RunOffline {
-            reference: None,
-            ..ask.clone()
-        };
         Self {
-            alone,
+            work: RolloutWork::new(&ask, present),
+            alone: RunOffline {
+                reference: None,
+                ..ask
+            },
             present,
-            work: RolloutWork::new(ask, present),
             first: None,
             took: Duration::ZERO,
             runs: 0,
@@ -52,13 +51,13 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for Repeated<N> {
         self.took += ran.took;
         self.runs += 1;
         let mut first = self.first.take().unwrap_or(ran);
-        let evaluations = u64::from(self.runs).saturating_mul(first.run.evaluations());
+        let evaluations = u64::from(self.runs).saturating_mul(first.run.evaluations);
         if self.took >= LEAST_MEASURED || evaluations >= MOST_EVALUATIONS {
             first.took = self.took / self.runs;
             return Some(Ok(first));
         }
         self.first = Some(first);
-        self.work = RolloutWork::new(self.alone.clone(), self.present);
+        self.work = RolloutWork::new(&self.alone, self.present);
         None
     }
 }

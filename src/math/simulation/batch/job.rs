@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** an arm is written back once, when its last step is taken or its result is not finite.
 
-use std::ops::ControlFlow;
-
 use crate::math::arm::State;
 use crate::math::count::partition_point;
 use crate::math::integrator::Method;
@@ -50,9 +48,6 @@ impl StepKind {
     }
 }
 
-/// Sees the states that an arm's steps lead to, and may end them there.
-pub(super) type Observer<'a, const N: usize> = Box<dyn FnMut(&State<N>) -> ControlFlow<()> + 'a>;
-
 /// An arm on its way.
 pub(super) struct BatchJob<'a, const N: usize> {
     pub(super) arm: &'a mut Simulation<N>,
@@ -63,7 +58,6 @@ pub(super) struct BatchJob<'a, const N: usize> {
     pushes: u64,
     /// The control period that it is in, where that may have several steps.
     period: Option<HeldSteps<N>>,
-    observer: Option<Observer<'a, N>>,
 }
 
 /// A control period, or the rest of one, in which the effort is given.
@@ -82,11 +76,7 @@ struct HeldSteps<const N: usize> {
 
 impl<'a, const N: usize> BatchJob<'a, N> {
     /// An arm, and how many steps it is to take: at least one.
-    pub(super) fn new(
-        arm: &'a mut Simulation<N>,
-        steps: u64,
-        observer: Option<Observer<'a, N>>,
-    ) -> Self {
+    pub(super) fn new(arm: &'a mut Simulation<N>, steps: u64) -> Self {
         let pushes = pushes(arm, steps);
         Self {
             arm,
@@ -94,7 +84,6 @@ impl<'a, const N: usize> BatchJob<'a, N> {
             left: steps,
             pushes,
             period: None,
-            observer,
         }
     }
 
@@ -143,10 +132,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
 
     /// Takes the steps alone, in no lane.
     pub(super) fn alone(self) {
-        match self.observer {
-            Some(mut observe) => self.arm.advance_with(self.left, |arm| observe(arm.state())),
-            None => self.arm.advance(self.left),
-        };
+        self.arm.advance(self.left);
     }
 
     /// How many steps it still has to take at most.
@@ -154,11 +140,8 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         self.left
     }
 
-    /// How many steps can be taken before it is looked at: each, or until the disturbance ends or all are taken.
+    /// How many steps can be taken before it is looked at: until the disturbance ends or all are taken.
     pub(super) fn until_look(&self) -> u64 {
-        if self.observer.is_some() {
-            return 1;
-        }
         let pushed = if self.is_pushed() {
             self.pushes - self.taken
         } else {
@@ -182,15 +165,6 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         self.taken += steps;
         self.left -= steps;
         was_pushed && !self.is_pushed()
-    }
-
-    /// Whether no more steps are to be taken from `state` on.
-    pub(super) fn is_done(&mut self, state: impl FnOnce() -> State<N>) -> bool {
-        let ended = match &mut self.observer {
-            Some(observe) => observe(&state()).is_break(),
-            None => false,
-        };
-        ended || self.left == 0
     }
 
     /// Notes the steps that were taken on the arm, and whether the next one was tried and not taken.

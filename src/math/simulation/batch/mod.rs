@@ -15,14 +15,12 @@ mod lanes;
 mod runner;
 
 use std::cmp::Reverse;
-use std::ops::ControlFlow;
 
 use fearless_simd::dispatch;
 
-use self::job::{BatchJob, Observer, StepKind};
+use self::job::{BatchJob, StepKind};
 use self::runner::BatchRunner;
 use super::Simulation;
-use crate::math::arm::State;
 use crate::math::number::Registers;
 
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
@@ -37,30 +35,9 @@ impl Registers {
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>,
     ) {
-        self.take_all(arms.into_iter().map(|(arm, steps)| (arm, steps, None)));
-    }
-
-    /// Does [`advance_with`] in these registers.
-    pub fn advance_with<'a, const N: usize, O>(
-        self,
-        arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64, O)>,
-    ) where
-        O: FnMut(&State<N>) -> ControlFlow<()> + 'a,
-    {
-        let observed = |(arm, steps, observe): (_, _, O)| {
-            let observer: Observer<'a, N> = Box::new(observe);
-            (arm, steps, Some(observer))
-        };
-        self.take_all(arms.into_iter().map(observed));
-    }
-
-    fn take_all<'a, const N: usize>(
-        self,
-        arms: impl Iterator<Item = (&'a mut Simulation<N>, u64, Option<Observer<'a, N>>)>,
-    ) {
         let mut waiting: [Vec<BatchJob<'a, N>>; StepKind::COUNT] =
             std::array::from_fn(|_| Vec::new());
-        for (arm, steps, observer) in arms {
+        for (arm, steps) in arms {
             if steps == 0 || arm.divergence.is_some() {
                 continue;
             }
@@ -68,7 +45,7 @@ impl Registers {
             let kind = StepKind::of(arm);
             // A lane has no clock.
             let alone = evaluations < WORTH_A_LANE || arm.steps_with_time(steps) < steps;
-            let job = BatchJob::new(arm, steps, observer);
+            let job = BatchJob::new(arm, steps);
             if alone {
                 job.alone();
                 continue;
@@ -110,29 +87,4 @@ impl Registers {
 /// ```
 pub fn advance<'a, const N: usize>(arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>) {
     Registers::widest().advance(arms);
-}
-
-/// Does what [`advance`] does, and shows each arm's own observer the state after every step. The observer may end its
-/// arm's advance there, as in [`Simulation::advance_with`].
-///
-/// ```
-/// use std::ops::ControlFlow;
-/// use pendularm::math::{arm::{Arm, State}, pid::Gains, simulation::{Simulation, batch}};
-///
-/// let mut arms = vec![Simulation::<2>::new(Arm::default(), Gains::default()); 100];
-/// let mut lowest = vec![0.0_f64; 100];
-/// batch::advance_with(arms.iter_mut().zip(&mut lowest).map(|(arm, lowest)| {
-///     (arm, 1000, move |state: &State<2>| {
-///         *lowest = lowest.min(state.position[0]);
-///         if *lowest < -1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-///     })
-/// }));
-/// assert!(arms.iter().all(|arm| arm.steps() < 1000));
-/// ```
-pub fn advance_with<'a, const N: usize, O>(
-    arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64, O)>,
-) where
-    O: FnMut(&State<N>) -> ControlFlow<()> + 'a,
-{
-    Registers::widest().advance_with(arms);
 }

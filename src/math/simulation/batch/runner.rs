@@ -96,14 +96,14 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
         }
     }
 
-    /// Counts the steps, shows where they led to, has arms leave that are done, and gives their lanes to the next.
+    /// Counts the steps, has arms leave that are done, and gives their lanes to the next.
     fn look(&mut self, steps: u64) {
         let chunks = self.jobs.chunks_mut(Wide::<S, K>::LANES);
         for (lanes, jobs) in self.pairs.iter_mut().zip(chunks) {
             for (lane, place) in jobs.iter_mut().enumerate() {
                 if let Some(job) = place {
                     let push_ends = job.count(steps);
-                    if job.is_done(|| lanes.moving.state(lane)) {
+                    if job.left() == 0 {
                         lanes.moving.write(lane, job.arm);
                         job.end(false);
                         lanes.rest(lane);

@@ -9,7 +9,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{Check, Observation, arm, each, held, is_near, short, verdict};
+use super::support::{Named, Observation, arm, each, held, is_near, short, verdict};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
@@ -20,21 +20,19 @@ use crate::report::experiments::measure::{
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, equilibrium};
 use crate::study::matrix::largest;
-use crate::study::stability::{
-    Sampling, largest_delayed_period, largest_period, largest_timestep, step_matrix,
-};
+use crate::study::stability::{Sampling, Stepping, largest_timestep, step_matrix};
 
-/// The checks of S07 to S15, in order.
-pub(super) const CHECKS: [Check; 9] = [
-    || limits_hold(gains(1e4, 0.0, [200.0, 60.0])),
-    || limits_hold(gains(1e6, 0.0, [2000.0, 600.0])),
-    overdamped,
-    undamped,
-    slow_control,
-    held_push,
-    late_control,
-    windup,
-    too_much_integral,
+/// The checks of S07 to S15.
+pub(super) const CHECKS: [Named; 9] = [
+    ("S07", || limits_hold(gains(1e4, 0.0, [200.0, 60.0]))),
+    ("S08", || limits_hold(gains(1e6, 0.0, [2000.0, 600.0]))),
+    ("S09", overdamped),
+    ("S10", undamped),
+    ("S11", slow_control),
+    ("S12", held_push),
+    ("S13", late_control),
+    ("S14", windup),
+    ("S15", too_much_integral),
 ];
 
 const POSE: [f64; 2] = [0.5, 0.8];
@@ -147,7 +145,8 @@ fn slow_control() -> Observation {
         let control = held(MODERATE, POSE).with_method(method);
         let linear = Linear::at_setpoint(&control);
         for substeps in [1, 10, 100] {
-            let predicted = largest_period(&linear, method, substeps).unwrap_or(f64::NAN);
+            let stepping = Stepping::held(&linear, method, substeps, false);
+            let predicted = stepping.limit().unwrap_or(f64::NAN);
             lowest = lowest.min(predicted);
             highest = highest.max(predicted);
             if substeps < 100 {
@@ -169,7 +168,8 @@ fn held_push() -> Observation {
         arm: arm([1.0; 2], 0.0),
         ..held(gains(1000.0, 0.0, [5.0, 2.0]), POSE)
     };
-    let limit = largest_period(&Linear::at_setpoint(&control), Method::Rk4, 100);
+    let linear = Linear::at_setpoint(&control);
+    let limit = Stepping::held(&linear, Method::Rk4, 100, false).limit();
     let grows = |period, substeps| {
         let control = in_substeps(&control.with_timestep(period), substeps, false);
         growth(&control, Sampling::Held).is_none_or(|growth| growth > 1.0)
@@ -190,8 +190,9 @@ fn held_push() -> Observation {
 fn late_control() -> Observation {
     let control = held(MODERATE, POSE);
     let linear = Linear::at_setpoint(&control);
-    let prompt = largest_period(&linear, Method::Rk4, 1);
-    let predicted = largest_delayed_period(&linear, Method::Rk4, 1).unwrap_or(f64::NAN);
+    let [prompt, late] =
+        [false, true].map(|delayed| Stepping::held(&linear, Method::Rk4, 1, delayed).limit());
+    let predicted = late.unwrap_or(f64::NAN);
     let measured = measured_period(&control, 0.9 * predicted, 1, true);
     let is_less = prompt.is_some_and(|prompt| predicted < 0.5 * prompt);
     verdict(

@@ -10,7 +10,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{Check, Observation, apart, arm, each, fastest, free, held, is_near, verdict};
+use super::support::{Named, Observation, apart, arm, each, fastest, free, held, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -20,20 +20,23 @@ use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, no_control};
 use crate::study::matrix::largest;
-use crate::study::rollout::{Deviation, Rollout, RolloutRequest};
+use crate::study::paused::at_once;
+use crate::study::rollout::{Rollout, RolloutRequest, rollout};
 use crate::study::stability::{Sampling, largest_timestep};
 
-/// The checks of S27 to S35, in order.
-pub(super) const CHECKS: [Check; 9] = [
-    gravity,
-    tiny_steps,
-    huge_steps,
-    wound,
-    huge_setpoints,
-    subnormal_start,
-    subnormal_inertia,
-    refused,
-    || refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be"),
+/// The checks of S27 to S35.
+pub(super) const CHECKS: [Named; 9] = [
+    ("S27", gravity),
+    ("S28", tiny_steps),
+    ("S29", huge_steps),
+    ("S30", wound),
+    ("S31", huge_setpoints),
+    ("S32", subnormal_start),
+    ("S33", subnormal_inertia),
+    ("S34", refused),
+    ("S35", || {
+        refusal(Arm::new([1.0; 2], [0.0, 1.0], 9.81), "masses[0] must be")
+    }),
 ];
 
 /// The largest error of a free swing against the study's reference, and the run \[rad\].
@@ -46,10 +49,8 @@ fn error(gravity: f64, start: [f64; 2], timestep: f64, duration: f64) -> Option<
         samples: 101,
         reference: true,
     };
-    let mut rollout = Rollout::new(request).ok()?;
-    while rollout.advance(u64::MAX) > 0 {}
-    let error = rollout.deviation().map(Deviation::largest)?;
-    Some((error, rollout))
+    let made = at_once(rollout(request)).ok()?;
+    Some((made.deviation.as_ref()?.largest(), made))
 }
 
 fn gravity() -> Observation {
@@ -79,12 +80,12 @@ fn gravity() -> Observation {
 }
 
 fn tiny_steps() -> Observation {
-    let Some((error, rollout)) = error(9.81, [0.3 - FRAC_PI_2, 0.0], 1e-6, 10.0) else {
+    let Some((error, made)) = error(9.81, [0.3 - FRAC_PI_2, 0.0], 1e-6, 10.0) else {
         return verdict(false, "not run");
     };
-    let end = rollout.times().last().copied().unwrap_or(f64::NAN);
+    let end = made.times.last().copied().unwrap_or(f64::NAN);
     let late = (end - 1e7 * 1e-6).abs();
-    let steps = rollout.done();
+    let steps = made.steps;
     verdict(
         error < 1e-13 && late == 0.0,
         format!("error {error:.1e} rad, time off by {late:e} s after {steps} steps"),

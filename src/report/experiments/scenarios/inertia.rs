@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::control::MODERATE;
 use super::support::{
-    Check, Observation, arm, digits_lost, each, fastest, free, held, is_near, short, states,
+    Named, Observation, arm, digits_lost, each, fastest, free, held, is_near, short, states,
 };
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
@@ -26,19 +26,19 @@ use crate::study::stability::{Sampling, largest_timestep, limits};
 /// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
 const DIGITS: f64 = 2.5;
 
-/// The checks of S16 to S26, in order.
-pub(super) const CHECKS: [Check; 11] = [
-    || light_outer_link(1e-3),
-    || light_outer_link(1e-6),
-    || light_outer_link(1e-9),
-    || heavy_outer_link(1e3),
-    || heavy_outer_link(1e6),
-    || heavy_outer_link(1e9),
-    heavy_link_stretched,
-    || each([1e3, 1e-3].map(long_outer_link)),
-    || each([loses_few(&Arm::default(), [0.0; 3], 0.0)]),
-    folded,
-    || {
+/// The checks of S16 to S26.
+pub(super) const CHECKS: [Named; 11] = [
+    ("S16", || light_outer_link(1e-3)),
+    ("S17", || light_outer_link(1e-6)),
+    ("S18", || light_outer_link(1e-9)),
+    ("S19", || heavy_outer_link(1e3)),
+    ("S20", || heavy_outer_link(1e6)),
+    ("S21", || heavy_outer_link(1e9)),
+    ("S22", heavy_link_stretched),
+    ("S23", || each([1e3, 1e-3].map(long_outer_link))),
+    ("S24", || each([loses_few(&Arm::default(), [0.0; 3], 0.0)])),
+    ("S25", folded),
+    ("S26", || {
         each(
             [
                 whirl::<2>([0.76376, 1.0801]),
@@ -46,7 +46,7 @@ pub(super) const CHECKS: [Check; 11] = [
             ]
             .concat(),
         )
-    },
+    }),
 ];
 
 /// Whether an arm loses few digits around a pose, and how many.

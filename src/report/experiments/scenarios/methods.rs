@@ -7,7 +7,7 @@
     reason = "indices name the joints of arrays of that length"
 )]
 
-use super::support::{Check, Noise, Observation, apart, each, free, verdict};
+use super::support::{Named, Noise, Observation, apart, each, free, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
@@ -18,8 +18,13 @@ use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
 use crate::study::taylor::TaylorReference;
 
-/// The checks of S36 to S39, in order.
-pub(super) const CHECKS: [Check; 4] = [one_joint, changes, there_and_back, step_doubling];
+/// The checks of S36 to S39.
+pub(super) const CHECKS: [Named; 4] = [
+    ("S36", one_joint),
+    ("S37", changes),
+    ("S38", there_and_back),
+    ("S39", step_doubling),
+];
 
 /// Stable by the closed forms, for `x'' = -ω² x - 2 z ω x'` with `w = (ω h)²`, `d = 2 z ω h`.
 fn closed_form(method: Method, w: f64, d: f64) -> bool {

@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::support::{Check, Observation, apart, arm, each, free, is_near, verdict};
+use super::support::{Named, Observation, apart, arm, each, free, is_near, verdict};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
@@ -18,14 +18,14 @@ use crate::study::linear::Linear;
 use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
 
-/// The checks of S01 to S06, in order.
-pub(super) const CHECKS: [Check; 6] = [
-    rest_without_gravity,
-    hanging_at_rest,
-    upright,
-    regular_swing,
-    || chaotic::<2>(1.2),
-    || chaotic::<3>(1.9),
+/// The checks of S01 to S06.
+pub(super) const CHECKS: [Named; 6] = [
+    ("S01", rest_without_gravity),
+    ("S02", hanging_at_rest),
+    ("S03", upright),
+    ("S04", regular_swing),
+    ("S05", || chaotic::<2>(1.2)),
+    ("S06", || chaotic::<3>(1.9)),
 ];
 
 fn rest_without_gravity() -> Observation {

@@ -12,7 +12,8 @@ use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::report::experiments::reference::{DoubleDouble, exact_acceleration, largest_difference};
+use crate::report::experiments::conditioning::lost;
+use crate::report::experiments::reference::exact_acceleration;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::largest;
 
@@ -32,6 +33,9 @@ pub struct Scenario {
 
 /// Runs a scene.
 pub(super) type Check = fn() -> Observation;
+
+/// A scene's identifier and its check.
+pub(super) type Named = (&'static str, Check);
 
 impl Scenario {
     /// Runs the scene.
@@ -127,10 +131,7 @@ pub(super) fn digits_lost<const N: usize>(arm: &Arm<N>, states: &[State<N>]) -> 
     largest(states.iter().map(|state| {
         let effort = noise.array(10.0);
         let found = forward_dynamics(arm, &state.position, &state.velocity, &effort);
-        let exact = exact_acceleration(arm, state, &effort);
-        let size = largest(exact.map(DoubleDouble::to_f64).iter().map(|it| it.abs()));
-        let roundings = largest_difference(&exact, &found) / size / (0.5 * f64::EPSILON);
-        roundings.max(1.0).log10()
+        lost(&exact_acceleration(arm, state, &effort), &found)
     }))
 }
 
