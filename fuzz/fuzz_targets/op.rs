@@ -136,9 +136,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
         } => {
             check_name(json, "service", service);
             let status = status.as_deref().unwrap_or_default();
-            let line = check_line(&messages::response(
-                service, id, values, *result, status,
-            ));
+            let line = check_line(&messages::response(service, id, values, *result, status));
             check_passed_on(json.get("values"), line.get("values"));
             check_passed_on(json.get("id"), line.get("id"));
         }
