@@ -92,7 +92,7 @@ impl Topics {
     /// A client does not advertise a topic any more.
     pub(crate) fn remove_publisher(&mut self, topic: &str) {
         self.remove(topic, |users| {
-            users.publishers = users.publishers.saturating_sub(1)
+            users.publishers = users.publishers.saturating_sub(1);
         });
     }
 
