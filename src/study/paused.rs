@@ -1,7 +1,7 @@
 //! Computations that take long, each written as one async function and done a piece at a time.
 //!
 //! A worker, and the page, do a piece of one computation and then of another. A piece ends where the function awaits
-//! [`pause`]. Nothing is waited for, so that no executor is needed: a poll is a piece.
+//! `pause`. Nothing is waited for, so that no executor is needed: a poll is a piece.
 //!
 //! **Invariant:** a computation gives the same bits in pieces as at once.
 

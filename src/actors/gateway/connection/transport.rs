@@ -25,6 +25,7 @@ pub(super) enum Transport<S> {
 }
 
 /// What a client has sent.
+#[cfg_attr(not(feature = "web"), derive(Clone, Copy))]
 pub(super) enum ReceivedData {
     /// This many bytes of a stream; none at its end, after which the client may still be reading.
     Bytes(usize),
