@@ -7,7 +7,7 @@ import { state } from "./store.js";
 
 const SAMPLES = 101;
 const PUSH_SPEED = 1e-6; // rad/s
-/** At so many instants a push is looked at. */
+/** Number of samples of the deviation after a push. */
 export const LOOKS = 14;
 
 /**

@@ -1,4 +1,4 @@
-"""Many arms are as many single ones, to the bit, whatever shares the work; arrays go in and out as they lie."""
+"""A batch gives each arm the bits of a single simulation, on any number of threads. Arrays keep their memory layout."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ COMPUTED = {
     "2.4": "horizon / 8",
     "3.1": "1e3 * by_hand",
     "3.2": "1e3 * halved",
-    "3.5": "round(waiting[2] / waiting[3])",
+    "3.5": "round(hold[2] / hold[3])",
     "4.1": "sag[0]",
     "4.3": "held[0]",
     "5.1": "light",

@@ -19,7 +19,7 @@ const NEIGHBOURS: u64 = 16;
 
 /// A run with any number of steps.
 pub trait StepTrial {
-    /// Whether the run with so many steps is good enough.
+    /// Whether the run with this number of steps is good enough.
     fn is_enough(&mut self, steps: u64) -> impl Future<Output = bool> + Send;
 }
 

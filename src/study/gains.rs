@@ -20,7 +20,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::control_loop::ControlLoop;
 use super::limits;
 use super::matrix::largest;
-use super::paused::pause;
+use super::paused::PieceWork;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
@@ -68,9 +68,6 @@ const ABOVE_GRAVITY: f64 = 2.0;
 
 /// How long the default arms take to settle with the default gains, with some reserve \[s\].
 const DEFAULT_SETTLING: f64 = 3.0;
-
-/// Steps of a move in a piece.
-const STEPS_PER_PIECE: u64 = 1000;
 
 /// The demands on gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -207,16 +204,14 @@ fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: Shape, settling_time: f64) 
 /// Makes the moves one by one, since where gains fail the first ones tell. Returns how long the slowest one took \[s\],
 /// or none as soon as one does not settle in time.
 async fn settle<const N: usize>(control: &ControlLoop<N>, settling_time: f64) -> Option<f64> {
-    let mut slowest: f64 = 0.0;
+    let (mut slowest, mut piece) = (0.0_f64, PieceWork::default());
     for index in 0..MOVES {
         let mut run = start_of_move(control, index);
         let setpoint = run.pid().setpoint().position;
         // When a joint was last seen off the setpoint.
         let mut off_at = 0.0;
         while run.time() < WATCHED * settling_time {
-            if run.steps().is_multiple_of(STEPS_PER_PIECE) {
-                pause().await;
-            }
+            piece.spend(control.method.evaluations().into()).await;
             let is_moving = run.step();
             let position = &run.state().position;
             if (0..N).any(|i| (position[i] - setpoint[i]).abs() > SETTLED) {

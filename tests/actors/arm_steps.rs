@@ -41,7 +41,7 @@ pub fn enable(enabled: bool) -> Enable {
     }
 }
 
-/// An arm that nothing moves, whatever the timestep.
+/// An arm that stays at rest at every timestep: gravity and gains are zero.
 async fn weightless() -> Stage<2> {
     Stage::with_a_floating_arm().await.0
 }

@@ -303,8 +303,8 @@ impl Arguments {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpError {
     /// A fault that is answered by an error `status`.
-    #[error("{0}")]
-    Status(Problem),
+    #[error(transparent)]
+    Status(#[from] Problem),
     /// A call whose service is known; it is answered by `service_response` with `result: false`.
     #[error("{problem}")]
     Call {

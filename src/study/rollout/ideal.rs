@@ -45,7 +45,7 @@ impl<const N: usize> Ideal<N> {
         }
     }
 
-    /// Goes on by so many steps of the run.
+    /// Follows the run by this number of its steps.
     pub(super) async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
         for _ in 0..steps * u64::from(self.parts) {
             if self.is_lost {

@@ -245,7 +245,7 @@ impl<const N: usize> Reference<N> {
         }
     }
 
-    /// Goes on by so many steps of the run: one after the other if there is a law to obey, else all at once.
+    /// Follows the run by this number of its steps: one after the other under a control law, else all at once.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
         let has_law = self.pid.is_enabled();
         let (stretches, stretch) = if has_law || steps == 0 {

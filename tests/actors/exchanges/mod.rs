@@ -18,7 +18,7 @@
 //! | `a error text = part` | the frame is followed by an error status that contains this part |
 //! | `a quiet` | nothing has come |
 //! | `a forget` | all frames that have come are dropped |
-//! | `a count ms pattern = 3` | time passes, and so many frames that have come by then match; all of them are dropped |
+//! | `a count ms pattern = 3` | time passes, and this number of the frames that have come by then match; all of them are dropped |
 //! | `a leave` | disconnects |
 //! | `options text` | from here on clients are admitted as with these options; as a first step, the arm is neither paused nor reset |
 //! | `request text = 200,404 part` | a new connection sends this request and ends; the answers have these statuses, and contain this part, or with `!` do not |
@@ -91,7 +91,7 @@ const PERIODIC: [&str; 5] = [
     "/diagnostics",
 ];
 
-/// Headers of every answer over HTTP, in lower case, and the beginnings of those that none has.
+/// Headers that every answer over HTTP has, in lower case.
 #[cfg(feature = "web")]
 const STRICT: [&str; 8] = [
     "\r\nx-content-type-options: nosniff",
@@ -103,6 +103,7 @@ const STRICT: [&str; 8] = [
     "default-src 'none'",
     "frame-ancestors 'none'",
 ];
+/// How headers begin that no answer has.
 #[cfg(feature = "web")]
 const NEVER: [&str; 2] = ["\r\naccess-control-", "\r\nserver:"];
 
@@ -190,7 +191,7 @@ impl Peer {
         }
     }
 
-    /// Takes the frames that come within a time, and those that have come before it.
+    /// Takes the frames that came before and those that come within `time`.
     async fn take_for(&mut self, time: Duration) -> Vec<Value> {
         let end = Instant::now() + time;
         while let Ok(Ok(frame)) = timeout_at(end, self.read()).await {

@@ -52,7 +52,7 @@ fn a_long_message_of_a_websocket_has_room_while_it_is_there() {
     });
 }
 
-/// On another thread, whatever it holds. Here all places are taken, and another client is served meanwhile.
+/// A long message is read on another thread. Here all places of such threads are taken, and another client is served meanwhile.
 #[test]
 fn a_long_message_is_read_aside() {
     const LONG: usize = 4 << 20;

@@ -108,7 +108,7 @@ fn of_two_encodings_the_denser_and_the_smaller_pieces_count() {
         ((json, Some(12)), (json, Some(9)), (json, Some(9))),
         ((json, None), (json, Some(9)), (json, Some(9))),
         ((raw, None), (cbor, None), (raw, None)),
-        // Binary frames are not cut up: their subscribers share them, whatever size they give besides.
+        // A binary frame is never fragmented: all its subscribers share it, so a fragment size has no effect.
         ((json, Some(9)), (cbor, Some(5)), (cbor, None)),
     ] {
         assert_eq!(one(first).merged(one(second)), one(both));

@@ -29,7 +29,6 @@ use crate::protocol::wire::payload::Payload;
 const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; \
                          over raw TCP every frame is a line of JSON";
 const NESTED_FRAGMENT: &str = "fragment: the pieces make a fragment again";
-const UNREADABLE: &str = "a frame could not be read";
 
 /// What is left to do once a part of the stream has been performed.
 pub(super) enum OpOutcome {
@@ -116,9 +115,7 @@ impl Performer {
     /// Pieces of messages that have not come in time are forgotten, and their room is given back.
     pub(super) fn forget_old_pieces(&mut self) {
         self.fragments.forget_old(Instant::now().into_std());
-        if self.fragments.allocated() == 0 {
-            self.pieces = None;
-        }
+        self.give_back();
     }
 
     /// Performs one part of the stream.
@@ -135,32 +132,43 @@ impl Performer {
     }
 
     async fn perform_part(&mut self, cut: FramePart) -> OpOutcome {
-        let (length, read): (_, Box<dyn FnOnce() -> Option<Incoming> + Send>) = match cut {
-            FramePart::Frame(frame) => (frame.len(), Box::new(move || Some(read(frame)))),
+        match cut {
+            FramePart::Frame(frame) => {
+                let length = frame.len();
+                self.perform_frame(length, move || Some(read(Ok(frame))))
+                    .await
+            }
             FramePart::Message(message) => {
-                (message.len(), Box::new(move || read_message(&message)))
+                let length = message.len();
+                self.perform_frame(length, move || read_message(&message))
+                    .await
             }
             FramePart::Lines(lines) => {
                 self.speaks_json = true;
-                return self.perform(None, Op::PublishLines(lines), 0).await;
+                self.perform(None, Op::PublishLines(lines), 0).await
             }
             FramePart::Error(FrameError::NotAnObject(start), _)
                 if !self.speaks_json && !self.takes_binary && is_host_line(&start) =>
             {
-                return OpOutcome::Refused(refusal(Foreign::Http.explanation()));
+                OpOutcome::Refused(refusal(Foreign::Http.explanation()))
             }
-            FramePart::Error(error, start) => {
-                return self.act_on(op::read_start(&start, &error), 0).await;
-            }
-        };
+            FramePart::Error(error, start) => self.act_on(op::read_start(&start, &error), 0).await,
+        }
+    }
+
+    /// Reads a frame of `length` bytes and performs it.
+    async fn perform_frame(
+        &mut self,
+        length: usize,
+        read: impl FnOnce() -> Option<Incoming> + Send + 'static,
+    ) -> OpOutcome {
         self.speaks_json = true;
         if length > MEDIUM {
             self.performed = Some(self.permit().await);
         }
         let incoming = match read_frame(length, read).await {
-            Some(Some(incoming)) => incoming,
-            Some(None) => return OpOutcome::Done,
-            None => return OpOutcome::Refused(refusal(UNREADABLE)),
+            Ok(incoming) => incoming,
+            Err(outcome) => return outcome,
         };
         let is_published = matches!(incoming.op, Ok(Op::Publish { .. } | Op::Fragment(_)));
         if length > SHORT && !is_published && self.performed.is_none() {
@@ -228,17 +236,11 @@ impl Performer {
         } else {
             self.performed.clone_from(&self.pieces);
         }
-        let whole = match read_frame(length, move || read_message(whole.text().as_bytes())).await {
-            Some(Some(whole)) => whole,
-            Some(None) => return Err(OpOutcome::Done),
-            None => return Err(OpOutcome::Refused(refusal(UNREADABLE))),
-        };
+        let whole = read_frame(length, move || read_message(whole.text().as_bytes())).await?;
         let whole = match whole.op {
             Ok(Op::Fragment(_)) => Incoming {
                 id,
-                op: Err(OpError::Status(Problem::NotAFrame(
-                    NESTED_FRAGMENT.to_owned(),
-                ))),
+                op: Err(Problem::NotAFrame(NESTED_FRAGMENT.to_owned()).into()),
             },
             Err(OpError::Status(Problem::NotAFrame(_))) => under_id(whole, id),
             _ => whole,
@@ -271,13 +273,11 @@ impl Performer {
     async fn perform(&self, id: Option<Payload>, op: Op, length: usize) -> OpOutcome {
         let is_computation = matches!(&op, Op::CallService(CallService { service, .. })
             if Service::from_name(service).is_some_and(Service::is_computation));
-        let from = self.id;
-        let permit = self.performed.clone();
         let request = Request {
-            from,
+            from: self.id,
             id,
             op,
-            permit,
+            permit: self.performed.clone(),
         };
         if is_computation {
             return OpOutcome::Computation(request, length);
@@ -297,16 +297,18 @@ pub(super) fn refusal(why: &str) -> Bytes {
     messages::status(Level::Error, why, None)
 }
 
-/// Reads a frame of `length` bytes: a long one on another thread, while the other clients are served. `None` if that
-/// failed.
-async fn read_frame<T: Send + 'static>(
+/// Reads a frame of `length` bytes: a long one on another thread, while the other clients are served.
+async fn read_frame(
     length: usize,
-    read: impl FnOnce() -> T + Send + 'static,
-) -> Option<T> {
-    if length <= SHORT {
-        return Some(read());
-    }
-    aside(WorkKind::reading(length), read).await
+    read: impl FnOnce() -> Option<Incoming> + Send + 'static,
+) -> Result<Incoming, OpOutcome> {
+    let incoming = if length <= SHORT {
+        read()
+    } else {
+        let incoming = aside(WorkKind::reading(length), read).await;
+        incoming.ok_or_else(|| OpOutcome::Refused(refusal("a frame could not be read")))?
+    };
+    incoming.ok_or(OpOutcome::Done)
 }
 
 /// An error goes out under the id of the pieces, unless it ends a call.
@@ -317,8 +319,9 @@ fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     }
 }
 
-fn read(frame: RawFrame) -> Incoming {
-    match frame.decode() {
+/// Reads a frame that was cut off, or says what is wrong with it.
+fn read(frame: Result<RawFrame, (FrameError, Vec<u8>)>) -> Incoming {
+    match frame.and_then(RawFrame::decode) {
         Ok(frame) => op::read(&frame.text),
         Err((error, start)) => op::read_start(&start, &error),
     }
@@ -326,8 +329,5 @@ fn read(frame: RawFrame) -> Incoming {
 
 /// Reads a message of a WebSocket, or a frame that came in pieces. `None` if there is nothing but white space.
 fn read_message(message: &[u8]) -> Option<Incoming> {
-    Some(match RawFrame::of_message(message)? {
-        Ok(frame) => read(frame),
-        Err((error, start)) => op::read_start(&start, &error),
-    })
+    RawFrame::of_message(message).map(read)
 }
