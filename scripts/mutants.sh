@@ -34,7 +34,7 @@ for layer in "${layers[@]}"; do
     status=0
     # A property test has 64 random cases, and is not shrunk.
     PROPTEST_CASES=64 PROPTEST_MAX_SHRINK_ITERS=0 cargo mutants --output "$out" --colors never "${files[@]}" "$@" \
-        -- --locked "${tests[@]}" -- "${skipped[@]}" || status=$?
+        --test-package pendularm,pendularm-actor-tests -- --locked "${tests[@]}" -- "${skipped[@]}" || status=$?
     # 2 and 3: some were missed, or timed out.
     case $status in 0 | 2 | 3) ;; *) fail "$layer: cargo mutants ended with status $status" ;; esac
     count() { wc -l <"$out/mutants.out/$1.txt"; }

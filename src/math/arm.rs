@@ -212,11 +212,10 @@ impl<const N: usize> State<N> {
 
     /// Whether every position and velocity is a finite number.
     #[must_use]
+    #[inline]
     pub fn is_finite(&self) -> bool {
-        self.position
-            .iter()
-            .chain(&self.velocity)
-            .all(|value| value.is_finite())
+        let are_finite = |values: &[f64; N]| values.iter().all(|value| value.is_finite());
+        are_finite(&self.position) && are_finite(&self.velocity)
     }
 }
 

@@ -24,7 +24,7 @@ impl Machine {
         let build = if cfg!(debug_assertions) {
             "development build: its times say nothing about the shipped program"
         } else {
-            "release build (optimised, link-time optimisation, one codegen unit)"
+            "release build (optimised)"
         };
         let cores = std::thread::available_parallelism().ok();
         let load = load().map(|load| {

@@ -619,10 +619,7 @@ where
 
 /// Runs the exchanges of a file; each that fails is named with its line.
 fn play(file: &str) {
-    let path = format!(
-        "{}/tests/actors/exchanges/{file}.txt",
-        env!("CARGO_MANIFEST_DIR")
-    );
+    let path = format!("{}/exchanges/{file}.txt", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
     let named = text.lines().map_while(|line| line.strip_prefix("let "));
     let named: Vec<(&str, &str)> = named.map(|line| line.split_once(" = ").unwrap()).collect();
