@@ -120,7 +120,7 @@ fn admission(settings: u8) -> Admission {
     };
     Admission {
         token,
-        site: Site::new(access, FOLDER.into()),
+        site: Site::new(access, FOLDER.into(), &[]),
         newcomers: Newcomers::default(),
     }
 }

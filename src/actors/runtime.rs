@@ -200,7 +200,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
                 origins,
                 strict_origin,
             };
-            Site::new(access, report).framed_by(&frames)
+            Site::new(access, report, &frames)
         },
         newcomers: Newcomers::of(unauthenticated),
     }

@@ -103,19 +103,15 @@ impl Access {
     /// [`AccessError::NoHost`] and [`AccessError::Host`].
     pub fn host(&self, request: &RequestHead, local: SocketAddr) -> Result<Authority, AccessError> {
         let text = request.one("host").ok_or(AccessError::NoHost)?;
-        let authority = Authority::parse(&text).filter(|host| self.is_ours(host, local));
+        let bound = Host::Address(local.ip().to_canonical());
+        let is_named = |asked: &Authority| self.hosts.iter().any(|one| one.allows(asked));
+        // No name server can point the first two elsewhere. Their port may be that of a proxy or of a tunnel.
+        let authority = Authority::parse(&text)
+            .filter(|asked| asked.host.is_loopback() || asked.host == bound || is_named(asked));
         authority.ok_or_else(|| AccessError::Host {
             host: shortened(&text, MAX_SHOWN),
             port: local.port(),
         })
-    }
-
-    fn is_ours(&self, asked: &Authority, local: SocketAddr) -> bool {
-        let bound = Host::Address(local.ip().to_canonical());
-        // No name server can point these names elsewhere. Their port may be that of a proxy or of a tunnel.
-        asked.host.is_loopback()
-            || asked.host == bound
-            || self.hosts.iter().any(|one| one.allows(asked))
     }
 
     /// Whether the page that opens a WebSocket may do so; `own` is the host that the request looks for. Without an
@@ -124,7 +120,7 @@ impl Access {
     /// # Errors
     /// [`AccessError::Origin`].
     pub fn origin(&self, request: &RequestHead, own: &Authority) -> Result<(), AccessError> {
-        if request.count("origin") == 0 {
+        if !request.0.headers.contains_key("origin") {
             return Ok(());
         }
         let text = request.one("origin").unwrap_or("more than one".into());
@@ -137,11 +133,9 @@ impl Access {
         let is_named = self.origins.iter().any(|named| **named == lower);
         // A browser sends the token's cookie along from every port of its host.
         let is_strict = self.strict_origin || self.token.is_some();
-        if is_own || is_named || (is_local && !is_strict) {
-            Ok(())
-        } else {
-            Err(AccessError::Origin(shortened(&text, MAX_SHOWN)))
-        }
+        let may_open = is_own || is_named || (is_local && !is_strict);
+        let refusal = || AccessError::Origin(shortened(&text, MAX_SHOWN));
+        may_open.then_some(()).ok_or_else(refusal)
     }
 
     /// Whether the request shows the token, in its query or its cookie. True if it did so in the query: a cookie is
@@ -153,15 +147,10 @@ impl Access {
         let Some(token) = &self.token else {
             return Ok(false);
         };
-        if let Some(shown) = request.query("token") {
-            return if token.matches(&shown) {
-                Ok(true)
-            } else {
-                Err(AccessError::WrongToken)
-            };
-        }
-        match request.cookie(&cookie_name(local.port())) {
-            Some(shown) if token.matches(&shown) => Ok(false),
+        let in_query = request.query("token");
+        let is_in_query = in_query.is_some();
+        match in_query.or_else(|| request.cookie(&cookie_name(local.port()))) {
+            Some(shown) if token.matches(&shown) => Ok(is_in_query),
             Some(_) => Err(AccessError::WrongToken),
             None => Err(AccessError::NoToken),
         }

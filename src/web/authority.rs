@@ -38,14 +38,10 @@ impl Host {
         is_name.then(|| Self::Name(text.to_ascii_lowercase().into()))
     }
 
-    /// Whether both are one host: a name with a full stop behind it is the same name.
-    fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Name(one), Self::Name(other)) => {
-                one.strip_suffix('.').unwrap_or(one) == other.strip_suffix('.').unwrap_or(other)
-            }
-            _ => self == other,
-        }
+    /// The host's text without a full stop behind it: with one, it is the same name.
+    fn bare(&self) -> String {
+        let text = self.to_string();
+        text.strip_suffix('.').map_or(text.clone(), str::to_owned)
     }
 
     /// Whether this machine alone has that name, independent of any name server.
@@ -83,14 +79,11 @@ impl Authority {
     pub fn parse(text: &str) -> Option<Self> {
         let (host, port) = match text.rsplit_once(':') {
             // The last colon of `[::1]` is no port's.
-            Some((host, port)) if !port.ends_with(']') => (host, Some(port)),
+            Some((host, port)) if !port.ends_with(']') => {
+                let is_number = port.bytes().all(|byte| byte.is_ascii_digit());
+                (host, Some(is_number.then(|| port.parse().ok())??))
+            }
             _ => (text, None),
-        };
-        let digits = |port: &str| port.bytes().all(|byte| byte.is_ascii_digit());
-        let port = match port {
-            Some(port) if digits(port) => Some(port.parse().ok()?),
-            Some(_) => return None,
-            None => None,
         };
         let host = Host::parse(host)?;
         Some(Self { host, port })
@@ -101,7 +94,7 @@ impl Authority {
     pub fn allows(&self, asked: &Self) -> bool {
         let is_default = |port| asked.port.is_none() && [HTTP_PORT, HTTPS_PORT].contains(&port);
         let has_port = |port| asked.port == Some(port) || is_default(port);
-        self.host.is_same(&asked.host) && self.port.is_none_or(has_port)
+        self.host.bare() == asked.host.bare() && self.port.is_none_or(has_port)
     }
 
     /// The port that is meant over `http`.

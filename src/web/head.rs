@@ -28,12 +28,6 @@ impl RequestHead {
         values.map(|value| String::from_utf8_lossy(value.as_bytes()))
     }
 
-    /// How many header lines have that name.
-    #[must_use]
-    pub fn count(&self, name: &str) -> usize {
-        self.all(name).count()
-    }
-
     /// The value of the one header line of that name. `None` if there is none, or more than one.
     #[must_use]
     pub fn one(&self, name: &str) -> Option<Cow<'_, str>> {

@@ -25,16 +25,19 @@ pub mod serve;
 pub mod stream;
 pub mod upgrade;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::spawn_blocking;
 
 use self::access::Access;
-use self::report::Disk;
 
 /// Folder of the report, unless another is named.
 pub const DEFAULT_REPORT: &str = "report";
 
 /// The files that are served over HTTP, and the rules for whom.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Site {
     /// The rules of admission.
     pub access: Access,
@@ -42,24 +45,36 @@ pub struct Site {
     pub report: PathBuf,
     /// Origins whose pages may show the page and the report in a frame, separated by spaces.
     frames: String,
-    disk: Disk,
+    /// A permit travels with the file that was read.
+    files: Arc<Semaphore>,
+}
+
+impl Default for Site {
+    fn default() -> Self {
+        Self::new(Access::default(), PathBuf::new(), &[])
+    }
 }
 
 impl Site {
-    /// A site with these rules, and the report that is in that folder.
+    /// A site with these rules and the report in that folder. Pages of the origins `frames` may show it in a frame.
     #[must_use]
-    pub fn new(access: Access, report: PathBuf) -> Self {
+    pub fn new(access: Access, report: PathBuf, frames: &[Box<str>]) -> Self {
         Self {
             access,
             report,
-            ..Self::default()
+            frames: frames.join(" "),
+            files: Arc::new(Semaphore::new(report::FILES)),
         }
     }
 
-    /// The same site, which pages of these origins may show in a frame.
-    #[must_use]
-    pub fn framed_by(self, origins: &[Box<str>]) -> Self {
-        let frames = origins.join(" ");
-        Self { frames, ..self }
+    /// Looks at the report's folder on another thread, once there is a permit. `None` if that panicked, or if the
+    /// runtime is ending.
+    async fn look<T: Send + 'static>(
+        &self,
+        look: impl FnOnce(&Path) -> T + Send + 'static,
+    ) -> Option<(T, OwnedSemaphorePermit)> {
+        let permit = Arc::clone(&self.files).acquire_owned().await.ok()?;
+        let folder = self.report.clone();
+        spawn_blocking(move || (look(&folder), permit)).await.ok()
     }
 }

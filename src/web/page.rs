@@ -46,8 +46,8 @@ pub fn find(path: &str) -> Option<Asset> {
 pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpResponse {
     let mut body = Bytes::from_static(bytes);
     if name == DOCUMENT {
-        let folder = site.report.clone();
-        let has_report = site.disk.run(move || report::exists(&folder)).await;
+        let has_report = site.look(|folder| folder.join(report::INDEX).is_file());
+        let has_report = has_report.await;
         if has_report.is_some_and(|(has_report, _)| has_report) {
             let html = String::from_utf8_lossy(bytes);
             body = html
@@ -55,17 +55,9 @@ pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpR
                 .into();
         }
     }
-    file(kind(name), &policy(own), body)
-}
-
-/// The media type of a file, by its name.
-fn kind(name: &str) -> &'static str {
-    match name.rsplit_once('.') {
-        Some((_, "js")) => "text/javascript; charset=utf-8",
-        Some((_, "css")) => "text/css; charset=utf-8",
-        Some((_, "svg")) => "image/svg+xml",
-        _ => "text/html; charset=utf-8",
-    }
+    // All others are scripts, which a report may not have.
+    let kind = report::media_type(name).unwrap_or("text/javascript; charset=utf-8");
+    file(kind, &policy(own), body)
 }
 
 /// The policy under which the page may run its own scripts and styles, draw, and speak to `own`, where it came from.

@@ -6,17 +6,13 @@
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::task::spawn_blocking;
 
 use super::head::decode;
 
 /// Path under which it is served.
 pub const PREFIX: &str = "/report/";
 /// The file that is served for a folder.
-const INDEX: &str = "index.html";
+pub(super) const INDEX: &str = "index.html";
 /// Deepest file below the folder, in names.
 const MAX_DEPTH: usize = 8;
 
@@ -24,7 +20,7 @@ const MAX_DEPTH: usize = 8;
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; base-uri 'none'; \
      form-action 'none'; frame-ancestors 'none'";
 
-/// Kinds of files by their names' end.
+/// Kinds of files by the ends of their names.
 const KINDS: [(&str, &str); 8] = [
     ("html", "text/html; charset=utf-8"),
     ("css", "text/css; charset=utf-8"),
@@ -41,27 +37,6 @@ pub const FILES: usize = 4;
 /// Longest file that is sent \[bytes\]: the longest of a full report has 1.5 MB.
 pub const MAX_FILE: u64 = 4 * 1024 * 1024;
 
-/// Permits to look at the report's folder. A permit travels with the file that was read.
-#[derive(Debug)]
-pub(super) struct Disk(Arc<Semaphore>);
-
-impl Default for Disk {
-    fn default() -> Self {
-        Self(Arc::new(Semaphore::new(FILES)))
-    }
-}
-
-impl Disk {
-    /// Does `work` on another thread, once there is a permit. `None` if it panicked, or if the runtime is ending.
-    pub(super) async fn run<T: Send + 'static>(
-        &self,
-        work: impl FnOnce() -> T + Send + 'static,
-    ) -> Option<(T, OwnedSemaphorePermit)> {
-        let permit = Arc::clone(&self.0).acquire_owned().await.ok()?;
-        spawn_blocking(|| (work(), permit)).await.ok()
-    }
-}
-
 /// A file of the report, by its path on the web.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
@@ -70,10 +45,11 @@ pub struct FileName {
     pub kind: &'static str,
 }
 
-/// Whether there is a report in the folder: one look at the disk.
-#[must_use]
-pub fn exists(folder: &Path) -> bool {
-    folder.join(INDEX).is_file()
+/// The media type of a file, by its name.
+pub(super) fn media_type(name: &str) -> Option<&'static str> {
+    let (_, ending) = name.rsplit_once('.')?;
+    let (_, kind) = KINDS.iter().find(|(one, _)| *one == ending)?;
+    Some(kind)
 }
 
 impl FileName {
@@ -81,12 +57,10 @@ impl FileName {
     /// beginning with a dot, a known ending. A folder's is its index.
     #[must_use]
     pub fn parse(rest: &str) -> Option<Self> {
-        let rest = decode(rest)?;
-        let whole = if rest.is_empty() || rest.ends_with('/') {
-            format!("{rest}{INDEX}")
-        } else {
-            rest
-        };
+        let mut whole = decode(rest)?;
+        if whole.is_empty() || whole.ends_with('/') {
+            whole += INDEX;
+        }
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
         let mut path = PathBuf::new();
         for (depth, name) in whole.split('/').enumerate() {
@@ -96,8 +70,7 @@ impl FileName {
             }
             path.push(name);
         }
-        let ending = path.extension()?.to_str()?;
-        let (_, kind) = KINDS.iter().find(|(one, _)| *one == ending)?;
+        let kind = media_type(&whole)?;
         Some(Self { path, kind })
     }
 

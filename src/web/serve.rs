@@ -158,7 +158,9 @@ impl<G: Gate> Responder<'_, G> {
         let (parts, body) = request.into_parts();
         let has_body = !body.is_end_stream();
         let request = RequestHead(parts);
-        let mut response = match self.check(&request, has_body) {
+        let body = (!has_body).then_some(()).ok_or(AccessError::Body);
+        let checked = self.check(&request);
+        let mut response = match checked.and_then(|checked| body.map(|()| checked)) {
             Ok((own, cookie)) => match self.gate.admit().await {
                 Ok(()) => {
                     let mut response = self.resource(&request, &own).await;
@@ -195,11 +197,7 @@ impl<G: Gate> Responder<'_, G> {
     }
 
     /// Whether a request may be served. Returns the host that it looks for, and a cookie that is due.
-    fn check(
-        &self,
-        request: &RequestHead,
-        has_body: bool,
-    ) -> Result<(Authority, Option<String>), AccessError> {
+    fn check(&self, request: &RequestHead) -> Result<(Authority, Option<String>), AccessError> {
         let access = &self.site.access;
         if !request.path().starts_with('/') || request.0.uri.authority().is_some() {
             return Err(AccessError::Target);
@@ -212,9 +210,6 @@ impl<G: Gate> Responder<'_, G> {
             access.origin(request, &own)?;
         }
         let is_shown = access.token(request, self.local)?;
-        if has_body {
-            return Err(AccessError::Body);
-        }
         let cookie = is_shown.then(|| access.cookie(self.local)).flatten();
         Ok((own, cookie))
     }
@@ -252,8 +247,8 @@ async fn open_report(rest: &str, site: &Site) -> HttpResponse {
     let Some(name) = report::FileName::parse(rest) else {
         return text(StatusCode::NOT_FOUND, NO_SUCH_FILE);
     };
-    let (kind, folder) = (name.kind, site.report.clone());
-    match site.disk.run(move || name.read(&folder)).await {
+    let kind = name.kind;
+    match site.look(move |folder| name.read(folder)).await {
         Some((Ok(Some(bytes)), permit)) => {
             file(kind, report::POLICY, AnswerBody::of(bytes, permit))
         }

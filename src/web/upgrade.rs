@@ -14,7 +14,7 @@ use super::response::{HttpResponse, set, text};
 /// Whether the request wants to become a WebSocket, rightly or not.
 #[must_use]
 pub fn is_wanted(request: &RequestHead) -> bool {
-    request.has_word("upgrade", "websocket") || request.count("sec-websocket-key") > 0
+    request.has_word("upgrade", "websocket") || request.0.headers.contains_key("sec-websocket-key")
 }
 
 /// The answer to a handshake. With the status 101 the stream is a WebSocket behind it.

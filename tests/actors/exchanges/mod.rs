@@ -123,7 +123,7 @@ pub fn admission(options: &str) -> Result<Admission, String> {
                 origins: options.web.origins,
                 strict_origin: options.web.strict_origin,
             };
-            Site::new(access, "no-report".into())
+            Site::new(access, "no-report".into(), &options.web.frames)
         },
         token: options.token,
         ..Admission::default()

@@ -81,7 +81,7 @@ fn report_of(test: &str, length: u64) -> (PathBuf, Arc<Admission>) {
     file.set_len(length).unwrap();
     let admission = Admission {
         token: None,
-        site: Site::new(Access::default(), folder.clone()),
+        site: Site::new(Access::default(), folder.clone(), &[]),
         ..Admission::default()
     };
     (folder, Arc::new(admission))
