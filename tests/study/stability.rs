@@ -7,8 +7,7 @@ use pendularm::math::arm::Arm;
 use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::report::experiments::growth::growth_per_period;
-use pendularm::report::experiments::measure::measured_limit;
+use pendularm::report::experiments::measure::{growth_per_period, measured_limit};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
