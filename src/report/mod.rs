@@ -71,12 +71,6 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
     SECTIONS.iter().map(|section| section.name)
 }
 
-/// The same, with commas between.
-#[must_use]
-pub fn names() -> String {
-    sections().collect::<Vec<_>>().join(", ")
-}
-
 /// Makes the report and answers the page's path.
 ///
 /// # Errors
@@ -127,11 +121,8 @@ fn side_by_side(
     makers: Vec<&'static Maker>,
     make: impl Fn(&'static Maker) -> Result<Section, ReportError> + Sync,
 ) -> Result<Vec<Section>, ReportError> {
-    let (mut timed, mut others): (Vec<_>, Vec<_>) = makers.into_iter().partition(|it| it.timed);
-    for queue in [&mut timed, &mut others] {
-        // The longest last, where it is taken first.
-        queue.sort_by(|a: &&Maker, b| a.weight.total_cmp(&b.weight));
-    }
+    // A worker takes from the end.
+    let (timed, others): (Vec<_>, Vec<_>) = makers.into_iter().rev().partition(|it| it.timed);
     let (timed, others) = (Mutex::new(timed), Mutex::new(others));
     let made = Mutex::new(Vec::new());
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::svg::{HEIGHT, Key, Marker, Panel, STYLE, WIDTH, csv, escape};
+use super::svg::{HEIGHT, Key, Marker, Plot, STYLE, WIDTH, csv, escape, lines};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
@@ -85,9 +85,9 @@ impl Section {
     }
 
     /// A grid of panels with its files: a title that says what was found, a caption that says how to read it.
-    pub(crate) fn figure(&mut self, name: &str, title: &str, caption: &str, panels: &[Panel]) {
+    pub(crate) fn figure(&mut self, name: &str, title: &str, caption: &str, panels: &[Plot]) {
         let mut legend: Vec<&Key> = Vec::new();
-        for key in panels.iter().flat_map(|panel| &panel.keys) {
+        for key in panels.iter().flat_map(Plot::keys) {
             match legend.iter_mut().find(|known| known.label == key.label) {
                 // A line and its marks are one entry.
                 Some(known) if known.marker == Marker::None => *known = key,
@@ -96,7 +96,7 @@ impl Section {
             }
         }
         let key = |key: &&Key| format!("<span>{} {}</span>", key.swatch(), escape(&key.label));
-        let drawn: String = panels.iter().map(|panel| panel.svg.as_str()).collect();
+        let drawn: String = panels.iter().map(Plot::svg).collect();
         self.html += &format!(
             "<figure id=\"{name}\"><h3>{NUMBER} {}</h3><p class=\"legend\">{}</p><div class=\"panels{}\">{drawn}</div>\
              <figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a>\
@@ -244,7 +244,7 @@ fn grid(panels: usize) -> (usize, &'static str, f64) {
 }
 
 /// A figure as one file, with its style inside. Heading and legend take as many lines as they need.
-fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
+fn sheet(title: &str, legend: &[&Key], panels: &[Plot]) -> String {
     /// Between the edge and the text in pixels.
     const MARGIN: f64 = 14.0;
     let (columns, _, scale) = grid(panels.len());
@@ -278,7 +278,7 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
         let y = header + panel_height * length_in_f64(index / columns);
         let place =
             format!("<svg x=\"{x}\" y=\"{y}\" width=\"{panel_width}\" height=\"{panel_height}\" ");
-        panel.svg.replacen("<svg ", &place, 1)
+        panel.svg().replacen("<svg ", &place, 1)
     });
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
@@ -290,40 +290,3 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Panel]) -> String {
 
 /// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
 const LETTER: f64 = 10.4;
-
-/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word stands alone.
-pub(super) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in heading.split_whitespace() {
-        let line = lines.last().map_or("", String::as_str);
-        let length = line.chars().count() + 1 + word.chars().count();
-        if line.is_empty() || letter * length_in_f64(length) <= room {
-            let line = format!("{line} {word}").trim_start().to_owned();
-            lines.pop();
-            lines.push(line);
-        } else {
-            lines.push(word.to_owned());
-        }
-    }
-    lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{LETTER, length_in_f64, lines};
-
-    #[test]
-    fn a_heading_takes_as_many_lines_as_it_needs_and_loses_no_word() {
-        let heading =
-            "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
-        for room in [100.0, 400.0, 812.0, 5000.0] {
-            let lines = lines(heading, room, LETTER);
-            assert_eq!(lines.join(" "), heading);
-            for line in &lines {
-                let fits = LETTER * length_in_f64(line.chars().count()) <= room;
-                assert!(fits || !line.contains(' '), "{line}");
-            }
-        }
-        assert_eq!(lines(heading, 5000.0, LETTER).len(), 1);
-    }
-}

@@ -20,6 +20,13 @@ pub(crate) trait Steppable<const N: usize>: Send {
     /// Takes a step. Returns its cost in evaluations of the dynamics; none if the run has diverged.
     fn step(&mut self) -> Option<u64>;
     fn state(&self) -> &State<N>;
+    /// Takes up to `steps` steps. Returns how many it took before the run diverged.
+    #[cfg(feature = "report")]
+    fn advance(&mut self, steps: u64) -> u64 {
+        (0..steps)
+            .take_while(|_| self.step().is_some())
+            .fold(0, |taken, _| taken + 1)
+    }
 }
 
 impl<const N: usize> Steppable<N> for Simulation<N> {
@@ -29,6 +36,11 @@ impl<const N: usize> Steppable<N> for Simulation<N> {
 
     fn state(&self) -> &State<N> {
         Simulation::state(self)
+    }
+
+    #[cfg(feature = "report")]
+    fn advance(&mut self, steps: u64) -> u64 {
+        Simulation::advance(self, steps)
     }
 }
 

@@ -40,12 +40,10 @@ impl<const N: usize> ContinuousLoop<N> {
         }
     }
 
-    /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if integrals of more
-    /// than three joints would have to be stepped.
+    /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if the arm has more
+    /// than three joints.
     pub fn step(&mut self) -> bool {
-        let integrates = self.control.integrating().contains(&true);
         match N {
-            _ if !integrates => self.step_arm(),
             1 => self.step_all::<2>(),
             2 => self.step_all::<4>(),
             3 => self.step_all::<6>(),
@@ -62,19 +60,6 @@ impl<const N: usize> ContinuousLoop<N> {
                 + kd[i] * (velocity[i] - v[i])
         });
         forward_dynamics(&self.control.arm, q, v, &effort)
-    }
-
-    fn step_arm(&mut self) -> bool {
-        let State { position, velocity } = self.state;
-        let (dq, dv) = increment(
-            self.control.method,
-            |_, q, v| self.acceleration(q, v, &[0.0; N]),
-            0.0,
-            &position,
-            &velocity,
-            self.control.timestep,
-        );
-        self.take(&dq, &dv, &[0.0; N])
     }
 
     /// `M` is twice `N`, which the language can't say yet.

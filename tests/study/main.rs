@@ -21,8 +21,10 @@ mod clocks;
 mod equilibrium;
 mod error;
 mod experiments;
+mod fewest;
 #[path = "../support/json.rs"]
 mod json;
+mod matrix;
 mod motion;
 mod planner;
 mod poses;

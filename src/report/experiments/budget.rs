@@ -9,11 +9,14 @@
 //! others.
 
 use super::error::{REACH_GAINS, REACH_SETPOINT};
-use super::reference::{DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference};
+use super::reference::{
+    Law, ReferenceMotion, ReferencePath, distance, exact_steps, largest_difference,
+};
 use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::study::control_loop::ControlLoop;
+use crate::study::matrix::largest;
 
 /// Comparisons of a run, and a power of two: after every step, or every second, every fourth...
 const MOST_LOOKS: usize = 1024;
@@ -38,7 +41,7 @@ pub struct Parts {
 pub struct Budget {
     control: ControlLoop<2>,
     duration: f64,
-    law: ReferenceMotion<2>,
+    law: ReferencePath<2>,
 }
 
 impl Budget {
@@ -51,11 +54,10 @@ impl Budget {
             ControlLoop::free(Arm::default())
         };
         let law = Law::Continuous(control.gains, control.setpoint);
-        let spacing = duration / length_in_f64(MOST_LOOKS);
         Self {
             control,
             duration,
-            law: ReferenceMotion::of(&control.arm, &State::rest(), &law, spacing, MOST_LOOKS),
+            law: ReferencePath::new(&control.arm, &State::rest(), &law, duration),
         }
     }
 
@@ -66,19 +68,20 @@ impl Budget {
         let timestep = self.duration / in_f64(steps);
         let looks = usize::try_from(steps).map_or(MOST_LOOKS, |steps| steps.clamp(1, MOST_LOOKS));
         let every = steps / looks as u64;
-        let stride = MOST_LOOKS / looks;
-        let truth = self.law.samples.iter().skip(stride - 1).step_by(stride);
+        let law: Vec<_> = (1..=looks as u64)
+            .map(|look| self.law.after(look * every, timestep))
+            .collect();
         let held = Law::Held {
             gains: self.control.gains,
             setpoint: self.control.setpoint,
             period: timestep,
         };
-        let spacing = self.duration / length_in_f64(looks);
-        let plant = (!self.control.is_free())
-            .then(|| ReferenceMotion::of(arm, &start, &held, spacing, looks));
-        let plant: Vec<_> = match &plant {
-            Some(plant) => plant.samples.iter().collect(),
-            None => truth.clone().collect(),
+        let plant = if self.control.is_free() {
+            law.clone()
+        } else {
+            let spacing = self.duration / length_in_f64(looks);
+            let plant = ReferenceMotion::of(arm, &start, &held, spacing, looks).samples;
+            plant.into_iter().map(|(angles, _)| angles).collect()
         };
         let parts = |&method| {
             let exact = exact_steps(arm, &start, &held, method, timestep, every, looks);
@@ -88,30 +91,20 @@ impl Budget {
                 timestep,
                 ..Parts::default()
             };
-            for (((law, _), (plant, _)), (exact, _)) in truth.clone().zip(&plant).zip(&exact) {
+            let raise = |part: &mut f64, error| *part = largest([*part, error].into_iter());
+            for ((law, plant), (exact, _)) in law.iter().zip(&plant).zip(&exact) {
                 let is_whole = live.advance(every) == every;
                 let live = live
                     .state()
                     .position
                     .map(|q| if is_whole { q } else { f64::NAN });
-                parts.total = larger(parts.total, largest_difference(law, &live));
-                parts.rounding = larger(parts.rounding, largest_difference(exact, &live));
-                parts.truncation = larger(parts.truncation, distance(exact, plant));
-                parts.hold = larger(parts.hold, distance(plant, law));
+                raise(&mut parts.total, largest_difference(law, &live));
+                raise(&mut parts.rounding, largest_difference(exact, &live));
+                raise(&mut parts.truncation, distance(exact, plant));
+                raise(&mut parts.hold, distance(plant, law));
             }
             parts
         };
         methods.iter().map(parts).collect()
     }
-}
-
-fn distance(a: &[DoubleDouble; 2], b: &[DoubleDouble; 2]) -> f64 {
-    let both = a.iter().zip(b);
-    both.map(|(a, b)| (*a - *b).abs().to_f64())
-        .fold(0.0, larger)
-}
-
-/// The larger of two, or NaN if the second is.
-fn larger(a: f64, b: f64) -> f64 {
-    if b <= a { a } else { b }
 }

@@ -107,6 +107,8 @@ pub struct Scene {
     pub uncertainty: f64,
     /// Most steps of one run.
     pub most_steps: u64,
+    /// The largest stable timestep of each method \[s\] as predicted for the control at its setpoint, if it has one.
+    limits: [Option<f64>; Method::ALL.len()],
     run: Box<dyn SceneRun>,
 }
 
@@ -116,8 +118,6 @@ trait SceneRun {
     fn compare(&self, method: Method, outcome: RunOutcome, most: f64) -> RunOutcome;
     /// The same steps without counting or comparing: [`RunOutcome::end`].
     fn replay(&self, method: Method, steps: u64) -> f64;
-    /// The largest stable timestep \[s\] as predicted for the control at its setpoint, if there is one.
-    fn predicted_limit(&self, method: Method) -> Option<f64>;
 }
 
 impl Scene {
@@ -140,10 +140,10 @@ impl Scene {
         self.run.replay(method, steps)
     }
 
-    /// The largest stable timestep \[s\] as predicted for the scene's control at its setpoint, if it has one.
-    #[must_use]
-    pub fn predicted_limit(&self, method: Method) -> Option<f64> {
-        self.run.predicted_limit(method)
+    /// The predicted limits of its control, of methods that have one.
+    pub(crate) fn predicted_limits(&self) -> impl Iterator<Item = (Method, f64)> {
+        let all = Method::ALL.into_iter().zip(self.limits);
+        all.filter_map(|(method, limit)| Some((method, limit?)))
     }
 }
 
@@ -155,30 +155,19 @@ pub fn scenes() -> Vec<Scene> {
         position: [0.0, 0.5],
         velocity: [10.0, 0.0],
     };
-    let reach = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
-    let swing = |name, title, arm, start| {
-        arm_scene(
-            name,
-            title,
-            ControlLoop::<2>::free(arm),
-            start,
-            Actuation::Held,
-        )
-    };
     vec![
         particle_scene(),
-        swing(
+        swing::<2>(
             "swing-2",
             "Free swing, 2 links",
             Arm::default(),
             State::rest(),
         ),
-        arm_scene(
+        swing::<3>(
             "swing-3",
             "Free swing, 3 links",
-            ControlLoop::<3>::free(Arm::default()),
+            Arm::default(),
             State::rest(),
-            Actuation::Held,
         ),
         swing(
             "whirl-2",
@@ -186,103 +175,100 @@ pub fn scenes() -> Vec<Scene> {
             weightless,
             whirling,
         ),
-        arm_scene(
+        reach(
             "reach-continuous",
             "PD reach, law in every stage",
-            reach,
-            State::rest(),
-            Actuation::Continuous,
+            Sampling::Continuous,
         ),
-        arm_scene(
+        reach(
             "reach-held",
             "PD reach, effort held for the step",
-            reach,
-            State::rest(),
-            Actuation::Held,
+            Sampling::Held,
         ),
     ]
-}
-
-/// How the effort of an arm's scene is found. The reference is the law at every instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Actuation {
-    /// The law in every stage of every step; its integral gains are 0.
-    Continuous,
-    /// As shipped: the law at the start of a step, its effort held for the step.
-    Held,
 }
 
 /// Simulated time of an arm's scene \[s\].
 const ARM_DURATION: f64 = 2.0;
 
-fn arm_scene<const N: usize>(
+fn swing<const N: usize>(
     name: &'static str,
     title: &'static str,
-    control: ControlLoop<N>,
+    arm: Arm<N>,
     start: State<N>,
-    drive: Actuation,
 ) -> Scene {
-    let ControlLoop {
-        arm,
-        gains,
-        setpoint,
-        ..
-    } = &control;
-    let kind = match drive {
-        _ if control.is_free() => "none",
-        Actuation::Continuous => "continuous",
-        Actuation::Held => "held",
-    };
-    let law = match kind {
-        "none" => "no control".to_owned(),
-        kind => format!(
-            "effort {kind}, kp {:?}, kd {:?}, to {:?} rad, error against the law at every instant",
-            gains.kp, gains.kd, setpoint.position
-        ),
-    };
-    let State { position, velocity } = start;
-    let about = format!(
-        "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
-         {ARM_DURATION} s",
-        arm.lengths(),
-        arm.masses(),
-        arm.gravity(),
+    let run = ArmRun::new(ControlLoop::free(arm), start, Sampling::Held);
+    run.scene((name, title, "none"), "no control")
+}
+
+fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
+    let Gains { kp, kd, .. } = REACH_GAINS;
+    let (kind, goal) = (sampling.name(), REACH_SETPOINT.position);
+    let law = format!(
+        "effort {kind}, kp {kp:?}, kd {kd:?}, to {goal:?} rad, error against the law at every instant"
     );
-    let law = Law::Continuous(*gains, *setpoint);
-    let reference = ReferencePath::new(arm, &start, &law, ARM_DURATION);
+    let control = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
+    let linear = Linear::at_setpoint(&control);
     Scene {
-        name,
-        title,
-        about,
-        control: kind,
-        unit: "rad",
-        duration: ARM_DURATION,
-        uncertainty: reference.uncertainty(),
-        most_steps: u64::MAX,
-        run: Box::new(ArmRun {
-            control,
-            start,
-            drive,
-            reference,
-        }),
+        limits: Method::ALL.map(|method| largest_timestep(&linear, method, sampling)),
+        ..ArmRun::new(control, State::rest(), sampling).scene((name, title, kind), &law)
     }
 }
 
-/// An arm in motion. The steps are those of the live arm, bit for bit, wherever the live arm can take them.
+/// An arm in motion. The steps are those of the live arm, bit for bit, wherever the live arm can take them. The
+/// reference is the law at every instant; its integral gains are 0.
 struct ArmRun<const N: usize> {
     control: ControlLoop<N>,
     start: State<N>,
-    drive: Actuation,
+    sampling: Sampling,
     reference: ReferencePath<N>,
 }
 
 impl<const N: usize> ArmRun<N> {
+    fn new(control: ControlLoop<N>, start: State<N>, sampling: Sampling) -> Self {
+        let law = Law::Continuous(control.gains, control.setpoint);
+        Self {
+            control,
+            start,
+            sampling,
+            reference: ReferencePath::new(&control.arm, &start, &law, ARM_DURATION),
+        }
+    }
+
+    fn scene(
+        self,
+        (name, title, control): (&'static str, &'static str, &'static str),
+        law: &str,
+    ) -> Scene {
+        let arm = &self.control.arm;
+        let State { position, velocity } = self.start;
+        let about = format!(
+            "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
+             {ARM_DURATION} s",
+            arm.lengths(),
+            arm.masses(),
+            arm.gravity(),
+        );
+        Scene {
+            name,
+            title,
+            about,
+            control,
+            unit: "rad",
+            duration: ARM_DURATION,
+            uncertainty: self.reference.uncertainty(),
+            most_steps: u64::MAX,
+            limits: [None; Method::ALL.len()],
+            run: Box::new(self),
+        }
+    }
+
     /// The arm before its first step.
     fn ready(&self, method: Method, timestep: f64) -> Box<dyn Steppable<N>> {
         let control = self.control.with_method(method).with_timestep(timestep);
-        match self.drive {
-            Actuation::Continuous => Box::new(ContinuousLoop::new(control, self.start, [0.0; N])),
-            Actuation::Held => Box::new(control.simulation(self.start)),
+        match self.sampling {
+            Sampling::Continuous => Box::new(ContinuousLoop::new(control, self.start, [0.0; N])),
+            Sampling::Held => Box::new(control.simulation(self.start)),
         }
     }
 }
@@ -294,46 +280,28 @@ impl<const N: usize> SceneRun for ArmRun<N> {
         } = outcome;
         let every = steps.div_ceil(MOST_LOOKS).max(1);
         let mut run = self.ready(method, timestep);
-        for step in 1..=steps {
-            let evaluations = run.step();
-            outcome.evaluations += evaluations.unwrap_or(0);
+        let (mut done, mut is_known) = (0, true);
+        while is_known && done < steps {
+            let due = every.min(steps - done);
+            let taken = run.advance(due);
+            done += taken;
             outcome.end = run.state().position.iter().sum();
-            if evaluations.is_some() && !step.is_multiple_of(every) && step < steps {
-                continue;
-            }
-            let exact = self.reference.after(step, timestep);
-            let error = evaluations.map(|_| largest_difference(&exact, &run.state().position));
-            if !outcome.take(step, error.unwrap_or(f64::NAN), most) {
-                break;
-            }
+            is_known = if taken == due {
+                let exact = self.reference.after(done, timestep);
+                let error = largest_difference(&exact, &run.state().position);
+                outcome.take(done, error, most)
+            } else {
+                outcome.take(done + 1, f64::NAN, most)
+            };
         }
+        outcome.evaluations = done * u64::from(method.evaluations());
         outcome
     }
 
     fn replay(&self, method: Method, steps: u64) -> f64 {
-        let timestep = ARM_DURATION / in_f64(steps);
-        if self.drive == Actuation::Held {
-            let control = self.control.with_method(method).with_timestep(timestep);
-            let mut live = control.simulation(self.start);
-            live.advance(steps);
-            return live.state().position.iter().sum();
-        }
-        let mut run = self.ready(method, timestep);
-        for _ in 0..steps {
-            if run.step().is_none() {
-                break;
-            }
-        }
+        let mut run = self.ready(method, ARM_DURATION / in_f64(steps));
+        run.advance(steps);
         run.state().position.iter().sum()
-    }
-
-    fn predicted_limit(&self, method: Method) -> Option<f64> {
-        let sampling = match self.drive {
-            _ if self.control.is_free() => return None,
-            Actuation::Continuous => Sampling::Continuous,
-            Actuation::Held => Sampling::Held,
-        };
-        largest_timestep(&Linear::at_setpoint(&self.control), method, sampling)
     }
 }
 
@@ -370,6 +338,7 @@ fn particle_scene() -> Scene {
         // Rounding of a closed form of a few operations at 106 bits.
         uncertainty: 1e-30,
         most_steps: MAX_STEPS,
+        limits: [None; Method::ALL.len()],
         run: Box::new(ParticleRun),
     }
 }
@@ -400,9 +369,5 @@ impl SceneRun for ParticleRun {
         };
         particle.advance(usize::MAX);
         particle.positions().last().copied().unwrap_or(f64::NAN)
-    }
-
-    fn predicted_limit(&self, _: Method) -> Option<f64> {
-        None
     }
 }

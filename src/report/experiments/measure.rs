@@ -6,6 +6,9 @@
 //! energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose. A single joint may move further off
 //! for a while.
 //!
+//! How fast a deviation grows per control period shows once it is scaled back to the size of the nudge after every
+//! period. So the fastest mode alone is left, and neither dies in rounding nor leaves the linear range.
+//!
 //! **Invariant:** no prediction enters but the equilibrium and a timestep to start the search from.
 
 #![allow(
@@ -21,6 +24,7 @@ use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Equilibrium, equilibrium, gravity_gradient};
+use crate::study::matrix::largest;
 use crate::study::stability::Sampling;
 
 /// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold
@@ -36,6 +40,12 @@ const ESCAPED: f64 = 2e-3;
 
 /// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.
 const DEAD: f64 = 1e-11;
+
+/// Periods before counting starts, in which all modes but the fastest fall behind.
+const BEFORE: u32 = 2000;
+
+/// Periods over which the growth is averaged: where in a swing they begin and end then matters less than 0.1 %.
+const COUNTED: u32 = 4000;
 
 /// Halvings of the search interval; the last one is narrower than 0.005 %.
 const HALVINGS: u32 = 15;
@@ -190,7 +200,7 @@ pub fn in_substeps<const N: usize>(
 
 /// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the
 /// velocity.
-pub(super) fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> State<N> {
+fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> State<N> {
     let mut state = State::at_rest(*position);
     let mut nudge = NUDGE;
     for i in 0..N {
@@ -199,6 +209,51 @@ pub(super) fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; 
         nudge *= -0.618;
     }
     state
+}
+
+/// Mean factor by which a deviation grows per control period of `substeps` steps, the effort held over it; the loop's
+/// timestep is the period. `None` if it is not finite.
+#[must_use]
+pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32) -> Option<f64> {
+    let period = control.timestep;
+    let control = in_substeps(control, substeps, false);
+    let rest = equilibrium(&control);
+    let mut live = live_at(&control, &rest, nudged(&control, &rest.position));
+    let mut logarithm = 0.0;
+    for count in 0..BEFORE + COUNTED {
+        live.advance(substeps.into());
+        let State { position, velocity } = *live.state();
+        let integral = live.pid().integral();
+        let moved: [f64; N] = std::array::from_fn(|i| position[i] - rest.position[i]);
+        // An integral that acts on nothing only drifts.
+        let acting = control.integrating().map(|acts| f64::from(u8::from(acts)));
+        let gathered: [f64; N] =
+            std::array::from_fn(|i| acting[i] * (integral[i] - rest.integral[i]));
+        let turning = velocity.map(|velocity| period * velocity);
+        let deviation = [moved, turning, gathered];
+        let size = largest(deviation.iter().flatten().map(|value| value.abs()));
+        if live.divergence().is_some() {
+            return None;
+        }
+        if size == 0.0 {
+            return Some(0.0);
+        }
+        let back = NUDGE / size;
+        let scaled = State {
+            position: std::array::from_fn(|i| rest.position[i] + back * moved[i]),
+            velocity: velocity.map(|velocity| velocity * back),
+        };
+        live = Simulation::continued(&Checkpoint {
+            state: scaled,
+            carry: State::rest(),
+            integral: std::array::from_fn(|i| rest.integral[i] + back * gathered[i]),
+            ..live.checkpoint()
+        });
+        if count >= BEFORE {
+            logarithm -= back.ln();
+        }
+    }
+    Some((logarithm / f64::from(COUNTED)).exp())
 }
 
 /// The boundary above which `holds` no longer does, by bisection around `guess`.

@@ -2,8 +2,7 @@
 //!
 //! | module | answers |
 //! | --- | --- |
-//! | [`measure`] | the largest stable timestep, measured on the arm itself |
-//! | [`growth`] | growth per control period, measured |
+//! | [`measure`] | the largest stable timestep and the growth per control period, measured on the arm itself |
 //! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
 //! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
 //! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
@@ -23,7 +22,6 @@ pub mod budget;
 pub mod chaos;
 pub mod conditioning;
 pub mod error;
-pub mod growth;
 pub mod measure;
 pub mod nonlinear;
 pub mod reference;

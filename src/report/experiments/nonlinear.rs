@@ -157,13 +157,16 @@ impl PeriodicSwing {
     /// The method's derivative is taken along the true swing, which is followed with far smaller steps.
     #[must_use]
     pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
+        /// Steps of the swing in one of the method's, and a deviation.
         const WITHIN: u32 = 32;
+        const NUDGE: f64 = 1e-5;
         let arm = Arm::<2>::default();
         let h = self.period / f64::from(steps);
         let mut here = self.start;
         let mut product = Matrix::from_fn(4, |i, j| f64::from(u8::from(i == j)));
         for _ in 0..steps {
-            product = derivative(&arm, method, &here, h).product(&product);
+            let step = |state: &_| state_after(&arm, method, state, &[0.0; 2], h);
+            product = derivative(&here, [NUDGE; 2], step).product(&product);
             for _ in 0..WITHIN {
                 here = state_after(&arm, Method::Rk4, &here, &[0.0; 2], h / f64::from(WITHIN));
             }
@@ -207,30 +210,26 @@ fn through_hanging(amplitude: f64, second: f64) -> Option<(f64, f64)> {
     Some((state.position[1], time))
 }
 
-/// How a step changes a deviation, by central differences.
-fn derivative(arm: &Arm<2>, method: Method, here: &State<2>, h: f64) -> Matrix {
-    const NUDGE: f64 = 1e-5;
-    let mut columns = Vec::new();
-    for column in 0..4 {
-        let nudged = |by: f64| {
-            let mut near = *here;
-            if column < 2 {
-                near.position[column] += by;
-            } else {
-                near.velocity[column - 2] += by;
-            }
-            let next = state_after(arm, method, &near, &[0.0; 2], h);
-            [
-                next.position[0],
-                next.position[1],
-                next.velocity[0],
-                next.velocity[1],
-            ]
-        };
-        let (above, below) = (nudged(NUDGE), nudged(-NUDGE));
-        columns.push(std::array::from_fn::<f64, 4, _>(|i| {
-            (above[i] - below[i]) / (2.0 * NUDGE)
-        }));
-    }
-    Matrix::from_fn(4, |row, column| columns[column][row])
+/// How a map of states changes a deviation from `here`, by central differences of these sizes of positions \[rad\] and
+/// velocities \[rad/s\].
+pub(super) fn derivative<const N: usize>(
+    here: &State<N>,
+    sizes: [f64; 2],
+    map: impl Fn(&State<N>) -> State<N>,
+) -> Matrix {
+    let moved = |column: usize, by: f64| -> Vec<f64> {
+        let mut near = *here;
+        let values = [&mut near.position, &mut near.velocity];
+        values[column / N][column % N] += by;
+        let State { position, velocity } = map(&near);
+        [position, velocity].concat()
+    };
+    let columns = (0..2 * N).map(|column| {
+        let size = sizes[column / N];
+        let both = moved(column, size).into_iter().zip(moved(column, -size));
+        both.map(|(above, below)| (above - below) / (2.0 * size))
+            .collect()
+    });
+    let columns: Vec<Vec<f64>> = columns.collect();
+    Matrix::from_fn(2 * N, |row, column| columns[column][row])
 }

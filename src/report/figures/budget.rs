@@ -7,26 +7,24 @@ use crate::math::integrator::Method;
 use crate::report::experiments::budget::{Budget, Parts};
 use crate::report::experiments::error::{OUTPUTS, REACH};
 use crate::report::section::Section;
-use crate::report::svg::{
-    Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
-};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, scientific, seconds};
 
 const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
 
-/// A part of the error: class, marker, name and value.
-type ErrorPart = (&'static str, Marker, &'static str, fn(&Parts) -> f64);
+/// A part of the error: its look and its value.
+type ErrorPart = (fn() -> Key, fn(&Parts) -> f64);
 
-const PARTS: [ErrorPart; 3] = [
-    ("c1", Marker::Diamond, "truncation (the method)", |parts| {
-        parts.truncation
-    }),
-    ("c3", Marker::Circle, "rounding (53 bits)", |parts| {
-        parts.rounding
-    }),
-    ("c2", Marker::Square, "control hold (the period)", |parts| {
-        parts.hold
-    }),
+const METHOD: fn() -> Key = || Key::line("c1", "truncation (the method)").marked(Marker::Diamond);
+const DIGITS: fn() -> Key = || Key::line("c3", "rounding (53 bits)").marked(Marker::Circle);
+const PERIOD: fn() -> Key = || Key::line("c2", "control hold (the period)").marked(Marker::Square);
+const TOTAL: fn() -> Key = || Key::line("ink", "all of it").dashed();
+
+const PARTS: [ErrorPart; 4] = [
+    (METHOD, |parts| parts.truncation),
+    (DIGITS, |parts| parts.rounding),
+    (PERIOD, |parts| parts.hold),
+    (TOTAL, |parts| parts.total),
 ];
 
 pub(super) fn make(section: &mut Section) {
@@ -70,21 +68,11 @@ fn figure(section: &mut Section, scenes: &[(&str, &Vec<Vec<Parts>>)]) {
     for (scene, runs) in scenes {
         for (index, method) in METHODS.iter().enumerate() {
             let parts: Vec<&Parts> = runs.iter().filter_map(|run| run.get(index)).collect();
-            let mut plot = Plot::new(format!("{scene}, {method}"), x.clone(), y.clone());
-            let total = parts.iter().map(|parts| (parts.timestep, parts.total));
-            let all = Curve::line(Key::line("ink", "all of it").dashed(), total);
-            for (class, marker, name, of) in PARTS {
-                let points = parts.iter().map(|parts| {
-                    let (timestep, value) = (parts.timestep, of(parts));
-                    let said = [scientific(value), seconds(timestep)].join(" rad at ");
-                    Point::new(timestep, value, format!("{name}: {said}"))
-                });
-                let points = points.filter(|point| point.y != 0.0);
-                let key = Key::line(class, name).marked(marker);
-                plot.curves.push(Curve::line(key, points));
-            }
-            plot.curves.push(all);
-            panels.push(plot.draw());
+            let plot = Plot::new(format!("{scene}, {method}"), x.clone(), y.clone());
+            panels.push(plot.with(PARTS.map(|(key, of)| {
+                let points = parts.iter().map(|parts| (parts.timestep, of(parts)));
+                Curve::line(key(), points.filter(|point| point.1 != 0.0))
+            })));
         }
     }
     section.figure(

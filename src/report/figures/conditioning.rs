@@ -5,7 +5,7 @@
 use super::fit::worst;
 use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::section::Section;
-use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, power};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
 
 /// Digits that the recursion may lose at worst.
 const ALLOWED: f64 = 2.5;
@@ -17,16 +17,16 @@ const POSES: [(&str, PoseShape); 3] = [
 ];
 
 /// A way of solving: its look and its worst loss.
-type Way = (&'static str, Marker, &'static str, fn(&Lost) -> f64);
+type Way = (fn() -> Key, fn(&Lost) -> f64);
+
+const DENSE: fn() -> Key = || Key::line("c2", "elimination of M(q)").marked(Marker::Square);
+const INHERENT: fn() -> Key = || Key::line("soft", "inherent").dashed();
+const RECURSION: fn() -> Key = || Key::line("c1", "this arm's recursion").marked(Marker::Diamond);
 
 const WAYS: [Way; 3] = [
-    ("c2", Marker::Square, "elimination of M(q)", |lost| {
-        lost.dense
-    }),
-    ("soft", Marker::None, "inherent", |lost| lost.inherent),
-    ("c1", Marker::Diamond, "this arm's recursion", |lost| {
-        lost.recursion
-    }),
+    (DENSE, |lost| lost.dense),
+    (INHERENT, |lost| lost.inherent),
+    (RECURSION, |lost| lost.recursion),
 ];
 
 pub(super) fn make(section: &mut Section) {
@@ -73,21 +73,10 @@ pub(super) fn make(section: &mut Section) {
     let panels = poses.map(|(title, lost)| {
         let x = "mass of the last link / mass of the others";
         let x = Axis::log(x, Unit::Number, (1e-9, 1e9));
-        let mut plot = Plot::new(title, x, Axis::linear("digits lost, of 16", (0.0, 12.0)));
-        for (class, marker, name, of) in WAYS {
-            let points = lost.iter().map(|(ratio, lost)| {
-                let said = format!("{}: {} digits", power(ratio.log10()), number(of(lost)));
-                Point::new(*ratio, of(lost), said)
-            });
-            let key = Key::line(class, name).marked(marker);
-            let key = if marker == Marker::None {
-                key.dashed()
-            } else {
-                key
-            };
-            plot.curves.push(Curve::line(key, points));
-        }
-        plot.draw()
+        let y = Axis::linear("digits lost, of 16", (0.0, 12.0));
+        Plot::new(title, x, y).with(WAYS.map(|(key, of)| {
+            Curve::line(key(), lost.iter().map(|(ratio, lost)| (*ratio, of(lost))))
+        }))
     });
     section.figure(
         "conditioning",

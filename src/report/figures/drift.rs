@@ -115,11 +115,10 @@ fn figure(section: &mut Section, headline: &str, swings: [Swing; 3], duration: f
             let baseline = Key::line("ink", "implicit midpoint").dashed();
             let curves = keys.into_iter().chain([baseline]);
             let drifts = swing.methods.into_iter().chain([swing.baseline]);
-            let mut plot = Plot::new(swing.title, x.clone(), y.clone());
-            plot.curves.extend(curves.zip(drifts).map(|(key, drift)| {
+            let plot = Plot::new(swing.title, x.clone(), y.clone());
+            plot.with(curves.zip(drifts).map(|(key, drift)| {
                 Curve::line(key, drift.into_iter().filter(|point| point.1 > 0.0))
-            }));
-            plot.draw()
+            }))
         });
     section.figure(
         "energy-drift",

@@ -8,9 +8,7 @@ use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
 use crate::report::section::{Cell, Section, Table, by_method};
-use crate::report::svg::{
-    Axis, Curve, Key, Mark, Plot, Point, Unit, number, power, scientific, seconds,
-};
+use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, scientific, seconds};
 use crate::report::timing::{Effort, Timing, time};
 
 /// Errors between which a slope is fitted \[rad\]: above, higher orders still show; below, rounding does.
@@ -21,6 +19,9 @@ const RESOLUTION: u64 = 256;
 
 /// No search tries more steps than this: a method that needs more is far from the cheapest.
 const MOST_SEARCHED: u64 = 1 << 17;
+
+/// The lower end of the axis of errors \[rad\].
+const LEAST_SHOWN: f64 = 1e-17;
 
 const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
@@ -236,16 +237,20 @@ fn scene_list(data: &[Data]) -> Table {
     table
 }
 
-/// A panel for each scene. All share the error axis, so that scenes can be compared.
-fn plots(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
+/// A panel for each scene. All share the error axis, so that scenes can be compared. `place` has the x of a run and its
+/// quartiles.
+fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> (f64, Option<(f64, f64)>)) -> Vec<Plot> {
     let plot = |data: &Data| {
         let label = match data.scene.unit {
             "m" => "largest error [m]",
             _ => "largest error [rad]",
         };
-        let y = Axis::log(label, Unit::Number, (1e-17, 10.0));
+        let y = Axis::log(label, Unit::Number, (LEAST_SHOWN, 10.0));
         let mut plot = Plot::new(data.scene.title, x.clone(), y);
-        plot.curves.extend(Method::ALL.map(|method| {
+        let rounding = Key::line("soft", "rounding: one unit in the last place of 1 rad").dashed();
+        let ends = [x.min, x.max].map(|x| (x, f64::EPSILON));
+        plot.add(Curve::line(rounding, ends));
+        plot.with(Method::ALL.map(|method| {
             let points = data.of(method).map(|run| {
                 let RunOutcome {
                     timestep,
@@ -253,20 +258,18 @@ fn plots(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
                     evaluations,
                     ..
                 } = run.outcome;
-                let outcome = match error.is_finite() {
-                    true => format!("error {} {}", scientific(error), data.scene.unit),
-                    false => "diverged".to_owned(),
-                };
                 let times = [seconds(timestep), seconds(run.timing.minimum)].join(" in ");
-                let tooltip = format!("{method}: dt {times}, {evaluations} evaluations: {outcome}");
-                // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
-                Point::new(of(run), error.max(1e-17), tooltip)
+                let (x, spread) = place(run);
+                Point {
+                    x,
+                    // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
+                    y: error.max(LEAST_SHOWN),
+                    spread,
+                    note: format!("dt {times}, {evaluations} evaluations"),
+                }
             });
             Curve::line(Key::of(method), points)
-        }));
-        plot.marks
-            .push(Mark::Horizontal(f64::EPSILON, "soft", "rounding"));
-        plot
+        }))
     };
     data.iter().map(plot).collect()
 }
@@ -275,14 +278,11 @@ fn against_time(section: &mut Section, data: &[Data]) {
     let all = data.iter().flat_map(|data| &data.runs);
     let times = all.map(|run| run.timing.minimum);
     let x = Axis::around("time for the whole run", Unit::Seconds, times);
-    let mut plots = plots(data, &x, |run| run.timing.minimum);
+    let mut plots = plots(data, &x, |run| {
+        (run.timing.minimum, Some(run.timing.quartiles))
+    });
     for (plot, data) in plots.iter_mut().zip(data) {
         plot.above = data.evaluation_time().map(|time| (time, "evaluations"));
-        let points = plot.curves.iter_mut().flat_map(|curve| &mut curve.points);
-        let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
-        for (point, run) in points.zip(runs) {
-            point.spread = Some(run.timing.quartiles);
-        }
     }
     let swing = of(data, "swing-2");
     let cost = |method| swing.and_then(|data| data.cost(method, 1e-6));
@@ -300,11 +300,11 @@ fn against_time(section: &mut Section, data: &[Data]) {
         &title,
         "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is \
          the minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
-         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. Dotted \
-         line: one unit in the last place of 1 rad. The error of a reach is the distance from a law that acts at every \
-         instant. The distance from the loop whose law runs once a period is the truncation in the figure of the \
-         error's parts. Each mark's tooltip has its own evaluations.",
-        &plots.iter().map(Plot::draw).collect::<Vec<_>>(),
+         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. The error \
+         of a reach is the distance from a law that acts at every instant. The distance from the loop whose law runs \
+         once a period is the truncation in the figure of the error's parts. Each mark's tooltip has its own \
+         evaluations.",
+        &plots,
     );
 }
 
@@ -312,16 +312,24 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
     let all = data.iter().flat_map(|data| &data.runs);
     let timesteps = all.map(|run| run.outcome.timestep);
     let x = Axis::around("timestep", Unit::Seconds, timesteps);
-    let mut plots = plots(data, &x, |run| run.outcome.timestep);
+    let mut plots = plots(data, &x, |run| (run.outcome.timestep, None));
     for (plot, data) in plots.iter_mut().zip(data) {
-        plot.marks
-            .extend(Method::ALL.into_iter().filter_map(|method| {
-                let limit = data.scene.predicted_limit(method)?;
-                let tooltip = format!("{method}: predicted stability limit {}", seconds(limit));
-                Some(Mark::Vertical(limit, method.name(), tooltip))
-            }));
-        plot.marks
-            .push(Mark::Slopes((x.max / 60.0, 1e-14), [1.0, 2.0, 4.0]));
+        let ends = [plot.y.min, plot.y.max];
+        let limits = data.scene.predicted_limits().map(|(method, limit)| {
+            let key = Key::line(method.name(), "").dashed();
+            Curve::line(key, ends.map(|y| (limit, y)))
+        });
+        let (corner, key) = (
+            x.max / 60.0,
+            Key::line("ink", "slopes of orders 1, 2 and 4"),
+        );
+        let strokes = [1e1, 1e2, 1e4].map(|rise| {
+            Curve::line(
+                key.clone(),
+                [(corner, 1e-14), (10.0 * corner, 1e-14 * rise)],
+            )
+        });
+        plot.curves.extend(limits.chain(strokes));
     }
     let held = data.iter().find(|data| data.is_held());
     let order = |method| {
@@ -335,9 +343,9 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
             order(Method::Rk4),
             order(Method::Verlet)
         ),
-        "The runs of the figure before, by timestep: the slope is the order of the method. Dotted upright lines: the \
-         predicted largest stable timestep at the setpoint, one per method. The three strokes show orders 1, 2 and 4.",
-        &plots.iter().map(Plot::draw).collect::<Vec<_>>(),
+        "The runs of the figure before, by timestep: the slope is the order of the method. Dashed upright lines: the \
+         predicted largest stable timestep at the setpoint, one per method.",
+        &plots,
     );
 }
 

@@ -7,7 +7,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::report::experiments::nonlinear::{PeriodicSwing, arrives, is_carried, move_of, spun};
 use crate::report::section::Section;
-use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Panel, Plot, Unit, number};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
 use crate::study::stability::{limit_held, limits};
@@ -92,46 +92,40 @@ pub(super) fn make(section: &mut Section) {
 fn map<P: Fn(f64) -> f64, H: Fn(f64, f64) -> bool>(
     kind: &Kind,
     columns: usize,
-    panels: &mut Vec<Panel>,
+    panels: &mut Vec<Plot>,
     measure: impl Fn(Method) -> (P, H),
 ) -> (usize, usize) {
     let mut counts = (0, 0);
-    let edges = [kind.steps, kind.values].map(|ends| edges(ends, columns));
-    let [steps, values] = edges.each_ref().map(|edges| centres(edges));
+    let [steps, values] = [kind.steps, kind.values].map(|ends| centres(&edges(ends, columns)));
     for method in Method::ALL {
         let (predicted, holds) = measure(method);
-        let (mut line, mut rows) = (Vec::new(), Vec::new());
+        let (mut line, mut cells) = (Vec::new(), [Vec::new(), Vec::new()]);
         for value in &values {
             let limit = predicted(*value);
             if limit <= kind.steps.1 {
                 line.push((limit, *value));
             }
-            let row: Vec<bool> = steps.iter().map(|h| holds(*value, *h)).collect();
-            let within = steps.iter().zip(&row);
-            for (_, holds) in within.filter(|(h, _)| **h <= ADVISED * limit) {
-                counts.0 += 1;
-                counts.1 += usize::from(!holds);
+            for h in &steps {
+                let holds = holds(*value, *h);
+                if *h <= ADVISED * limit {
+                    counts.0 += 1;
+                    counts.1 += usize::from(!holds);
+                }
+                let [lost, carried] = &mut cells;
+                (if holds { carried } else { lost }).push((*h, *value));
             }
-            rows.push(
-                row.iter()
-                    .map(|holds| if *holds { "yes" } else { "no" })
-                    .collect(),
-            );
         }
-        let mut plot = Plot::new(
+        let plot = Plot::new(
             format!("{method}, {}", kind.name),
             Axis::log("timestep", Unit::Seconds, kind.steps),
             Axis::log(kind.label, Unit::Number, kind.values),
         );
-        let edges = edges.clone();
-        plot.heat = Some(Heat { edges, rows });
-        plot.curves
-            .push(Curve::line(Key::line("ink", "predicted limit"), line));
-        for (class, label) in [("yes", "arrives, or keeps its energy"), ("no", "does not")] {
-            let key = Key::line(class, label).marked(Marker::Square);
-            plot.curves.push(Curve::named(key));
-        }
-        panels.push(plot.draw());
+        let keys = [("no", "does not"), ("yes", "arrives, or keeps its energy")];
+        let cells = keys.into_iter().zip(cells).map(|((class, label), cells)| {
+            Curve::cells(Key::line(class, label).marked(Marker::Square), cells)
+        });
+        let line = Curve::line(Key::line("ink", "predicted limit"), line);
+        panels.push(plot.with(cells.chain([line])));
     }
     counts
 }

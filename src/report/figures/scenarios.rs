@@ -3,9 +3,9 @@
 //! **Invariant:** a scene that is not run is listed as not run, one that falls short as falling short.
 
 use crate::report::experiments::scenarios;
-use crate::report::scenes::{LiveRun, LiveScene, live_scenes};
-use crate::report::section::{Cell, Section, Table, lines};
-use crate::report::svg::{HEIGHT, Key, Panel, PlotNumber, WIDTH, escape, number, plain, seconds};
+use crate::report::scenes::{LiveScene, live_scenes};
+use crate::report::section::{Cell, Section, Table};
+use crate::report::svg::{Axis, Curve, Form, Key, Plot, Thumbnail, number, plain, seconds};
 use crate::study::matrix::largest;
 
 pub(super) fn make(section: &mut Section) {
@@ -83,93 +83,42 @@ const JOINTS: [(&str, &str); 3] = [("j1", "joint 1"), ("j2", "joint 2"), ("j3", 
 /// The page that a picture's name opens.
 const PAGE: &str = "http://127.0.0.1:9095/#";
 
-/// Half of a panel's paper, and where the curves are.
-const SMALL_WIDTH: f64 = 0.5 * WIDTH;
-const SMALL_HEIGHT: f64 = 0.5 * HEIGHT;
-const LEFT: f64 = 8.0;
-const RIGHT: f64 = SMALL_WIDTH - LEFT;
-const TOP: f64 = 40.0;
-const MIDDLE: f64 = 0.5 * (TOP + SMALL_HEIGHT - 24.0);
-
-fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Panel {
-    /// A letter of a heading is no wider on average, in pixels.
-    const LETTER: f64 = 8.2;
-    let bottom = SMALL_HEIGHT - 8.0;
-    let (class, verdict) = match holds {
+/// Joint angles over time by the scene's live arm, or why there are none.
+fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
+    let watched = live.watch();
+    let samples = watched.as_ref().map_or(&[][..], |watched| &watched.samples);
+    let angles = samples.iter().flat_map(|(_, angles)| angles);
+    let largest = largest(angles.map(|angle| angle.abs()));
+    let end = samples.last().map_or(0.0, |(time, _)| *time);
+    let [width, reach] = [end, largest].map(|it| if it > 0.0 { it } else { 1.0 });
+    let x = Axis::linear("time [s]", (0.0, width));
+    let y = Axis::linear("angle from the start [rad]", (-reach, reach));
+    let mut plot = Plot::new(name, x, y);
+    for (joint, (class, label)) in JOINTS.into_iter().enumerate() {
+        let points = samples.iter();
+        let points = points.filter_map(|(time, angles)| Some((*time, *angles.get(joint)?)));
+        plot.add(Curve::line(Key::line(class, label), points));
+    }
+    if watched.as_ref().is_ok_and(|watched| watched.diverged) {
+        let lost = [(end, f64::INFINITY)];
+        plot.add(Curve::dots(Key::line("ink", ""), lost));
+    }
+    let (link, note) = match watched {
+        Ok(_) => (
+            format!("{PAGE}{}", live.fragment()),
+            format!("{}, ±{} rad", seconds(live.seconds()), number(largest)),
+        ),
+        Err(why) => (String::new(), why),
+    };
+    let verdict = match holds {
         Some(true) => ("good", "holds"),
         Some(false) => ("bad", "falls short"),
         None => ("soft", "not run"),
     };
-    let mut heading = String::new();
-    for (y, line) in [15, 31].into_iter().zip(lines(name, RIGHT - LEFT, LETTER)) {
-        let line = escape(&line);
-        heading += &format!("<text class=\"title\" x=\"{LEFT}\" y=\"{y}\">{line}</text>");
-    }
-    let (drawn, rows) = match live.watch() {
-        Ok(watched) => {
-            let link = escape(&live.fragment());
-            let angles = watched.samples.iter().flat_map(|(_, angles)| angles);
-            let largest = largest(angles.map(|angle| angle.abs()));
-            let scale = format!("{}, ±{} rad", seconds(live.seconds()), number(largest));
-            let drawn = format!(
-                "<a href=\"{PAGE}{link}\">{heading}</a>{}<text class=\"note\" x=\"{LEFT}\" y=\"{bottom}\">{scale}\
-                 </text>",
-                curves(&watched, largest)
-            );
-            (drawn, rows(name, &watched))
-        }
-        Err(why) => {
-            let why = escape(&why);
-            let note = format!("<text class=\"note\" x=\"{LEFT}\" y=\"{MIDDLE}\">{why}</text>");
-            (heading + &note, Vec::new())
-        }
-    };
-    Panel {
-        svg: format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {SMALL_WIDTH} {SMALL_HEIGHT}\" role=\"img\" aria-label=\"{}\">{drawn}\
-             <text class=\"note {class}\" x=\"{RIGHT}\" y=\"{bottom}\" text-anchor=\"end\">{verdict}</text></svg>",
-            escape(name)
-        ),
-        keys: JOINTS
-            .map(|(class, label)| Key::line(class, label))
-            .to_vec(),
-        axes: ["time [s]", "angle from the start [rad]"].map(str::to_owned),
-        rows,
-    }
-}
-
-fn rows(name: &str, watched: &LiveRun) -> Vec<PlotNumber> {
-    let samples = watched.samples.iter();
-    let row = |(time, angles): &(f64, Vec<f64>)| {
-        let angles = angles.iter().zip(JOINTS);
-        let row = |(angle, (_, joint)): (&f64, (&str, &str))| {
-            (format!("{name}: {joint}"), *time, *angle, String::new())
-        };
-        angles.map(row).collect::<Vec<_>>()
-    };
-    samples.flat_map(row).collect()
-}
-
-fn curves(watched: &LiveRun, largest: f64) -> String {
-    let end = watched.samples.last().map_or(1.0, |(time, _)| *time);
-    let x = |time: f64| LEFT + (RIGHT - LEFT) * time / end;
-    let part = |angle: f64| if largest > 0.0 { angle / largest } else { 0.0 };
-    let y = |angle: f64| MIDDLE - (MIDDLE - TOP) * part(angle);
-    let mut out = String::new();
-    for (joint, (class, _)) in JOINTS.iter().enumerate() {
-        let points = watched.samples.iter().filter_map(|(time, angles)| {
-            Some(format!("{:.1} {:.1}", x(*time), y(*angles.get(joint)?)))
-        });
-        let points: Vec<String> = points.collect();
-        if !points.is_empty() {
-            let path = points.join("L");
-            out += &format!("<g class=\"series {class}\"><path class=\"line\" d=\"M{path}\"/></g>");
-        }
-    }
-    if watched.diverged {
-        let (x, y) = (RIGHT - 8.0, MIDDLE - 4.0);
-        out += "<g class=\"series ink\">";
-        out += &format!("<path class=\"lost\" d=\"M{x} {y}l8 8m0 -8l-8 8\"/></g>");
-    }
-    out
+    plot.form = Form::Thumbnail(Thumbnail {
+        link,
+        note,
+        verdict,
+    });
+    plot
 }

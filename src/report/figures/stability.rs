@@ -9,16 +9,15 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::report::experiments::growth::growth_per_period;
-use crate::report::experiments::measure::{STEPS, decays, growth, measured_limit, stiffened};
-use crate::report::section::{Cell, Section, Table, by_method};
-use crate::report::svg::{
-    Axis, Curve, Key, Mark, Marker, Panel, Plot, Point, Unit, number, seconds,
+use crate::report::experiments::measure::{
+    STEPS, decays, growth, growth_per_period, measured_limit, stiffened,
 };
+use crate::report::section::{Cell, Section, Table, by_method};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{
-    Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
+    Limits, Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 
 pub(super) fn make(section: &mut Section) {
@@ -30,55 +29,47 @@ pub(super) fn make(section: &mut Section) {
     section.table(&limits_table(&lines));
 }
 
-/// The limits of a loop with one kind of control, by method.
-struct LimitRow {
+/// Predicted and measured limit of a loop \[s\], the smallest of all poses, and the advice. A loop that is stable at no
+/// timestep has none.
+struct LimitCase {
     loop_name: String,
     sampling: Sampling,
-    limits: [Option<MethodLimit>; Method::ALL.len()],
-}
-
-/// Predicted and measured limit with a method, the smallest of all poses, and the advice \[s\].
-#[derive(Clone, Copy)]
-struct MethodLimit {
-    predicted: f64,
+    method: Method,
+    predicted: Option<f64>,
     measured: Option<f64>,
     others: [Option<f64>; 2],
 }
 
-impl LimitRow {
-    fn of(&self, method: Method) -> Option<MethodLimit> {
-        let mut all = Method::ALL.into_iter().zip(self.limits);
-        all.find(|(one, _)| *one == method)?.1
-    }
-}
-
-impl MethodLimit {
-    /// How far the measured limit is from the predicted one, as a part of it.
-    fn off(&self) -> f64 {
+impl LimitCase {
+    /// How far the measured limit is from the predicted one, as a part of it; none without a limit.
+    fn off(&self) -> Option<f64> {
         let measured = self.measured.unwrap_or(f64::INFINITY);
-        (measured / self.predicted - 1.0).abs()
+        Some((measured / self.predicted? - 1.0).abs())
     }
 
     fn cell(&self) -> Cell {
+        let Some(predicted) = self.predicted else {
+            return Cell::new("none").class("bad");
+        };
         let said = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), seconds);
         let mut details = vec![format!("measured {}", said(self.measured))];
         for (name, limit) in ["all poses", "advised"].into_iter().zip(self.others) {
             details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
         }
-        Cell::new(seconds(self.predicted)).detail(details.join(", "))
+        Cell::new(seconds(predicted)).detail(details.join(", "))
     }
 }
 
 /// The loops of 2 links and of 3.
-fn loops() -> Vec<LimitRow> {
-    let two = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8]);
-    let three = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8, -0.5]);
+fn loops() -> Vec<LimitCase> {
+    let two = |name, kp, kd| cases(name, proportional(kp, kd), [0.4, 0.8]);
+    let three = |name, kp, kd| cases(name, proportional(kp, kd), [0.4, 0.8, -0.5]);
     [
         two("mild", [200.0, 100.0], [30.0, 12.0]),
-        rows("default", Gains::default(), [0.4, 0.8]),
+        cases("default", Gains::default(), [0.4, 0.8]),
         two("stiff", [1e4; 2], [200.0, 60.0]),
         two("overdamped", [200.0; 2], [500.0; 2]),
-        rows("default", Gains::default(), [0.4, 0.8, -0.5]),
+        cases("default", Gains::default(), [0.4, 0.8, -0.5]),
         three("stiff", [1e4; 3], [300.0, 100.0, 30.0]),
         three("overdamped", [200.0; 3], [500.0; 3]),
     ]
@@ -92,34 +83,34 @@ fn proportional<const N: usize>(kp: [f64; N], kd: [f64; N]) -> Gains<N> {
     Gains { kp, ki, kd }
 }
 
-/// A row for each kind of control; a method with which the loop is stable at no timestep has no limit.
-fn rows<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> [LimitRow; 2] {
+/// The cases of a loop: each kind of control with each method.
+fn cases<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> Vec<LimitCase> {
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
-    let all = Method::ALL.map(|method| limits(&control.with_method(method)));
-    Sampling::ALL.map(|sampling| {
-        let mut methods = Method::ALL.into_iter();
-        let limits = all.map(|limits| {
-            let control = control.with_method(methods.next()?);
-            let (predicted, others) = match sampling {
-                Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
-                Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
-            };
-            let predicted = predicted.filter(|limit| *limit > 0.0)?;
-            Some(MethodLimit {
-                predicted,
-                measured: measured_limit(&control, sampling, predicted),
-                others,
-            })
-        });
-        LimitRow {
+    let all = Method::ALL.map(|method| {
+        let control = control.with_method(method);
+        (control, limits(&control))
+    });
+    let case = |sampling, (control, limits): &(ControlLoop<N>, Limits<N>)| {
+        let (predicted, others) = match sampling {
+            Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
+            Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
+        };
+        let predicted = predicted.filter(|limit| *limit > 0.0);
+        LimitCase {
             loop_name: format!("{N} links, {name} gains"),
             sampling,
-            limits,
+            method: control.method,
+            predicted,
+            measured: predicted.and_then(|limit| measured_limit(control, sampling, limit)),
+            others,
         }
-    })
+    };
+    let both = Sampling::ALL.into_iter();
+    both.flat_map(|sampling| all.each_ref().map(|one| case(sampling, one)))
+        .collect()
 }
 
-fn limits_table(lines: &[LimitRow]) -> Table {
+fn limits_table(cases: &[LimitCase]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
@@ -129,46 +120,55 @@ fn limits_table(lines: &[LimitRow]) -> Table {
          period: the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         by_method(&["Loop", "Control"]),
     );
-    for line in lines {
-        let control = match line.sampling {
+    for cases in cases
+        .chunk_by(|one, other| (&one.loop_name, one.sampling) == (&other.loop_name, other.sampling))
+    {
+        let Some(LimitCase {
+            loop_name,
+            sampling,
+            ..
+        }) = cases.first()
+        else {
+            continue;
+        };
+        let control = match sampling {
             Sampling::Held => "effort held for the step (as the live arm does)",
             Sampling::Continuous => "law in every stage",
         };
-        let mut row = vec![Cell::new(&line.loop_name), Cell::new(control)];
-        row.extend(line.limits.iter().map(|limit| match limit {
-            Some(limit) => limit.cell(),
-            None => Cell::new("none").class("bad"),
-        }));
-        table.rows.push(row);
+        let head = [Cell::new(loop_name), Cell::new(control)];
+        let cells = cases.iter().map(LimitCase::cell);
+        table.rows.push(head.into_iter().chain(cells).collect());
     }
     table
 }
 
-fn findings(section: &mut Section, lines: &[LimitRow]) {
+fn findings(section: &mut Section, cases: &[LimitCase]) {
     let at = |sampling, method| {
-        let mut lines = lines.iter().filter(|line| line.sampling == sampling);
-        lines
-            .find(|line| line.loop_name == "2 links, default gains")?
-            .of(method)
+        cases.iter().find(|case| {
+            let looks = (case.loop_name.as_str(), case.sampling, case.method);
+            looks == ("2 links, default gains", sampling, method)
+        })
     };
+    let limit = |sampling, method| at(sampling, method)?.predicted;
     if let (Some(verlet), Some(rk4), Some(continuous)) = (
-        at(Sampling::Held, Method::Verlet),
-        at(Sampling::Held, Method::Rk4),
-        at(Sampling::Continuous, Method::Rk4),
+        limit(Sampling::Held, Method::Verlet),
+        limit(Sampling::Held, Method::Rk4),
+        limit(Sampling::Continuous, Method::Rk4),
     ) {
+        let all_poses = at(Sampling::Held, Method::Rk4).and_then(|case| case.others[0]);
         section.find(format!(
             "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
              Verlet**. Both limits are the same, since the effort is held for the step. With the law in every stage \
              RK4 would be stable up to {}. That limit belongs to the simulation. The first one belongs to the \
              controller, and a real arm would show it. The smallest limit of all poses is {}.",
-            seconds(rk4.predicted),
-            seconds(verlet.predicted),
-            seconds(continuous.predicted),
-            seconds(rk4.others.first().copied().flatten().unwrap_or(f64::NAN)),
+            seconds(rk4),
+            seconds(verlet),
+            seconds(continuous),
+            seconds(all_poses.unwrap_or(f64::NAN)),
         ));
     }
-    let all = || lines.iter().flat_map(|line| line.limits).flatten();
-    let (count, furthest) = (all().count(), worst(all().map(|limit| limit.off())));
+    let off: Vec<f64> = cases.iter().filter_map(LimitCase::off).collect();
+    let (count, furthest) = (off.len(), worst(off));
     section.find(format!(
         "**The linearised loop predicts the arm's own limit to {} %** in {count} cases: 2 and 3 links, mild to \
          overdamped gains, all methods, both kinds of control.",
@@ -187,15 +187,14 @@ const FACTORS: (f64, f64) = (1e-2, 1e2);
 
 /// The empty map, whose legend tells both kinds of control.
 fn map_plot() -> Plot {
-    let mut plot = Plot::new(
+    let plot = Plot::new(
         "All methods",
         Axis::log("timestep", Unit::Seconds, TIMESTEPS),
         Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
     );
     let held = Key::line("soft", "predicted, effort held for the step");
     let continuous = Key::line("soft", "predicted, law in every stage").dashed();
-    plot.curves.extend([held, continuous].map(Curve::named));
-    plot
+    plot.with([held, continuous].map(Curve::named))
 }
 
 /// Does a nudge of the arm die out or grow, by timestep and stiffness, beside the predicted line.
@@ -231,20 +230,15 @@ fn map(section: &mut Section) {
             let first = growth.iter().position(|growth| !decays(*growth));
             let edge = first.filter(|first| *first > 0 && limit > 0.0);
             measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
-                let said = [seconds(*h), seconds(limit)].join(", predicted ");
-                let kind = sampling.name();
-                Point::new(
-                    *h,
-                    *factor,
-                    format!("{method}, {kind}: unstable from {said}"),
-                )
+                let note = format!("{}, predicted {}", sampling.name(), seconds(limit));
+                Point::new(*h, *factor, note)
             }));
         }
         let key = Key::of(method).marked(Marker::None);
         let is_held = sampling == Sampling::Held;
         let key = if is_held { key } else { key.dashed() };
-        plot.curves.push(Curve::line(key, predicted));
-        plot.curves.push(Curve::dots(Key::of(method), measured));
+        plot.add(Curve::line(key, predicted));
+        plot.add(Curve::dots(Key::of(method), measured));
     }
     section.claim(
         "At most 1 % of the map's cells that can be judged disagree with the prediction",
@@ -264,7 +258,7 @@ fn map(section: &mut Section) {
          the arm itself grew. In the lowest rows the gains are too weak to carry the arm against gravity, and no \
          timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
          energy by less than a factor e in the 4000 steps watched.",
-        &[plot.draw()],
+        &[plot],
     );
 }
 
@@ -304,11 +298,11 @@ fn regions(section: &mut Section) {
              begin near 1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
             PARTS.0, PARTS.1, RUNS[0], RUNS[1]
         ),
-        &circles.chain(runs).collect::<Vec<Panel>>(),
+        &circles.chain(runs).collect::<Vec<Plot>>(),
     );
 }
 
-fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Panel {
+fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Plot {
     let method = control.method;
     // As wide as it is high, on the paper.
     let mut plot = Plot::new(
@@ -318,8 +312,7 @@ fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Panel {
     );
     let angles = (0..=120).map(|part| TAU * f64::from(part) / 120.0);
     let circle = angles.map(|angle| (angle.cos(), angle.sin()));
-    plot.curves
-        .push(Curve::line(Key::line("ink", "the unit circle"), circle));
+    plot.add(Curve::line(Key::line("ink", "the unit circle"), circle));
     let linear = Linear::at_setpoint(control);
     let mut points = [Vec::new(), Vec::new()];
     for index in 0..SHOWN {
@@ -328,18 +321,14 @@ fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Panel {
         let values = step_matrix(&linear, method, Sampling::Held, h).eigenvalues();
         let [below, beyond] = &mut points;
         let side = if part <= 1.0 { below } else { beyond };
-        side.extend(values.into_iter().map(|value| {
-            let words = format!("{}: {:.3} {:+.3} i", seconds(h), value.re, value.im);
-            Point::new(value.re, value.im, words)
-        }));
+        let points = values.into_iter();
+        side.extend(points.map(|value| Point::new(value.re, value.im, seconds(h))));
     }
     let dots = sides().into_iter().zip(points);
-    plot.curves
-        .extend(dots.map(|(key, points)| Curve::dots(key, points)));
-    plot.draw()
+    plot.with(dots.map(|(key, points)| Curve::dots(key, points)))
 }
 
-fn runs(control: &ControlLoop<2>, limit: f64) -> Panel {
+fn runs(control: &ControlLoop<2>, limit: f64) -> Plot {
     const DURATION: f64 = 3.0;
     let y = "distance from the setpoint [rad]";
     let mut plot = Plot::new(
@@ -347,6 +336,9 @@ fn runs(control: &ControlLoop<2>, limit: f64) -> Panel {
         Axis::linear("simulated time [s]", (0.0, DURATION)),
         Axis::log(y, Unit::Number, (1e-12, 1e2)),
     );
+    let nudge = Key::line("soft", "the distance at the start").dashed();
+    let ends = [0.0, DURATION].map(|time| (time, NUDGE));
+    plot.add(Curve::line(nudge, ends));
     let setpoint = control.setpoint.position;
     for (part, key) in RUNS.into_iter().zip(sides()) {
         let h = part * limit;
@@ -365,11 +357,9 @@ fn runs(control: &ControlLoop<2>, limit: f64) -> Panel {
             let off = off.map(|(one, other)| (one - other).abs());
             points.push((time, off.fold(1e-12, f64::max)));
         }
-        plot.curves
-            .push(Curve::line(key.marked(Marker::None), points));
+        plot.add(Curve::line(key.marked(Marker::None), points));
     }
-    plot.marks.push(Mark::Horizontal(NUDGE, "soft", ""));
-    plot.draw()
+    plot
 }
 
 /// Ends of the axis of control periods \[s\], and the growth up to which curves are drawn.
@@ -433,14 +423,15 @@ fn control_period(section: &mut Section) {
 }
 
 impl Growth {
-    fn panel(&mut self, method: Method, dots: u32) -> Panel {
+    fn panel(&mut self, method: Method, dots: u32) -> Plot {
         let control = stiffened(1.0).with_method(method);
         let linear = Linear::at_setpoint(&control);
         let x = Axis::log("control period", Unit::Seconds, PERIODS);
         let y = Axis::linear("growth per control period", GROWTH);
         let mut plot = Plot::new(method.name(), x, y);
-        plot.marks
-            .push(Mark::Horizontal(1.0, "ink", "unstable above"));
+        let limit = Key::line("ink", "unstable above").dashed();
+        let ends = [PERIODS.0, PERIODS.1].map(|period| (period, 1.0));
+        plot.add(Curve::line(limit, ends));
         for (turn, (substeps, label, class, marker)) in (0..).zip(SUBSTEPS) {
             let predicted = |substeps, period| {
                 let stepping = Stepping::held(&linear, method, substeps, false);
@@ -450,7 +441,7 @@ impl Growth {
             let curve = curve.map(|period| (period, predicted(substeps, period)));
             let key = Key::line(class, label).marked(marker);
             let is_shown = |growth: f64| growth <= GROWTH.1;
-            plot.curves.push(Curve::line(
+            plot.add(Curve::line(
                 key.clone().marked(Marker::None),
                 curve.filter(|it| is_shown(it.1)),
             ));
@@ -475,15 +466,14 @@ impl Growth {
                 }
                 self.dots += 1;
                 self.furthest = self.furthest.max((measured / expected - 1.0).abs());
-                let said = format!("{measured:.5} measured, {expected:.5} predicted");
-                let tooltip = format!("{substeps} steps in {}: {said}", seconds(period));
-                points.push(Point::new(period, measured, tooltip));
+                let note = format!("{measured:.5} measured, {expected:.5} predicted");
+                points.push(Point::new(period, measured, note));
             }
-            plot.curves.push(Curve::dots(key, points));
+            plot.add(Curve::dots(key, points));
             self.limits
                 .extend(limit.filter(|_| method != Method::Euler));
         }
-        plot.draw()
+        plot
     }
 }
 

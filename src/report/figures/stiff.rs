@@ -7,9 +7,7 @@ use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
 use crate::report::section::Section;
-use crate::report::svg::{
-    Axis, Curve, Key, Marker, Panel, Plot, Point, Unit, number, power, scientific, seconds,
-};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, power, scientific};
 use crate::report::timing::{Effort, time};
 
 /// The error that is to be kept \[rad\].
@@ -64,7 +62,7 @@ pub(super) fn make(section: &mut Section) {
     }
     section.findings.extend(finding(&costs));
     verdicts(section, &costs, uncertainty);
-    let panels: Vec<Panel> = FAMILIES
+    let panels: Vec<Plot> = FAMILIES
         .into_iter()
         .flat_map(|it| panels(&costs, it))
         .collect();
@@ -172,7 +170,7 @@ fn verdicts(section: &mut Section, costs: &[Cost], uncertainty: f64) {
 }
 
 /// Evaluations and run time of one family.
-fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Panel; 2] {
+fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Plot; 2] {
     let panel = |what: &str, y| {
         let x = "stiffness ratio: the elbow's rate per the swing's";
         let x = Axis::log(x, Unit::Number, (0.5, 2e8));
@@ -192,24 +190,19 @@ fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Panel; 2] {
             Solver::Rodas3 => Key::line("ink", name).marked(Marker::Circle),
         };
         let runs = || of(costs, by, solver).filter_map(|cost| Some((cost.ratio, cost.run?)));
-        let counted = runs().map(|(ratio, (run, _))| {
-            let tooltip = format!("{name}: {}", run.evaluations);
-            Point::new(ratio, in_f64(run.evaluations), tooltip)
-        });
-        evaluations.curves.push(Curve::line(key.clone(), counted));
-        let timed = runs().map(|(ratio, (_, time))| {
-            Point::new(ratio, time, format!("{name}: {}", seconds(time)))
-        });
-        times.curves.push(Curve::line(key, timed));
+        let counted = runs().map(|(ratio, (run, _))| (ratio, in_f64(run.evaluations)));
+        evaluations.add(Curve::line(key.clone(), counted));
+        let timed = runs().map(|(ratio, (_, time))| (ratio, time));
+        times.add(Curve::line(key, timed));
         if let Solver::Explicit(method) = solver {
             let least = of(costs, by, solver).filter_map(|cost| {
                 Some((cost.ratio, cost.fewest? * f64::from(method.evaluations())))
             });
             let key = Key::line(method.name(), "").dashed();
-            evaluations.curves.push(Curve::line(key, least));
+            evaluations.add(Curve::line(key, least));
         }
     }
     let key = Key::line("soft", "demand of stability, predicted").dashed();
-    evaluations.curves.push(Curve::named(key));
-    [evaluations.draw(), times.draw()]
+    evaluations.add(Curve::named(key));
+    [evaluations, times]
 }

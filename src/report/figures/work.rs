@@ -19,7 +19,7 @@ use crate::math::pid::Gains;
 use crate::math::simulation::{Simulation, step_under};
 use crate::report::experiments::step_scene::{ready, undamped};
 use crate::report::section::{Cell, Section, Table};
-use crate::report::svg::{bars, number, seconds};
+use crate::report::svg::{Plot, number, seconds};
 use crate::report::timing::{Effort, time};
 use crate::study::control_loop::no_control;
 
@@ -98,6 +98,10 @@ fn particle(function: &str) -> f64 {
 /// with a detail behind a colon, and whether their difference is saved.
 const LEFT_OUT: &str = include_str!("left_out.txt");
 
+fn columns(line: &'static str) -> Vec<&'static str> {
+    line.split('|').map(str::trim).collect()
+}
+
 /// The factor and the unit in which a count is shown.
 fn unit(name: &str) -> (f64, &'static str) {
     const RATE: &str = "million instructions a second";
@@ -113,39 +117,9 @@ fn unit(name: &str) -> (f64, &'static str) {
     }
 }
 
-/// Claims about a count: its name, its unit, and a bound. Whole numbers below one half are none.
-const BELOW: [(&str, &str, &str, f64); 5] = [
-    (
-        "A physics step allocates nothing",
-        "allocations-in-steps",
-        "allocations",
-        0.5,
-    ),
-    (
-        "The 1-DOF service runs none of the arm's code",
-        "arm-in-particle-rk4-constant",
-        "instructions a step",
-        0.5,
-    ),
-    (
-        "Nothing is encoded while nobody subscribes",
-        "server-running-json",
-        "instructions of JSON a second",
-        0.5,
-    ),
-    (
-        "The gateway does not wake while nothing is asked of it (less than once a second)",
-        "wakes-idle",
-        "wake-ups a second",
-        1.0,
-    ),
-    (
-        "Without its feature no web code is in the program",
-        "web-symbols-bare",
-        "symbols of HTTP and WebSocket",
-        0.5,
-    ),
-];
+/// Claims about a count, a line each: the claim, the count's name and its unit, and a bound. Whole numbers below one
+/// half are none.
+const BELOW: &str = include_str!("below.txt");
 
 impl Measured {
     fn count(&self, name: &str) -> Option<f64> {
@@ -171,7 +145,7 @@ impl Measured {
     }
 
     fn table(&self) -> Table {
-        let mut lines = LEFT_OUT.lines().map(|line| line.split('|').map(str::trim));
+        let mut lines = LEFT_OUT.lines().map(columns);
         let mut table = Table::new(
             "left-out",
             "What is left out, and the proof",
@@ -182,7 +156,7 @@ impl Measured {
         );
         let count = |told: &str| self.count(told.split(": ").next()?);
         for line in lines {
-            let [work, place, with, without, saved] = line.collect::<Vec<_>>()[..] else {
+            let [work, place, with, without, saved] = line[..] else {
                 continue;
             };
             let both = count(with).zip(count(without)).filter(|_| saved == "yes");
@@ -223,9 +197,9 @@ impl Measured {
             "Work of a step and of the server, scene by scene",
             &format!("Instructions by callgrind, time as the minimum of repeats. {allocations}"),
             &[
-                bars("Instructions per step", "c1", &counts.collect::<Vec<_>>()),
-                bars("Time per step [ns]", "c2", &times.collect::<Vec<_>>()),
-                bars("The server: million instructions per second", "c3", &server),
+                Plot::bars("Instructions per step", "c1", counts),
+                Plot::bars("Time per step [ns]", "c2", times),
+                Plot::bars("The server: million instructions per second", "c3", server),
             ],
         );
     }
@@ -278,8 +252,10 @@ impl Measured {
             let seen = "5000 steps of every method, 2 and 3 links";
             section.claim(format!("Leaving out {work} changes no bit"), seen, holds);
         }
-        for (claim, name, unit, bound) in BELOW {
-            if let Some(count) = self.count(name) {
+        for line in BELOW.lines() {
+            if let [claim, name, unit, bound] = columns(line)[..]
+                && let (Some(count), Ok(bound)) = (self.count(name), bound.parse::<f64>())
+            {
                 section.claim(claim, format!("{} {unit}", number(count)), count < bound);
             }
         }
@@ -353,12 +329,17 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::LEFT_OUT;
+    use super::{BELOW, LEFT_OUT, columns};
 
     #[test]
-    fn every_line_of_what_is_left_out_has_five_columns() {
+    fn every_line_has_the_columns_of_its_table() {
         for line in LEFT_OUT.lines() {
-            assert_eq!(line.split('|').count(), 5, "{line}");
+            assert_eq!(columns(line).len(), 5, "{line}");
+        }
+        for line in BELOW.lines() {
+            let columns = columns(line);
+            assert_eq!(columns.len(), 4, "{line}");
+            assert!(columns[3].parse::<f64>().is_ok(), "{line}");
         }
     }
 }

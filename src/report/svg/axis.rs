@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a tick's label says its value exactly.
 
-use super::numbers::{number, power, seconds};
+use super::numbers::{number, power, scientific, seconds};
 
 /// How a tick's value is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,6 +125,15 @@ impl Axis {
             index += 1.0;
         }
         ticks
+    }
+
+    /// Its label with one of its values, for a tooltip.
+    pub(super) fn told(&self, value: f64) -> String {
+        let value = match self.unit {
+            Unit::Seconds => seconds(value),
+            Unit::Number => scientific(value),
+        };
+        format!("{} {value}", self.label)
     }
 
     fn said(&self, value: f64) -> String {

@@ -1,4 +1,4 @@
-//! Small SVG plots: axes, lines, markers, marks that explain, cells. No library, no script, no colour of its own.
+//! Small SVG plots: axes, lines and markers. No library, no script, no colour of its own.
 //!
 //! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with
 //! a marker shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
@@ -11,8 +11,9 @@ mod plot;
 
 pub(crate) use axis::{Axis, Unit};
 pub(crate) use numbers::{number, one_digit, plain, power, scientific, seconds};
-pub(crate) use plot::{Heat, Mark, Plot, bars, csv};
+pub(crate) use plot::{Form, Plot, Thumbnail, csv};
 
+use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
 /// Classes that plots use, for the page and for files of their own.
@@ -109,23 +110,24 @@ impl Key {
     }
 }
 
-/// A point of a curve, with its tooltip.
+/// A point of a curve.
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// From and to, along x.
     pub(crate) spread: Option<(f64, f64)>,
-    pub(crate) tooltip: String,
+    /// What its axes do not say; often empty.
+    pub(crate) note: String,
 }
 
 impl Point {
-    pub(crate) fn new(x: f64, y: f64, tooltip: impl Into<String>) -> Self {
+    pub(crate) fn new(x: f64, y: f64, note: impl Into<String>) -> Self {
         Self {
             x,
             y,
             spread: None,
-            tooltip: tooltip.into(),
+            note: note.into(),
         }
     }
 }
@@ -141,6 +143,7 @@ impl From<(f64, f64)> for Point {
 pub(crate) struct Curve {
     pub(crate) key: Key,
     pub(crate) has_line: bool,
+    pub(crate) has_tooltips: bool,
     pub(crate) points: Vec<Point>,
 }
 
@@ -150,6 +153,7 @@ impl Curve {
         Self {
             key,
             has_line: true,
+            has_tooltips: true,
             points,
         }
     }
@@ -165,20 +169,15 @@ impl Curve {
             ..Self::line(key, points)
         }
     }
-}
 
-/// A drawn panel: an `<svg>` element without style, the keys of its curves, and its numbers with the names of its axes.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Panel {
-    pub(crate) svg: String,
-    pub(crate) keys: Vec<Key>,
-    /// Names of x and y with their units; empty for an axis that is not there.
-    pub(crate) axes: [String; 2],
-    pub(crate) rows: Vec<PlotNumber>,
+    /// Marks so many that tooltips would be most of the file.
+    pub(crate) fn cells(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
+        Self {
+            has_tooltips: false,
+            ..Self::dots(key, points)
+        }
+    }
 }
-
-/// A number of a panel: curve, x, y and the rest in words.
-pub(crate) type PlotNumber = (String, f64, f64, String);
 
 /// Text for use between tags and in attributes.
 pub(crate) fn escape(text: &str) -> String {
@@ -186,4 +185,42 @@ pub(crate) fn escape(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
+}
+
+/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word stands alone.
+pub(crate) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in heading.split_whitespace() {
+        let line = lines.last().map_or("", String::as_str);
+        let length = line.chars().count() + 1 + word.chars().count();
+        if line.is_empty() || letter * length_in_f64(length) <= room {
+            let line = format!("{line} {word}").trim_start().to_owned();
+            lines.pop();
+            lines.push(line);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{length_in_f64, lines};
+
+    #[test]
+    fn a_heading_takes_as_many_lines_as_it_needs_and_loses_no_word() {
+        const LETTER: f64 = 10.4;
+        let heading =
+            "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
+        for room in [100.0, 400.0, 812.0, 5000.0] {
+            let lines = lines(heading, room, LETTER);
+            assert_eq!(lines.join(" "), heading);
+            for line in &lines {
+                let fits = LETTER * length_in_f64(line.chars().count()) <= room;
+                assert!(fits || !line.contains(' '), "{line}");
+            }
+        }
+        assert_eq!(lines(heading, 5000.0, LETTER).len(), 1);
+    }
 }

@@ -15,10 +15,10 @@ pub struct Complex {
 }
 
 impl Complex {
-    pub(in crate::study) const ZERO: Self = Self { re: 0.0, im: 0.0 };
+    pub(super) const ZERO: Self = Self { re: 0.0, im: 0.0 };
 
     #[inline]
-    pub(in crate::study) const fn real(re: f64) -> Self {
+    pub(super) const fn real(re: f64) -> Self {
         Self { re, im: 0.0 }
     }
 
@@ -37,17 +37,11 @@ impl Complex {
     }
 
     #[inline]
-    pub(in crate::study) fn scaled(self, factor: f64) -> Self {
+    pub(super) fn scaled(self, factor: f64) -> Self {
         Self {
             re: self.re * factor,
             im: self.im * factor,
         }
-    }
-
-    /// `1 / self`, without overflow on the way; not finite at zero.
-    pub(in crate::study) fn reciprocal(self) -> Self {
-        let modulus = self.modulus();
-        self.conjugate().scaled(1.0 / modulus).scaled(1.0 / modulus)
     }
 
     /// Principal square root.

@@ -32,27 +32,13 @@ pub struct RolloutRequest<const N: usize> {
 /// Why a run is refused. The field names are those of the request.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RolloutError {
-    /// A number that is NaN or infinite.
-    #[error("{field} must be finite, got {}", Shown(*.value))]
-    NotFinite {
+    /// A number that is NaN or infinite, a negative gain, or a time that is not positive.
+    #[error("{field} must be {bound}, got {}", Shown(*.value))]
+    OutOfBounds {
         /// `q0`, `qdot0`, `duration`, `timestep`, `kp`, `ki`, `kd` or `setpoint`.
         field: &'static str,
-        /// The given value.
-        value: f64,
-    },
-    /// A duration or a timestep that is zero or negative.
-    #[error("{field} must be greater than 0, got {}", Shown(*.value))]
-    NotPositive {
-        /// `duration` or `timestep`.
-        field: &'static str,
-        /// The given time \[s\].
-        value: f64,
-    },
-    /// A gain that is negative.
-    #[error("{field} must be at least 0, got {}", Shown(*.value))]
-    Negative {
-        /// `kp`, `ki` or `kd`.
-        field: &'static str,
+        /// `finite`, `at least 0` or `greater than 0`.
+        bound: &'static str,
         /// The given value.
         value: f64,
     },
@@ -114,21 +100,23 @@ impl<const N: usize> RolloutRequest<N> {
             ("setpoint", &setpoint.velocity),
         ];
         for (field, values) in fields {
-            if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
-                return Err(RolloutError::NotFinite { field, value });
-            }
-            if field.starts_with('k')
-                && let Some(&value) = values.iter().find(|&&value| value < 0.0)
-            {
-                return Err(RolloutError::Negative { field, value });
+            let is_gain = field.starts_with('k');
+            let is_time = field == "duration" || field == "timestep";
+            for &value in values {
+                let bound = match value {
+                    value if !value.is_finite() => "finite",
+                    value if is_gain && value < 0.0 => "at least 0",
+                    value if is_time && value <= 0.0 => "greater than 0",
+                    _ => continue,
+                };
+                return Err(RolloutError::OutOfBounds {
+                    field,
+                    bound,
+                    value,
+                });
             }
         }
         let duration = self.duration;
-        for (field, value) in [("duration", duration), ("timestep", timestep)] {
-            if value <= 0.0 {
-                return Err(RolloutError::NotPositive { field, value });
-            }
-        }
         let steps = steps_in(duration, timestep);
         if steps < 1.0 {
             return Err(RolloutError::TooShort { duration, timestep });

@@ -22,7 +22,8 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
     assert!(refusal(&["report", "--speed"]).starts_with("unexpected argument '--speed'"));
     for (names, wrong) in [("error,colour", "colour"), ("", "")] {
         let refused = refusal(&["report", "--only", names]);
-        let known = pendularm::report::names();
+        let known: Vec<_> = pendularm::report::sections().collect();
+        let known = known.join(", ");
         assert!(
             refused.contains("--only <NAMES>") && refused.contains(wrong),
             "{refused}"

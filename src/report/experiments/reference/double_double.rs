@@ -10,7 +10,7 @@
 //! **Invariant:** shares nothing with the arm's own dynamics, and [`two_sum`] with its sums, so that a mistake is not
 //! in both.
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::math::arm::Arm;
 use crate::math::integrator::two_sum;
@@ -84,8 +84,8 @@ impl DoubleDouble {
             let n = f64::from(n);
             even = -even * square / Self::from((n - 1.0) * n);
             odd = -odd * square / Self::from(n * (n + 1.0));
-            cos += even;
-            sin += odd;
+            cos = cos + even;
+            sin = sin + odd;
         }
         // Whole numbers, so the comparison is exact.
         match turns.rem_euclid(4.0) {
@@ -113,13 +113,6 @@ impl Add for DoubleDouble {
         let (hi, carry) = fast_two_sum(hi, carry + lo);
         let (hi, lo) = fast_two_sum(hi, carry + rest);
         Self { hi, lo }
-    }
-}
-
-impl AddAssign for DoubleDouble {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
     }
 }
 

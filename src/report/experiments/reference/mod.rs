@@ -22,6 +22,8 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::{Method, increment};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::study::control_loop::no_control;
+use crate::study::matrix::largest;
 use crate::study::taylor::series::{PowerSeries, differences};
 use crate::study::taylor::{Drive, Precision, Taylor};
 
@@ -152,10 +154,7 @@ impl<'a, const N: usize> Followed<'a, N> {
     ) -> Self {
         let (position, velocity) = exact(start);
         let (gains, setpoint) = match law {
-            Law::Constant(_) => (
-                crate::study::control_loop::no_control(),
-                Setpoint::default(),
-            ),
+            Law::Constant(_) => (no_control(), Setpoint::default()),
             Law::Continuous(gains, setpoint)
             | Law::Held {
                 gains, setpoint, ..
@@ -337,9 +336,8 @@ fn plus<const N: usize>(x: &[Real; N], y: &[Real; N]) -> [Real; N] {
 }
 
 /// The largest difference of two poses \[rad\].
-fn distance<const N: usize>(a: &[Real; N], b: &[Real; N]) -> f64 {
-    let both = a.iter().zip(b);
-    both.map(|(a, b)| (*a - *b).magnitude()).fold(0.0, f64::max)
+pub(super) fn distance<const N: usize>(a: &[Real; N], b: &[Real; N]) -> f64 {
+    largest(a.iter().zip(b).map(|(a, b)| (*a - *b).magnitude()))
 }
 
 /// Joint accelerations \[rad/s²\] under the efforts `tau` \[N m\], with 106 bits.
@@ -357,7 +355,7 @@ pub fn exact_acceleration<const N: usize>(
 #[must_use]
 pub fn largest_difference<const N: usize>(exact: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
     let both = exact.iter().zip(values);
-    crate::study::matrix::largest(both.map(|(exact, value)| exact.minus(*value).abs()))
+    largest(both.map(|(exact, value)| exact.minus(*value).abs()))
 }
 
 /// Joint angles \[rad\] and rates \[rad/s\] after every `every` steps of `h` \[s\] with `method`, `count` samples in

@@ -8,11 +8,8 @@
 //! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. A seed in the source
 //! gives what is random.
 
-mod control;
-mod extreme;
-mod inertia;
-mod methods;
-mod motion;
+mod extremes;
+mod loops;
 mod support;
 
 pub use support::{Observation, Scenario};
@@ -23,19 +20,12 @@ const SCENES: &str = include_str!("scenes.txt");
 /// All scenes, in order.
 #[must_use]
 pub fn all() -> Vec<Scenario> {
-    let checks = [
-        motion::CHECKS.as_slice(),
-        control::CHECKS.as_slice(),
-        inertia::CHECKS.as_slice(),
-        extreme::CHECKS.as_slice(),
-        methods::CHECKS.as_slice(),
-    ]
-    .concat();
     let scene = |line: &'static str| {
         let mut columns = line.split(" | ");
         let mut next = || columns.next().unwrap_or_default();
         let id = next();
-        let (_, check) = checks.iter().find(|(of, _)| *of == id)?;
+        let mut checks = loops::CHECKS.iter().chain(&extremes::CHECKS);
+        let (_, check) = checks.find(|(of, _)| *of == id)?;
         Some(Scenario {
             id,
             parameters: next(),

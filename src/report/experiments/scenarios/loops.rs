@@ -1,0 +1,562 @@
+//! S01 to S26: free motion, the controller, and uneven arms.
+//!
+//! **Invariant:** a limit is predicted before it is measured, and both are shown.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices name the joints of arrays of that length"
+)]
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::support::{
+    Named, Observation, apart, arm, digits_lost, each, fastest, free, held, is_near, short, states,
+    verdict,
+};
+use crate::math::arm::{Arm, State};
+use crate::math::dynamics::{energy, forward_dynamics};
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
+use crate::math::simulation::state_after;
+use crate::report::experiments::measure::{
+    boundary, growth, in_substeps, live_at, measured_limit, measured_period,
+};
+use crate::report::experiments::nonlinear::derivative;
+use crate::study::control_loop::ControlLoop;
+use crate::study::linear::{Linear, equilibrium};
+use crate::study::matrix::largest;
+use crate::study::stability::{Sampling, Stepping, largest_timestep, limits, step_matrix};
+
+/// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
+const DIGITS: f64 = 2.5;
+
+/// The checks of S01 to S26.
+pub(super) const CHECKS: [Named; 26] = [
+    ("S01", rest_without_gravity),
+    ("S02", hanging_at_rest),
+    ("S03", upright),
+    ("S04", regular_swing),
+    ("S05", || chaotic::<2>(1.2)),
+    ("S06", || chaotic::<3>(1.9)),
+    ("S07", || limits_hold(gains(1e4, 0.0, [200.0, 60.0]))),
+    ("S08", || limits_hold(gains(1e6, 0.0, [2000.0, 600.0]))),
+    ("S09", overdamped),
+    ("S10", undamped),
+    ("S11", slow_control),
+    ("S12", held_push),
+    ("S13", late_control),
+    ("S14", windup),
+    ("S15", too_much_integral),
+    ("S16", || light_outer_link(1e-3)),
+    ("S17", || light_outer_link(1e-6)),
+    ("S18", || light_outer_link(1e-9)),
+    ("S19", || heavy_outer_link(1e3)),
+    ("S20", || heavy_outer_link(1e6)),
+    ("S21", || heavy_outer_link(1e9)),
+    ("S22", heavy_link_stretched),
+    ("S23", || each([1e3, 1e-3].map(long_outer_link))),
+    ("S24", || each([loses_few(&Arm::default(), [0.0; 3], 0.0)])),
+    ("S25", folded),
+    ("S26", || {
+        each(
+            [
+                whirl::<2>([0.76376, 1.0801]),
+                whirl::<3>([0.42370, 0.59920]),
+            ]
+            .concat(),
+        )
+    }),
+];
+
+// ---- S01 to S06: free motion ---------------------------------------------------------------------------------------
+
+fn rest_without_gravity() -> Observation {
+    let start = State::at_rest([0.3, -1.2, 2.0]);
+    let kept = Method::ALL.into_iter().all(|method| {
+        let mut simulation = free(arm([1.0; 3], 0.0), start, method, 0.001);
+        simulation.advance(10_000);
+        *simulation.state() == start
+    });
+    verdict(kept, if kept { "every bit kept" } else { "moved" })
+}
+
+/// The rate at which a deviation grows under a method at 1 ms \[1/s\], as the step matrix says.
+fn predicted_rate(linear: &Linear, method: Method) -> f64 {
+    let step = step_matrix(linear, method, Sampling::Held, 0.001);
+    step.spectral_radius().ln() / 0.001
+}
+
+/// `-π/2` is no double, so the arm hangs 6e-17 rad off and swings by that much.
+fn hanging_at_rest() -> Observation {
+    let start = State::at_rest([-FRAC_PI_2, 0.0, 0.0]);
+    let linear = Linear::at_pose(&ControlLoop::free(Arm::<3>::default()), &start.position);
+    let swinging = |method| free(Arm::default(), start, method, 0.001);
+    let drifts = [Method::Midpoint, Method::Verlet, Method::Rk4].map(|method| {
+        let mut simulation = swinging(method);
+        simulation.advance(1_000_000);
+        let drift = apart(simulation.state(), &start);
+        (drift < 1e-12, format!("{method} drifts {drift:.1e}"))
+    });
+    let predicted = predicted_rate(&linear, Method::Euler);
+    let mut simulation = swinging(Method::Euler);
+    // The largest within a second, longer than the fastest swing.
+    let mut largest_after = |steps| {
+        simulation.advance(steps);
+        largest((0..1000).map(|_| {
+            simulation.step();
+            apart(simulation.state(), &start)
+        }))
+    };
+    let (early, late) = (largest_after(200_000), largest_after(199_000));
+    let rate = (late / early).ln() / 200.0;
+    let words = format!("Euler grows by {rate:.5}/s, predicted {predicted:.5}/s");
+    let grows = (is_near(Some(rate), predicted, 0.02), words);
+    each(drifts.into_iter().chain([grows]))
+}
+
+fn upright() -> Observation {
+    let pose = [FRAC_PI_2, 0.0];
+    let linear = Linear::at_pose(&ControlLoop::free(Arm::default()), &pose);
+    let unstable = largest(linear.flow().eigenvalues().iter().map(|mode| mode.re));
+    let eigenvalue = (true, format!("eigenvalue {unstable:.5}/s"));
+    each([eigenvalue].into_iter().chain(Method::ALL.map(|method| {
+        let start = State::at_rest([pose[0] + 1e-12, 1e-12]);
+        let mut simulation = free(Arm::default(), start, method, 0.001);
+        let mut off = |steps| {
+            simulation.advance(steps);
+            (simulation.state().position[0] - pose[0]).abs()
+        };
+        // After two seconds the fastest mode has outgrown the other one a few thousand times.
+        let (early, late) = (off(2000), off(1000));
+        let rate = (late / early).ln();
+        let predicted = predicted_rate(&linear, method);
+        let order = (unstable * 0.001).powi(method.order().cast_signed());
+        let holds =
+            is_near(Some(rate), predicted, 2e-3) && is_near(Some(predicted), unstable, 2.0 * order);
+        (holds, format!("{method} {rate:.5}"))
+    })))
+}
+
+fn regular_swing() -> Observation {
+    each(Method::ALL.map(|method| {
+        let start = State::at_rest([0.3 - FRAC_PI_2, 0.0]);
+        let mut simulation = free(Arm::default(), start, method, 0.001);
+        let begun = energy(simulation.arm(), &start);
+        let (mut lowest, mut highest) = (0.0_f64, 0.0_f64);
+        for _ in 0..10_000 {
+            simulation.advance(100);
+            let gained = energy(simulation.arm(), simulation.state()) - begun;
+            lowest = lowest.min(gained);
+            highest = highest.max(gained);
+        }
+        let holds = match method {
+            Method::Euler => highest > 1.0,
+            Method::Midpoint => highest < 1e-3 && highest > -lowest,
+            Method::Verlet => highest.max(-lowest) < 1e-4,
+            // A method of order p gains or loses some h^(p-1).
+            _ => highest.max(-lowest) < 1e-3_f64.powi(method.order().cast_signed() - 1),
+        };
+        (holds, format!("{method} {lowest:+.1e} to {highest:+.1e} J"))
+    }))
+}
+
+/// The rate at which two neighbours part, brought back together every tenth of a second.
+fn chaotic<const N: usize>(expected: f64) -> Observation {
+    const APART: f64 = 1e-8;
+    let mut one = free(Arm::default(), State::rest(), Method::Rk4, 0.001);
+    let mut other = one.clone();
+    let mut beside = State::<N>::rest();
+    beside.position[0] += APART;
+    other.set_state(beside);
+    let mut grown = 0.0;
+    for _ in 0..2000 {
+        one.advance(100);
+        other.advance(100);
+        let (here, there) = (*one.state(), *other.state());
+        let distance = apart(&here, &there);
+        grown += (distance / APART).ln();
+        let back = |here: &[f64; N], there: &[f64; N]| {
+            std::array::from_fn(|i| here[i] + (there[i] - here[i]) * APART / distance)
+        };
+        let position = back(&here.position, &there.position);
+        let velocity = back(&here.velocity, &there.velocity);
+        other.set_state(State { position, velocity });
+    }
+    let rate = grown / 200.0;
+    let reached = 36.0 / rate;
+    let words =
+        format!("{rate:.2} per second: a unit of rounding is a radian after {reached:.0} s");
+    verdict(is_near(Some(rate), expected, 0.25), words)
+}
+
+// ---- S07 to S15: the controller ------------------------------------------------------------------------------------
+
+const POSE: [f64; 2] = [0.5, 0.8];
+
+const MODERATE: Gains<2> = Gains {
+    kp: [200.0, 100.0],
+    ki: [0.0; 2],
+    kd: [30.0, 12.0],
+};
+
+fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
+    let (kp, ki) = ([kp; 2], [ki; 2]);
+    Gains { kp, ki, kd }
+}
+
+/// Whether prediction and measurement agree to 1 % for all methods, and the limits of Runge-Kutta 4, held and
+/// continuous, in words.
+fn compare(gains: Gains<2>) -> (bool, Option<f64>, String) {
+    let mut worst: f64 = 0.0;
+    let [held, continuous] = Sampling::ALL.map(|sampling| {
+        let measured = Method::ALL.map(|method| {
+            let control = held(gains, POSE).with_method(method);
+            let predicted = largest_timestep(&Linear::at_setpoint(&control), method, sampling);
+            let predicted = predicted.unwrap_or(f64::NAN);
+            let measured = measured_limit(&control, sampling, 0.9 * predicted);
+            let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
+            worst = worst.max((ratio - 1.0).abs());
+            measured
+        });
+        // Methods are taken in order, Runge-Kutta 4 last.
+        measured.into_iter().next_back().flatten()
+    });
+    let words = format!(
+        "off by {:.4} % at worst; Runge-Kutta 4 held {} s, continuous {} s",
+        100.0 * worst,
+        short(held),
+        short(continuous)
+    );
+    (worst < 0.01, held, words)
+}
+
+fn limits_hold(gains: Gains<2>) -> Observation {
+    let (holds, _, words) = compare(gains);
+    verdict(holds, words)
+}
+
+fn overdamped() -> Observation {
+    let gains = gains(200.0, 0.0, [500.0; 2]);
+    let (holds, limit, words) = compare(gains);
+    let chatter = limit.and_then(|limit| chatter(&held(gains, POSE).with_timestep(1.01 * limit)));
+    let words = format!("{words}; beyond: chatter of {} rad/s", short(chatter));
+    verdict(holds && chatter.is_some(), words)
+}
+
+/// How fast the arm goes to and fro after a long while, if it does so at every step.
+fn chatter(control: &ControlLoop<2>) -> Option<f64> {
+    let mut live = control.simulation(State::at_rest(POSE));
+    live.advance(100_000);
+    let mut before = live.state().velocity[1];
+    let alternates = (0..100).all(|_| {
+        live.step();
+        let now = live.state().velocity[1];
+        now * std::mem::replace(&mut before, now) < 0.0
+    });
+    alternates.then_some(before.abs())
+}
+
+fn undamped() -> Observation {
+    let still = held(gains(1e4, 0.0, [0.0; 2]), POSE);
+    let linear = Linear::at_setpoint(&still);
+    let modes = linear.flow().eigenvalues();
+    let fastest = largest(modes.iter().map(|mode| mode.modulus()));
+    let limits = Method::ALL.map(|method| {
+        let held = largest_timestep(&linear, method, Sampling::Held);
+        let continuous = largest_timestep(&linear, method, Sampling::Continuous);
+        // Where the region of stability ends on the imaginary axis, for Runge-Kutta methods by their order.
+        let expected = match (method, method.order()) {
+            (Method::Verlet, _) => 2.0,
+            (_, 3) => 3.0_f64.sqrt(),
+            (_, 4) => 8.0_f64.sqrt(),
+            _ => 0.0,
+        };
+        // The arm itself: a deviation escapes within 4000 steps just beyond, and does not just below.
+        let escapes = |part: f64| {
+            let timestep = part * expected / fastest;
+            let control = still.with_method(method).with_timestep(timestep);
+            growth(&control, Sampling::Continuous).is_none()
+        };
+        let is_predicted = continuous.is_some_and(|it| (it * fastest - expected).abs() < 1e-4);
+        let is_measured = expected == 0.0 || (escapes(1.02) && !escapes(0.98));
+        let holds = held == Some(0.0) && is_predicted && is_measured;
+        (
+            holds,
+            format!("{method} {} s in every stage, held none", short(continuous)),
+        )
+    });
+    let step = step_matrix(&linear, Method::Midpoint, Sampling::Continuous, 1e-4);
+    let grown = 1e-4 / step.spectral_radius().ln();
+    let grown = (
+        true,
+        format!("midpoint at 0.1 ms grows e-fold in {grown:.0} s"),
+    );
+    each(limits.into_iter().chain([grown]))
+}
+
+fn slow_control() -> Observation {
+    let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
+    let mut worst: f64 = 0.0;
+    for method in [Method::Midpoint, Method::Verlet, Method::Rk4] {
+        let control = held(MODERATE, POSE).with_method(method);
+        let linear = Linear::at_setpoint(&control);
+        for substeps in [1, 10, 100] {
+            let stepping = Stepping::held(&linear, method, substeps, false);
+            let predicted = stepping.limit().unwrap_or(f64::NAN);
+            lowest = lowest.min(predicted);
+            highest = highest.max(predicted);
+            if substeps < 100 {
+                let measured = measured_period(&control, 0.9 * predicted, substeps, false);
+                let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
+                worst = worst.max((ratio - 1.0).abs());
+            }
+        }
+    }
+    let range = format!("{lowest:.5} to {highest:.5} s over methods and substeps");
+    verdict(
+        worst < 0.01 && highest / lowest < 1.01,
+        format!("{range}; measured within {:.4} %", 100.0 * worst),
+    )
+}
+
+fn held_push() -> Observation {
+    let control = ControlLoop {
+        arm: arm([1.0; 2], 0.0),
+        ..held(gains(1000.0, 0.0, [5.0, 2.0]), POSE)
+    };
+    let linear = Linear::at_setpoint(&control);
+    let limit = Stepping::held(&linear, Method::Rk4, 100, false).limit();
+    let grows = |period, substeps| {
+        let control = in_substeps(&control.with_timestep(period), substeps, false);
+        growth(&control, Sampling::Held).is_none_or(|growth| growth > 1.0)
+    };
+    let (slow, fast) = (grows(0.02, 100), grows(2e-4, 1));
+    let words = |grows| if grows { "grows" } else { "decays" };
+    verdict(
+        slow && !fast && limit.is_some_and(|limit| limit < 0.02),
+        format!(
+            "limit of the period {} s; at 20 ms it {}, at 0.2 ms it {}",
+            short(limit),
+            words(slow),
+            words(fast)
+        ),
+    )
+}
+
+fn late_control() -> Observation {
+    let control = held(MODERATE, POSE);
+    let linear = Linear::at_setpoint(&control);
+    let [prompt, late] =
+        [false, true].map(|delayed| Stepping::held(&linear, Method::Rk4, 1, delayed).limit());
+    let predicted = late.unwrap_or(f64::NAN);
+    let measured = measured_period(&control, 0.9 * predicted, 1, true);
+    let is_less = prompt.is_some_and(|prompt| predicted < 0.5 * prompt);
+    verdict(
+        is_less && is_near(measured, predicted, 0.01),
+        format!(
+            "predicted {predicted:.4e} s, measured {} s; without delay {} s",
+            short(measured),
+            short(prompt)
+        ),
+    )
+}
+
+/// The shipped law has no cap on the effort; this scene puts one behind it.
+fn windup() -> Observation {
+    const CAP: f64 = 10.0;
+    const H: f64 = 0.001;
+    let blocked = held(gains(100.0, 50.0, [20.0; 2]), [0.0; 2]);
+    let mut pid = Pid::new(blocked.gains);
+    pid.enable(true);
+    pid.set_setpoint(blocked.setpoint);
+    let mut state = State::at_rest([-1.5, 0.0]);
+    let mut unlimited = 0.0;
+    let mut advance = |pid: &mut Pid<2>, steps: u32| {
+        for _ in 0..steps {
+            let control = pid.control(&state, H);
+            pid.commit(control.integral);
+            unlimited += (pid.setpoint().position[0] - state.position[0]) * H;
+            let effort = control.effort.map(|effort| effort.clamp(-CAP, CAP));
+            state = state_after(&blocked.arm, Method::Rk4, &state, &effort, H);
+        }
+        (state, unlimited)
+    };
+    let (_, wound) = advance(&mut pid, 60_000);
+    let limited = pid.integral()[0];
+    // Hanging needs no effort. The integral has to be unwound by the opposite error first.
+    let goal = [-FRAC_PI_2, 0.0];
+    pid.set_setpoint(Setpoint::at(goal));
+    let recovered = (1..=600_u32).find(|_| {
+        let (state, _) = advance(&mut pid, 1000);
+        let is_near = (0..2).all(|i| (state.position[i] - goal[i]).abs() < 0.02);
+        is_near && state.velocity.iter().all(|v| v.abs() < 0.02)
+    });
+    let back = recovered.map_or_else(|| "never".to_owned(), |s| format!("after {s} s"));
+    let integrals = format!("integral {limited:.1} rad s, unlimited {wound:.1}");
+    verdict(
+        limited <= INTEGRAL_LIMIT && wound > limited && recovered.is_some(),
+        format!("{integrals}; released, the arm is back {back}"),
+    )
+}
+
+fn too_much_integral() -> Observation {
+    let control = held(gains(100.0, 2000.0, [20.0; 2]), POSE);
+    let linear = Linear::at_setpoint(&control);
+    let limits = Sampling::ALL.map(|sampling| largest_timestep(&linear, Method::Rk4, sampling));
+    let modes = linear.flow().eigenvalues();
+    let Some(mode) = modes.iter().max_by(|a, b| a.re.total_cmp(&b.re)) else {
+        return verdict(false, "no modes");
+    };
+    let rate = growth_rate(&control, TAU / mode.im.abs());
+    let eigenvalue = mode.re;
+    verdict(
+        limits == [Some(0.0); 2] && eigenvalue > 0.0 && is_near(Some(rate), eigenvalue, 0.02),
+        format!(
+            "predicted limit {} s; eigenvalue {eigenvalue:.4}/s, measured at about 0.1 ms {rate:.4}/s",
+            short(limits[0])
+        ),
+    )
+}
+
+/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]. It is measured from the largest
+/// deviation within two periods to that within the next two, once other modes have died out.
+fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
+    const STEPS: u32 = 20_000;
+    let h = 2.0 * swing / f64::from(STEPS);
+    let rest = equilibrium(control);
+    let mut start = State::at_rest(rest.position);
+    start.position[0] += 1e-9;
+    let mut live = live_at(&control.with_timestep(h), &rest, start);
+    let windows = [(); 4].map(|()| {
+        largest((0..STEPS).map(|_| {
+            live.step();
+            (live.state().position[0] - rest.position[0]).abs()
+        }))
+    });
+    (windows[3] / windows[2]).ln() / (2.0 * swing)
+}
+
+// ---- S16 to S26: uneven arms ---------------------------------------------------------------------------------------
+
+/// Whether an arm loses few digits around a pose, and how many.
+fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> (bool, String) {
+    let digits = digits_lost(arm, &states(pose, spread));
+    (digits <= DIGITS, format!("{digits:.1} digits lost"))
+}
+
+fn light_outer_link(mass: f64) -> Observation {
+    let control = ControlLoop {
+        arm: arm([1.0, mass], 9.81),
+        ..held(MODERATE, [0.5, 0.8])
+    };
+    let linear = Linear::at_setpoint(&control);
+    let predicted = largest_timestep(&linear, Method::Rk4, Sampling::Held);
+    let limit = predicted.unwrap_or(f64::NAN);
+    let measured = measured_limit(&control, Sampling::Held, 0.9 * limit);
+    // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
+    let alone = 2.0 * (mass / 3.0) / MODERATE.kd[1];
+    let holds = is_near(measured, limit, 0.01) && is_near(predicted, alone, 0.01);
+    let limits = format!(
+        "limit predicted {} s, measured {} s",
+        short(predicted),
+        short(measured)
+    );
+    each([loses_few(&control.arm, [0.0; 2], PI), (holds, limits)])
+}
+
+fn heavy_outer_link(mass: f64) -> Observation {
+    each([loses_few(&arm([1.0, 1.0, mass], 9.81), [0.0; 3], PI)])
+}
+
+fn long_outer_link(length: f64) -> (bool, String) {
+    let arm = Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).unwrap_or_default();
+    let (holds, words) = loses_few(&arm, [0.0; 3], PI);
+    (holds, format!("{words} with a tip of {length} m"))
+}
+
+fn heavy_link_stretched() -> Observation {
+    let arm = arm([1.0, 1.0, 1e9], 9.81);
+    let linear = Linear::at_pose(&ControlLoop::free(arm), &[-FRAC_PI_2, 0.0, 0.0]);
+    let limits = [(Method::Rk4, 1.649e-5), (Method::Verlet, 1.166e-5)].map(|(method, expected)| {
+        let limit = largest_timestep(&linear, method, Sampling::Continuous);
+        (
+            is_near(limit, expected, 0.01),
+            format!("{method} limit {} s", short(limit)),
+        )
+    });
+    let swings = [(1.6e-5, false), (2.0e-5, true)].map(|(timestep, is_apart)| {
+        let start = State::at_rest([-FRAC_PI_2, 1e-6, -1e-6]);
+        let mut simulation = free(arm, start, Method::Rk4, timestep);
+        simulation.advance(20_000);
+        // The nudge holds 1e-6 rad of a mode of 1.7e5 rad/s: rates of some 0.2 rad/s.
+        let flies = simulation.divergence().is_some() || fastest(&simulation) > 10.0;
+        let words = if flies { "flies apart" } else { "swings on" };
+        (flies == is_apart, format!("at {timestep:e} s it {words}"))
+    });
+    let digits = loses_few(&arm, [0.0; 3], 1e-6);
+    each([digits].into_iter().chain(limits).chain(swings))
+}
+
+fn folded() -> Observation {
+    let control = held(Gains::<3>::default(), [0.0; 3]);
+    let smallest = limits(&control).minimum_held;
+    let at = |pose: [f64; 3]| {
+        let linear = Linear::at_pose(&control, &pose);
+        largest_timestep(&linear, Method::Rk4, Sampling::Held).unwrap_or(f64::INFINITY)
+    };
+    let (stretched, folded) = (at([0.0; 3]), at([0.0, PI, -PI]));
+    // Poses between those of the grid.
+    let others = states([0.0; 3], PI).into_iter().take(50);
+    let anywhere = others
+        .map(|state| at(state.position))
+        .fold(f64::INFINITY, f64::min);
+    let least = stretched.min(folded).min(anywhere);
+    let covers = smallest.is_some_and(|smallest| least > 0.99 * smallest);
+    let words = format!(
+        "limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, minimum over \
+         poses {} s",
+        short(smallest)
+    );
+    each([
+        loses_few(&Arm::default(), [0.0, PI, -PI], 0.0),
+        (covers, words),
+    ])
+}
+
+/// Limits of Verlet and Runge-Kutta 4 as timestep times rate: predicted from the fastest mode of the whirling arm, and
+/// measured.
+fn whirl<const N: usize>([verlet, rk4]: [f64; 2]) -> [(bool, String); 2] {
+    const RATE: f64 = 1000.0;
+    let methods = [
+        (Method::Verlet, verlet, 2.0),
+        (Method::Rk4, rk4, 8.0_f64.sqrt()),
+    ];
+    methods.map(|(method, expected, reach)| {
+        let arm = arm([1.0; N], 0.0);
+        let mut start = State::rest();
+        start.velocity[0] = RATE;
+        // Rates are differenced at their own scale.
+        let modes = derivative(&start, [1e-5, 1e-5 * RATE], |state| State {
+            position: state.velocity,
+            velocity: forward_dynamics(&arm, &state.position, &state.velocity, &[0.0; N]),
+        });
+        let modes = modes.eigenvalues();
+        let predicted = reach * RATE / largest(modes.iter().map(|mode| mode.modulus()));
+        start.position[1] = 1e-9;
+        let measured = boundary(0.9 * expected, |angle| {
+            let mut simulation = free(arm, start, method, angle / RATE);
+            // At any time: past its limit Runge-Kutta 4 takes spin away until it is within again.
+            (0..400).all(|_| {
+                simulation.advance(10);
+                let angles = simulation.state().position;
+                angles.iter().skip(1).all(|q| q.abs() < 1e-6)
+            })
+        });
+        let both = [Some(predicted), measured];
+        let holds = both.iter().all(|limit| is_near(*limit, expected, 0.01));
+        (
+            holds,
+            format!("{method} {predicted:.4e} (measured {})", short(measured)),
+        )
+    })
+}

@@ -1,0 +1,84 @@
+//! Small matrices: eigenvalues and solutions that are known.
+
+use pendularm::study::matrix::Matrix;
+
+fn sorted(matrix: &Matrix) -> Vec<(f64, f64)> {
+    let mut values: Vec<_> = matrix
+        .eigenvalues()
+        .iter()
+        .map(|value| (value.re, value.im))
+        .collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    values
+}
+
+/// A companion matrix has the roots of its polynomial for eigenvalues, here those of
+/// `(z - 1)(z + 2)(z² + z + 1)(z - 0.5) = z⁵ + 1.5 z⁴ - z³ - z² - 1.5 z + 1`.
+#[test]
+fn a_companion_matrix_has_the_roots_of_its_polynomial() {
+    let coefficients = [1.0, -1.5, -1.0, -1.0, 1.5];
+    let matrix = Matrix::from_fn(5, |row, column| {
+        if column == 4 {
+            -coefficients[row]
+        } else {
+            f64::from(u8::from(row == column + 1))
+        }
+    });
+    let half_root_3 = 0.75_f64.sqrt();
+    let expected = [
+        (-2.0, 0.0),
+        (-0.5, -half_root_3),
+        (-0.5, half_root_3),
+        (0.5, 0.0),
+        (1.0, 0.0),
+    ];
+    // Simple, well separated roots: some ten units of rounding.
+    for (found, expected) in sorted(&matrix).iter().zip(expected) {
+        assert!((found.0 - expected.0).abs() < 1e-14, "{found:?}");
+        assert!((found.1 - expected.1).abs() < 1e-14, "{found:?}");
+    }
+}
+
+#[test]
+fn widely_scaled_states_keep_their_slow_eigenvalues() {
+    // A fast pole at -1e9 and a slow one at -1e-3, states scaled apart by 1e12.
+    let scale = 1e12;
+    let matrix = Matrix::from_fn(2, |row, column| match (row, column) {
+        (0, 0) => -1e-3,
+        (0, 1) => scale,
+        (1, 1) => -1e9,
+        _ => 0.0,
+    });
+    let values = sorted(&matrix);
+    assert!((values[0].0 / -1e9 - 1.0).abs() < 1e-14);
+    assert!((values[1].0 / -1e-3 - 1.0).abs() < 1e-14);
+}
+
+#[test]
+fn a_nilpotent_matrix_has_zeros_for_eigenvalues() {
+    let matrix = Matrix::from_fn(6, |row, column| f64::from(u8::from(column == row + 3)));
+    assert!(matrix.spectral_radius() == 0.0);
+}
+
+#[test]
+fn what_is_not_finite_comes_out_as_nan() {
+    let matrix = Matrix::from_fn(3, |row, _| if row == 1 { f64::NAN } else { 1.0 });
+    assert!(matrix.spectral_radius().is_nan());
+}
+
+#[test]
+fn a_solution_satisfies_its_equations() {
+    let matrix = Matrix::from_fn(3, |row, column| {
+        [[0.0, 2.0, 1.0], [1.0, -1.0, 3.0], [4.0, 0.5, -2.0]][row][column]
+    });
+    // The solution is (1, -2, 3), exact in a few units of rounding.
+    let x = matrix.solve(&[-1.0, 12.0, -3.0]).unwrap();
+    for (x, expected) in x.iter().zip([1.0, -2.0, 3.0]) {
+        assert!((x - expected).abs() < 1e-14);
+    }
+    assert!(Matrix::zeros(2).solve(&[1.0, 1.0]).is_none());
+    let product = matrix.product(&matrix.inverse().unwrap());
+    let off = Matrix::from_fn(3, |i, j| product[(i, j)] - f64::from(u8::from(i == j)));
+    assert!((0..9).all(|at| off[(at / 3, at % 3)].abs() < 1e-15));
+    assert!(Matrix::zeros(2).inverse().is_none());
+}
