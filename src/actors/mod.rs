@@ -4,7 +4,7 @@
 //! ```text
 //!              accepts                 Request, Disconnect              Call of a question, SetSetpoint, Interest
 //!  listener ───────────▶ connection ──────────────────▶ registry ─ wire ────────────────────────────────▶ nodes
-//!                            ▲   Deliver, Response, Finish  │ ▲            Publish, Respond
+//!                            ▲           ToClient           │ ▲            Publish, Respond
 //!                            └──────────────────────────────┘ └──────────────────────────────────────── nodes
 //! ```
 //!

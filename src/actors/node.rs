@@ -6,6 +6,8 @@
 //! **Invariant:** every [`Call`] is answered exactly once, even if the node that has it fails: a [`Reply`] that
 //! is dropped unanswered answers with an error.
 
+use std::sync::Arc;
+
 use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
@@ -62,8 +64,16 @@ pub enum Unserved {
     ),
 }
 
-/// Dropped at the end of a call, when all its effects have been had: the client's next frame is read then.
-pub type Done = oneshot::Sender<()>;
+/// A guard of an op that has yet to take effect: a call, a goal, or a message on its way to its subscribers. The
+/// connection reads the client's next frame once the last clone is dropped.
+pub type Done = Arc<oneshot::Sender<()>>;
+
+/// A guard, and the receiver that ends with its last clone.
+#[must_use]
+pub fn guard() -> (Done, oneshot::Receiver<()>) {
+    let (done, ended) = oneshot::channel();
+    (Arc::new(done), ended)
+}
 
 /// An answer of megabytes, which is written piece by piece.
 pub trait Pieces: Send {

@@ -27,7 +27,8 @@ use crate::actors::arm::sim::{ArmSim, Consult};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
-use crate::actors::gateway::connection::admission::{Admission, Newcomers};
+use crate::actors::gateway::connection::admission::Admission;
+use crate::actors::gateway::connection::admission::slots::Slots;
 use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{self, Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
@@ -202,7 +203,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
             };
             Site::new(access, report, &frames)
         },
-        newcomers: Newcomers::of(unauthenticated),
+        unauthenticated: Slots::new(unauthenticated),
     }
 }
 

@@ -9,7 +9,7 @@ use actix::dev::ToEnvelope;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Respond, Unserved, ask};
+use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Respond, Unserved, ask, guard};
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
@@ -146,7 +146,7 @@ pub fn ask_as<A: Ask>(
     ask: A,
 ) -> Asked<A::Answer> {
     let gone = Arc::new(AtomicBool::new(false));
-    let (done, ended) = oneshot::channel();
+    let (done, ended) = guard();
     let (give, answer) = oneshot::channel();
     let asking = Asking {
         connection,

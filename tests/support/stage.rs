@@ -18,7 +18,7 @@ use pendularm::actors::arm::sim::{
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Registry;
-use pendularm::actors::node::{Ask, Call, Publish, Reply};
+use pendularm::actors::node::{Ask, Call, Publish, Reply, guard};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
@@ -112,7 +112,7 @@ where
     T: Actor<Context = Context<T>> + Handler<Call<A>>,
 {
     let (answered, answer) = oneshot::channel();
-    let (done, ended) = oneshot::channel();
+    let (done, ended) = guard();
     let reply = Reply::new(answered, Some(done));
     node.send(Call { ask, reply }).await.unwrap();
     let answer = answer.await.expect("an asker").expect("an answer");

@@ -44,9 +44,6 @@ pub const KEPT_PLACES: usize = 16;
 pub const OPENING_TIME: Duration = Duration::from_secs(1);
 /// While more bytes of responses than this wait, the client is not read and none of its computations starts.
 pub const MAX_RESPONSES_WAITING: usize = SHORT;
-/// Different `fragment_size`s among the subscriptions to a topic, beside powers of two: a message is cut up once for
-/// each of them. A further one counts as the power of two below, of which there are few.
-pub const MAX_FRAGMENT_SIZES: usize = 16;
 /// How long a provider may take where its caller sets no timeout.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,

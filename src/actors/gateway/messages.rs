@@ -6,18 +6,19 @@
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
+use crate::actors::node::Done;
 pub use crate::actors::node::{Feedback, Publish, Respond};
 use crate::actors::resources::memory::Permit;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;
+use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::payload::Payload;
 
@@ -38,17 +39,11 @@ pub struct Connect {
 #[rtype(result = "()")]
 pub struct CountRefusal;
 
-/// The ways to a connection. One mailbox is behind all of them, so order is kept between them.
+/// The way to a connection, and what it shares with the registry.
 #[derive(Clone)]
 pub struct Outlets {
-    /// Topic messages.
-    pub deliver: Recipient<Deliver>,
-    /// Responses, statuses and forwarded calls.
-    pub respond: Recipient<Response>,
-    /// Throttling of topics.
-    pub configure: Recipient<Configure>,
-    /// The end.
-    pub finish: Recipient<Finish>,
+    /// Its mailbox.
+    pub mailbox: Recipient<ToClient>,
     /// Set while a failed call has its reason in `values` too.
     pub wants_text: Arc<AtomicBool>,
     /// Set when the client is gone: heavy computations for it stop.
@@ -118,12 +113,12 @@ pub struct Request {
     pub permit: Option<Permit>,
 }
 
-/// The op has been routed. Its effect may be still to come, in a node or at the subscribers' sockets: a receiver ends
+/// The op has been routed. Its effect may be still to come, in a node or at the subscribers' sockets: the receiver ends
 /// when it has.
 #[derive(MessageResponse, Default)]
 pub struct Handled {
-    node: Option<oneshot::Receiver<()>>,
-    subscribers: Option<oneshot::Receiver<()>>,
+    effect: Option<oneshot::Receiver<()>>,
+    is_with_a_node: bool,
 }
 
 impl Handled {
@@ -133,33 +128,34 @@ impl Handled {
         Self::default()
     }
 
-    /// The op has gone to a node, or to a client that provides a service.
+    /// The op has gone to a node, or to a client that provides a service. A message may also be on its way to
+    /// subscribers.
     #[must_use]
     pub fn by_node(effect: oneshot::Receiver<()>) -> Self {
         Self {
-            node: Some(effect),
-            ..Self::default()
+            effect: Some(effect),
+            is_with_a_node: true,
         }
     }
 
-    /// The op's message has also gone to subscribers, if there is a receiver.
+    /// A message is on its way to subscribers.
     #[must_use]
-    pub fn and_by_subscribers(self, effect: Option<oneshot::Receiver<()>>) -> Self {
+    pub fn by_subscribers(effect: oneshot::Receiver<()>) -> Self {
         Self {
-            subscribers: effect,
-            ..self
+            effect: Some(effect),
+            is_with_a_node: false,
         }
     }
 
     /// Whether a node has yet to perform the op.
     #[must_use]
     pub const fn is_with_a_node(&self) -> bool {
-        self.node.is_some()
+        self.is_with_a_node
     }
 
     /// Waits until the op has taken effect.
     pub async fn effect(self) {
-        for effect in [self.node, self.subscribers].into_iter().flatten() {
+        if let Some(effect) = self.effect {
             // The sender is dropped, never used: its end is the news.
             let _ = effect.await;
         }
@@ -224,64 +220,34 @@ pub struct FinishAll;
 
 // ---- from the registry to a connection ------------------------------------------------------------------------------
 
-/// A topic message for this client, or a [series](crate::protocol::wire::series) of them. From the registry; may be
-/// dropped, oldest first, when the client is slow.
+/// All that the registry sends a connection, in one order.
 #[derive(Message, Clone)]
 #[rtype(result = "()")]
-pub struct Deliver {
-    /// The topic, for throttling; none for feedback of a goal.
-    pub topic: Option<Arc<str>>,
-    /// The message, shared by all subscribers of this form.
-    pub frame: Bytes,
-    /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
-    pub underway: Option<DeliveryGuard>,
+pub enum ToClient {
+    /// A topic message, or a [series](crate::protocol::wire::series) of them. It may be dropped, oldest first, when the
+    /// client is slow.
+    Deliver {
+        /// The topic, for throttling; none for feedback of a goal.
+        topic: Option<Arc<str>>,
+        /// The message, shared by all subscribers of this form.
+        frame: Bytes,
+        /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
+        done: Option<Done>,
+    },
+    /// A response, a status, or a call forwarded to this client as a provider. It is never dropped.
+    Respond {
+        /// The whole frame.
+        frame: Bytes,
+        /// The service that it answers, if it is the runtime's own.
+        service: Option<Service>,
+    },
+    /// How a topic is throttled for this client.
+    Configure {
+        /// The topic.
+        topic: Arc<str>,
+        /// The smallest of the subscriptions' values; `None` once it is not subscribed.
+        throttle: Option<Throttle>,
+    },
+    /// Send the queue, then end. The runtime is ending.
+    Finish,
 }
-
-/// Shared by the deliveries of a message whose publisher waits. The last drop lets the publisher go on.
-pub type DeliveryGuard = Arc<oneshot::Sender<()>>;
-
-/// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
-#[derive(Message, Clone)]
-#[rtype(result = "()")]
-pub struct Response {
-    /// The whole frame.
-    pub frame: Bytes,
-    /// The service that it answers, if it is the runtime's own.
-    pub service: Option<Service>,
-}
-
-/// How a topic is throttled for this client; `None` once it is not subscribed. From the registry.
-#[derive(Message, Clone)]
-#[rtype(result = "()")]
-pub struct Configure {
-    /// The topic.
-    pub topic: Arc<str>,
-    /// The smallest of the subscriptions' values.
-    pub throttle: Option<Throttle>,
-}
-
-/// The throttling that a connection's subscriptions to one topic ask for together: the smallest of each value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Throttle {
-    /// Least time between two deliveries; zero is no limit.
-    pub interval: Duration,
-    /// How many messages throttling may hold back, newest kept; at least 1.
-    pub held_back: usize,
-    /// How many messages may wait for a slow client, newest kept, if a subscription limits that.
-    pub queue_length: Option<usize>,
-}
-
-impl Throttle {
-    /// No limit.
-    pub const NONE: Self = Self {
-        interval: Duration::ZERO,
-        held_back: 1,
-        queue_length: None,
-    };
-}
-
-/// Send the queue, then end. From the registry when the runtime ends, and from the reader at the end of the
-/// stream.
-#[derive(Message, Clone, Copy)]
-#[rtype(result = "()")]
-pub struct Finish;

@@ -4,8 +4,8 @@
 //! nothing but its bytes and that one client waits for is done here. Examples are a frame of megabytes to be read, a
 //! message to be encoded, and a long list to be written.
 //!
-//! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of errand; the others
-//! wait in the order in which they came.
+//! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of work. The others wait
+//! in the order in which they came.
 
 use std::sync::Arc;
 
@@ -16,69 +16,43 @@ use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 use crate::protocol::limits::MEDIUM;
 
-/// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other.
+/// Threads at work at once on each kind of work.
 pub const PLACES: usize = 2;
 
-/// The kinds of errands. Each has places of its own.
+/// The kinds of work. Each has places of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkKind {
-    /// Reads a client's input.
-    Reading,
-    /// The same with more than [`MEDIUM`]. Long ones have places of their own, so that shorter work waits for
-    /// less.
-    ReadingLong,
-    /// Writes messages in the forms that clients ask for.
-    Writing,
-    /// The same with more than [`MEDIUM`].
-    WritingLong,
-    /// Writes long lists that clients ask for: a client that encodes messages without end delays no
-    /// question.
+    /// Reads a frame or encodes a message.
+    Usual,
+    /// The same with more than [`MEDIUM`]: shorter work does not wait for it.
+    Long,
+    /// Writes a long list. It keeps its place while it waits for the room of its answer.
     Listing,
 }
 
 impl WorkKind {
-    /// Reads that many bytes of a client's input.
+    /// Reads or encodes that many bytes.
     #[must_use]
-    pub const fn reading(bytes: usize) -> Self {
+    pub const fn of(bytes: usize) -> Self {
         if bytes > MEDIUM {
-            Self::ReadingLong
+            Self::Long
         } else {
-            Self::Reading
-        }
-    }
-
-    /// Writes a message of that many bytes in another form.
-    #[must_use]
-    pub const fn writing(bytes: usize) -> Self {
-        if bytes > MEDIUM {
-            Self::WritingLong
-        } else {
-            Self::Writing
+            Self::Usual
         }
     }
 }
 
 thread_local! {
-    static READING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
-    static READING_LONG: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
-    static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
-    static WRITING_LONG: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
-    static LISTING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+    static FREE: [Arc<Semaphore>; 3] = std::array::from_fn(|_| Arc::new(Semaphore::new(PLACES)));
 }
 
-/// A place among those who are at work on one kind of errand.
+/// A place for one kind of work.
 pub struct WorkPermit(OwnedSemaphorePermit);
 
 impl WorkPermit {
     /// A place, once one is free: for work that is to take nothing while it waits. `None` if the runtime is ending.
-    pub async fn take(errand: WorkKind) -> Option<Self> {
-        let free = match errand {
-            WorkKind::Reading => READING.with(Arc::clone),
-            WorkKind::ReadingLong => READING_LONG.with(Arc::clone),
-            WorkKind::Writing => WRITING.with(Arc::clone),
-            WorkKind::WritingLong => WRITING_LONG.with(Arc::clone),
-            WorkKind::Listing => LISTING.with(Arc::clone),
-        };
+    pub async fn take(kind: WorkKind) -> Option<Self> {
+        let free = FREE.with(|free| free.get(kind as usize).map(Arc::clone))?;
         free.acquire_owned().await.ok().map(Self)
     }
 
@@ -112,8 +86,8 @@ impl WorkPermit {
 
 /// Waits for a place and does `work` there.
 pub async fn aside<T: Send + 'static>(
-    errand: WorkKind,
+    kind: WorkKind,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Option<T> {
-    WorkPermit::take(errand).await?.perform(work).await
+    WorkPermit::take(kind).await?.perform(work).await
 }

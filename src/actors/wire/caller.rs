@@ -12,7 +12,7 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, FrameOut, Respond, Unserved};
+use crate::actors::node::{Done, FrameOut, Respond, Unserved, guard};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::trajectory::NodeMessage;
@@ -86,7 +86,7 @@ impl Caller {
         id: Option<Payload>,
         gone: Arc<AtomicBool>,
     ) -> (Self, oneshot::Receiver<()>) {
-        let (done, ended) = oneshot::channel();
+        let (done, ended) = guard();
         let caller = Self {
             registry,
             connection,

@@ -82,7 +82,7 @@ pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Sen
     if length > LONG_ARGUMENTS {
         // Boxed, for every kind of task is compiled anew: there is one then, not one for each service.
         let read: Box<dyn FnOnce() + Send> = Box::new(read);
-        actix_rt::spawn(aside(WorkKind::reading(length), read));
+        actix_rt::spawn(aside(WorkKind::of(length), read));
     } else {
         read();
     }

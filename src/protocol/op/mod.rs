@@ -185,8 +185,8 @@ pub struct Subscribe {
 pub struct Encoding {
     /// The encoding.
     pub compression: Compression,
-    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. With none, a message always
-    /// comes in one piece, as binary messages do.
+    /// Longest piece of a message in JSON, in bytes, a power of two; longer messages come in fragments. With none, a
+    /// message always comes in one piece, as binary messages do.
     pub fragment_size: Option<usize>,
     /// Whether stamps have the names of ROS 1 too. The registry decides it by the topic.
     pub ros1_stamps: bool,

@@ -191,74 +191,62 @@ impl<'a> OpReader<'a> {
     }
 
     fn compression(&self) -> Result<Compression, Problem> {
-        let Some(raw) = self.get("compression") else {
-            return Ok(Compression::None);
-        };
-        match json::text(raw).as_deref() {
-            Some("none" | "png") => Ok(Compression::None),
-            Some("cbor") => Ok(Compression::Cbor),
-            Some("cbor-raw") => Ok(Compression::CborRaw),
-            _ => Err(self.mistyped("compression", "none, png, cbor or cbor-raw", raw)),
-        }
+        let expected = "none, png, cbor or cbor-raw";
+        let compression = self.optional("compression", expected, |raw| {
+            match json::text(raw)?.as_ref() {
+                "none" | "png" => Some(Compression::None),
+                "cbor" => Some(Compression::Cbor),
+                "cbor-raw" => Some(Compression::CborRaw),
+                _ => None,
+            }
+        })?;
+        Ok(compression.unwrap_or_default())
     }
 
     fn fragment_size(&self) -> Result<Option<usize>, Problem> {
-        let Some(raw) = self.get("fragment_size").filter(|raw| raw.get() != "null") else {
-            return Ok(None);
-        };
-        let size = json::integer(raw)
-            .filter(|size| *size > 0)
-            .ok_or_else(|| self.mistyped("fragment_size", "an integer, at least 1", raw))?;
-        Ok(usize::try_from(size).ok())
+        let size = self.optional("fragment_size", "an integer, at least 1", |raw| {
+            match raw.get() {
+                "null" => Some(None),
+                _ => json::integer(raw).filter(|size| *size > 0).map(Some),
+            }
+        })?;
+        // With powers of two alone a message is cut up in few ways, however many subscribers there are.
+        let size = size.flatten().map(|size| 1 << size.ilog2());
+        Ok(size.and_then(|size: u64| usize::try_from(size).ok()))
     }
 
     fn piece(&self) -> Result<Piece, Problem> {
         let id = self.required("id")?;
         self.short("id", id.get())?;
-        let raw = self.required("data")?;
-        let data = json::text(raw).ok_or_else(|| self.mistyped("data", "a string", raw))?;
+        // A number that does not fit is refused as too large a little later.
+        let index = |field| {
+            let number = self.typed(field, "an integer, at least 0", json::integer)?;
+            Ok(usize::try_from(number).unwrap_or(usize::MAX))
+        };
         Ok(Piece {
             id: id.get().to_owned(),
-            data: data.into_owned(),
-            num: self.index("num")?,
-            total: self.index("total")?,
+            data: self.typed("data", "a string", json::text)?.into_owned(),
+            num: index("num")?,
+            total: index("total")?,
         })
     }
 
-    /// A count. One that does not fit is refused as too large a little later.
-    fn index(&self, field: &'static str) -> Result<usize, Problem> {
-        let raw = self.required(field)?;
-        let number = json::integer(raw)
-            .ok_or_else(|| self.mistyped(field, "an integer, at least 0", raw))?;
-        Ok(usize::try_from(number).unwrap_or(usize::MAX))
-    }
-
     fn verbosity(&self) -> Result<Verbosity, Problem> {
-        let raw = self.required("level")?;
-        let name = json::text(raw);
-        let level = Level::ALL
-            .into_iter()
-            .find(|level| name.as_deref() == Some(level.name()));
-        match level {
-            None if name.as_deref() != Some("none") => {
-                Err(self.mistyped("level", "info, warning, error or none", raw))
-            }
-            level => Ok(Verbosity(level)),
-        }
+        let expected = "info, warning, error or none";
+        self.typed("level", expected, |raw| {
+            let name = json::text(raw)?;
+            let mut levels = Level::ALL.into_iter();
+            let level = levels.find(|level| level.name() == name);
+            (level.is_some() || name == "none").then_some(Verbosity(level))
+        })
     }
 
     fn error_form(&self) -> Result<Option<ErrorForm>, Problem> {
-        let Some(raw) = self.get("errors") else {
-            return Ok(None);
-        };
-        let name = json::text(raw);
-        let form = ErrorForm::ALL
-            .into_iter()
-            .find(|form| name.as_deref() == Some(form.name()));
-        match form {
-            Some(form) => Ok(Some(form)),
-            None => Err(self.mistyped("errors", "object or text", raw)),
-        }
+        self.optional("errors", "object or text", |raw| {
+            let name = json::text(raw)?;
+            let mut forms = ErrorForm::ALL.into_iter();
+            forms.find(|form| form.name() == name)
+        })
     }
 
     /// Reads the token that a client shows. A complaint about it does not repeat it.
@@ -289,24 +277,44 @@ impl<'a> OpReader<'a> {
     }
 
     fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
-        self.get(field)
-            .ok_or(Problem::Missing { op: self.op, field })
+        self.typed(field, "", Some)
     }
 
-    fn mistyped(&self, field: &'static str, expected: &'static str, raw: &RawValue) -> Problem {
-        Problem::Mistyped {
+    /// A member as `read` reads it, if it is there. `None` from that means that it is not what was `expected`.
+    fn optional<T>(
+        &self,
+        field: &'static str,
+        expected: &'static str,
+        read: impl FnOnce(&'a RawValue) -> Option<T>,
+    ) -> Result<Option<T>, Problem> {
+        let Some(raw) = self.get(field) else {
+            return Ok(None);
+        };
+        let mistyped = || Problem::Mistyped {
             op: self.op,
             field,
             expected,
             found: text::found(raw),
-        }
+        };
+        read(raw).map(Some).ok_or_else(mistyped)
+    }
+
+    /// The same for a member that must be there.
+    fn typed<T>(
+        &self,
+        field: &'static str,
+        expected: &'static str,
+        read: impl FnOnce(&'a RawValue) -> Option<T>,
+    ) -> Result<T, Problem> {
+        let value = self.optional(field, expected, read)?;
+        value.ok_or(Problem::Missing { op: self.op, field })
     }
 
     /// A topic or service name.
     fn name(&self, field: &'static str) -> Result<String, Problem> {
-        let raw = self.required(field)?;
-        let name = json::text(raw).filter(|name| !name.is_empty());
-        let name = name.ok_or_else(|| self.mistyped(field, "a non-empty string", raw))?;
+        let name = self.typed(field, "a non-empty string", |raw| {
+            json::text(raw).filter(|name| !name.is_empty())
+        })?;
         self.short(field, &name)?;
         Ok(name.into_owned())
     }
@@ -328,57 +336,43 @@ impl<'a> OpReader<'a> {
     }
 
     fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
-        let Some(raw) = self.get(field) else {
-            return Ok(None);
-        };
-        let text = json::text(raw).ok_or_else(|| self.mistyped(field, "a string", raw))?;
-        self.short(field, &text)?;
-        Ok(Some(text.into_owned()))
+        let text = self.optional(field, "a string", json::text)?;
+        self.short(field, text.as_deref().unwrap_or_default())?;
+        Ok(text.map(Cow::into_owned))
     }
 
     fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
-        let raw = self.required(field)?;
-        json::boolean(raw).ok_or_else(|| self.mistyped(field, "true or false", raw))
+        self.typed(field, "true or false", json::boolean)
     }
 
     /// A ROS message, which is an object.
     fn object(&self, field: &'static str) -> Result<Payload, Problem> {
-        let raw = self.required(field)?;
-        if raw.get().starts_with('{') {
-            return Ok(raw.into());
-        }
-        Err(self.mistyped(field, "an object", raw))
+        let object = self.typed(field, "an object", |raw| {
+            raw.get().starts_with('{').then_some(raw)
+        })?;
+        Ok(object.into())
     }
 
     fn throttle(&self) -> Result<Duration, Problem> {
-        let Some(raw) = self.get("throttle_rate") else {
-            return Ok(Duration::ZERO);
-        };
-        let throttle_ms = json::number(raw)
-            .filter(|rate| rate.is_finite() && *rate >= 0.0)
-            .ok_or_else(|| self.mistyped("throttle_rate", "a number of ms, at least 0", raw))?;
-        Ok(duration(throttle_ms / 1000.0, MAX_THROTTLE))
+        let expected = "a number of ms, at least 0";
+        let rate = self.optional("throttle_rate", expected, |raw| {
+            json::number(raw).filter(|rate| rate.is_finite() && *rate >= 0.0)
+        })?;
+        Ok(duration(rate.unwrap_or_default() / 1000.0, MAX_THROTTLE))
     }
 
     fn queue_length(&self) -> Result<usize, Problem> {
-        let Some(raw) = self.get("queue_length") else {
-            return Ok(0);
-        };
-        let length = json::integer(raw)
-            .ok_or_else(|| self.mistyped("queue_length", "an integer, at least 0", raw))?;
-        Ok(usize::try_from(length)
-            .unwrap_or(MAX_QUEUE_LENGTH)
-            .min(MAX_QUEUE_LENGTH))
+        let length = self.optional("queue_length", "an integer, at least 0", json::integer)?;
+        let length = usize::try_from(length.unwrap_or_default());
+        Ok(length.unwrap_or(MAX_QUEUE_LENGTH).min(MAX_QUEUE_LENGTH))
     }
 
     fn timeout(&self) -> Result<Option<Duration>, Problem> {
-        let Some(raw) = self.get("timeout") else {
-            return Ok(None);
-        };
-        let timeout = json::number(raw)
-            .filter(|timeout| timeout.is_finite() && *timeout > 0.0)
-            .ok_or_else(|| self.mistyped("timeout", "a number of seconds greater than 0", raw))?;
-        Ok(Some(duration(timeout, MAX_TIMEOUT)))
+        let expected = "a number of seconds greater than 0";
+        let timeout = self.optional("timeout", expected, |raw| {
+            json::number(raw).filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+        })?;
+        Ok(timeout.map(|timeout| duration(timeout, MAX_TIMEOUT)))
     }
 }
 
@@ -449,17 +443,16 @@ impl OpReader<'_> {
     }
 
     fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
-        let Some(raw) = self.get("status") else {
-            return Ok(if is_good {
-                GoalStatus::Succeeded
-            } else {
-                GoalStatus::Aborted
-            } as u8);
+        let status = self.optional("status", "an integer from 0 to 6", |raw| {
+            let status = u8::try_from(json::integer(raw)?).ok();
+            status.filter(|status| *status <= GoalStatus::Aborted as u8)
+        })?;
+        let usual = if is_good {
+            GoalStatus::Succeeded
+        } else {
+            GoalStatus::Aborted
         };
-        let status = json::integer(raw).and_then(|status| u8::try_from(status).ok());
-        status
-            .filter(|status| *status <= GoalStatus::Aborted as u8)
-            .ok_or_else(|| self.mistyped("status", "an integer from 0 to 6", raw))
+        Ok(status.unwrap_or(usual as u8))
     }
 }
 

@@ -13,6 +13,7 @@
 //! **Invariant:** dropping removes whole messages, never reorders; of topic messages, held back ones included, at most
 //! [`MAX_TOPIC_BYTES`] wait.
 
+mod message;
 mod throttle;
 
 use std::collections::{HashMap, VecDeque};
@@ -21,7 +22,9 @@ use std::time::{Duration, Instant};
 
 use bytes::{Buf, Bytes};
 
-use self::throttle::{HeldMessage, TopicLimits, TopicThrottle};
+use self::message::{QueuedMessage, by_itself, counted};
+pub use self::throttle::Throttle;
+use self::throttle::TopicLimits;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -37,20 +40,6 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
 /// Bytes that a waiting message counts beside its own: its reference count, its place, and the allocator's share.
 pub const MESSAGE_BYTES: usize = 160;
-
-/// Bytes of a message, or of a series, that count.
-fn counted(frame: &Bytes) -> usize {
-    frame.len().min(MEDIUM)
-}
-
-/// A message that is queued without the series that it is part of, if it is: it keeps none of the others in memory.
-fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
-    if is_part {
-        Bytes::copy_from_slice(&frame)
-    } else {
-        frame
-    }
-}
 
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
@@ -80,42 +69,15 @@ pub struct Outbox {
     response_bytes: usize,
     short_bytes: usize,
     /// The frames that are being written.
-    in_flight: VecDeque<InFlight>,
+    writing: VecDeque<Writing>,
     dropped: u64,
-}
-
-/// A topic message that waits, or a series of them.
-#[derive(Debug)]
-struct QueuedMessage {
-    number: u64,
-    /// When it was produced.
-    since: Instant,
-    /// Its topic; feedback of a goal has none.
-    topic: Option<Arc<str>>,
-    frame: Bytes,
-}
-
-impl QueuedMessage {
-    fn is_on(&self, topic: &Arc<str>) -> bool {
-        let own = self.topic.as_ref();
-        own.is_some_and(|own| Arc::ptr_eq(own, topic) || own == topic)
-    }
-
-    fn is_older(&self, age: Duration, now: Instant) -> bool {
-        now.saturating_duration_since(self.since) > age
-    }
-
-    /// How many messages it has.
-    fn count(&self) -> u64 {
-        messages(self.frame.clone()).count() as u64
-    }
 }
 
 /// A frame that is being written.
 #[derive(Debug)]
-struct InFlight {
-    /// Bytes that have not been written.
-    left: usize,
+struct Writing {
+    /// The bytes of it that have not been written.
+    rest: Bytes,
     is_response: bool,
     /// Bytes of the whole.
     length: usize,
@@ -136,7 +98,7 @@ impl Outbox {
             return;
         }
         match self.limits.get(topic) {
-            Some(limits) if limits.throttle.is_some() => self.offer(topic, frame, now),
+            Some(limits) if limits.holds_back() => self.offer(topic, frame, now),
             Some(_) => {
                 let is_series = first_message(&frame) < frame.len();
                 for frame in messages(frame) {
@@ -186,16 +148,9 @@ impl Outbox {
         self.fresh = fresh;
     }
 
-    /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
-    /// They count as being written until [`written`](Self::written) says otherwise. A series counts as one, unless
-    /// one frame is all that is asked for.
-    pub fn take_frames(
-        &mut self,
-        now: Instant,
-        max_frames: usize,
-        max_bytes: usize,
-        frames: &mut Vec<Bytes>,
-    ) {
+    /// Moves the next frames to [those being written](Self::writing), at least one if any waits, as many as
+    /// `max_frames` and `max_bytes` allow. A series counts as one, unless one frame is all that is asked for.
+    pub fn take_frames(&mut self, now: Instant, max_frames: usize, max_bytes: usize) {
         self.release(now);
         self.drop_old(now);
         let mut bytes = 0;
@@ -246,21 +201,25 @@ impl Outbox {
             if let Some(room) = self.room.as_mut().filter(|_| !is_response) {
                 *room = room.saturating_sub(length);
             }
-            self.in_flight.push_back(InFlight {
-                left: length,
+            self.writing.extend(frame.map(|rest| Writing {
+                rest,
                 is_response,
                 length,
-            });
-            frames.extend(frame);
+            }));
         }
         self.is_behind &= !self.topics.is_empty();
     }
 
+    /// The frames that are being written, without the bytes that have been.
+    pub fn writing(&self) -> impl ExactSizeIterator<Item = &Bytes> {
+        self.writing.iter().map(|frame| &frame.rest)
+    }
+
     /// Notes that the next `bytes` of what was taken have been written.
     pub fn written(&mut self, mut bytes: usize) {
-        while let Some(frame) = self.in_flight.front_mut() {
-            let done = bytes.min(frame.left);
-            frame.left -= done;
+        while let Some(frame) = self.writing.front_mut() {
+            let done = bytes.min(frame.rest.len());
+            frame.rest.advance(done);
             bytes -= done;
             if frame.is_response {
                 self.response_bytes -= done;
@@ -268,10 +227,10 @@ impl Outbox {
                     self.short_bytes -= done;
                 }
             }
-            if frame.left > 0 {
+            if !frame.rest.is_empty() {
                 return;
             }
-            self.in_flight.pop_front();
+            self.writing.pop_front();
         }
     }
 
@@ -279,7 +238,7 @@ impl Outbox {
     #[must_use]
     pub fn has_long(&self) -> bool {
         let mut waiting = self.topics.iter();
-        let mut writing = self.in_flight.iter();
+        let mut writing = self.writing.iter();
         waiting.any(|message| message.frame.len() > MEDIUM)
             || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
     }
@@ -360,46 +319,26 @@ impl Outbox {
 // ---- throttles ------------------------------------------------------------------------------------------------------
 
 impl Outbox {
-    /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
-    /// (`None`, or no time at all). Messages held back then count as produced now.
-    pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
-        let limits = self.limits.entry(Arc::clone(topic)).or_default();
-        let before = limits.throttle.take();
-        if let Some((interval, most_held)) = throttle.filter(|(interval, _)| !interval.is_zero()) {
-            limits.throttle = Some(TopicThrottle {
-                interval,
-                most_held: most_held.max(1),
-                last: before.and_then(|before| before.last),
-            });
-            let surplus = limits.trim();
-            self.forget_held(&surplus);
+    /// Sets the limits of a topic, or forgets the topic after an unsubscription. Queued messages still leave. Where the
+    /// throttle is lifted, messages held back count as produced now.
+    pub fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
+        let Some(throttle) = throttle else {
+            self.take_held(topic);
+            self.limits.remove(topic);
             return;
+        };
+        let limits = self.limits.entry(Arc::clone(topic)).or_default();
+        limits.throttle = throttle;
+        if limits.holds_back() {
+            let surplus = limits.trim();
+            return self.forget_held(&surplus);
         }
+        limits.last = None;
         for held in self.take_held(topic) {
             self.enqueue(Some(topic), held.since, held.frame);
         }
         self.keep_to_queue_length(topic);
-        self.tidy(topic);
-    }
-
-    /// Sets how many messages of a topic may wait while the client does not take all that it is offered, the newest
-    /// kept; `None` for any number.
-    pub fn set_queue_length(&mut self, topic: &Arc<str>, queue_length: Option<usize>) {
-        let limits = self.limits.entry(Arc::clone(topic)).or_default();
-        limits.queue_length = queue_length;
-        self.tidy(topic);
-    }
-
-    /// Forgets a topic after an unsubscription: its throttle, and the messages held back. Queued messages still leave.
-    pub fn forget(&mut self, topic: &str) {
-        self.take_held(topic);
-        self.limits.remove(topic);
-    }
-
-    /// Forgets the limits of a topic that has none.
-    fn tidy(&mut self, topic: &str) {
-        let limits = self.limits.get(topic);
-        if limits.is_some_and(TopicLimits::is_none) {
+        if throttle.queue_length.is_none() {
             self.limits.remove(topic);
         }
     }
@@ -411,8 +350,8 @@ impl Outbox {
         while !frames.is_empty() {
             let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
             if !self.offer_one(topic, frame, now) {
-                let throttle = self.limits.get(topic).and_then(|one| one.throttle.as_ref());
-                let left = throttle.map_or(0, |throttle| throttle.most_held);
+                let limits = self.limits.get(topic);
+                let left = limits.map_or(0, |limits| limits.throttle.held_back);
                 for frame in messages(last_messages(frames, left)) {
                     self.offer_one(topic, by_itself(frame, true), now);
                 }
@@ -427,23 +366,21 @@ impl Outbox {
         let Some(limits) = self.limits.get_mut(topic) else {
             return true;
         };
-        let Some(throttle) = &mut limits.throttle else {
-            return true;
-        };
-        if limits.held.is_empty() && throttle.is_due(now) {
-            throttle.last = Some(now);
+        if limits.held.is_empty() && limits.is_due(now) {
+            limits.last = Some(now);
             self.enqueue(Some(topic), now, frame);
             return true;
         }
-        if frame.len() > MEDIUM && !throttle.may_hold_long(now) {
+        if frame.len() > MEDIUM && !limits.may_hold_long(now) {
             self.dropped += 1;
             return false;
         }
         self.held_count += 1;
         self.held_bytes += counted(&frame);
-        limits.held.push_back(HeldMessage {
+        limits.held.push_back(QueuedMessage {
             number,
             since: now,
+            topic: Some(Arc::clone(topic)),
             frame,
         });
         let surplus = limits.trim();
@@ -452,13 +389,13 @@ impl Outbox {
     }
 
     /// These messages are no longer held back.
-    fn forget_held(&mut self, held: &[HeldMessage]) {
+    fn forget_held(&mut self, held: &[QueuedMessage]) {
         self.held_count -= held.len();
         self.held_bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
     }
 
     /// Takes all that is held back of a topic, oldest first; its throttle stays.
-    fn take_held(&mut self, topic: &str) -> Vec<HeldMessage> {
+    fn take_held(&mut self, topic: &str) -> Vec<QueuedMessage> {
         let limits = self.limits.get_mut(topic);
         let held = limits.map_or_else(Vec::new, |limits| std::mem::take(&mut limits.held).into());
         self.forget_held(&held);
@@ -489,9 +426,7 @@ impl Outbox {
             let Some(limits) = self.limits.get_mut(&topic) else {
                 return;
             };
-            if let Some(throttle) = &mut limits.throttle {
-                throttle.last = Some(now);
-            }
+            limits.last = Some(now);
             let held = limits.held.pop_front();
             self.forget_held(held.as_slice());
             if let Some(held) = held {
@@ -516,10 +451,10 @@ impl Outbox {
     /// it is offered.
     fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
         let limits = self.limits.get(topic);
-        let Some(most) = limits.and_then(|limits| limits.queue_length) else {
+        let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
             return;
         };
-        if self.in_flight.is_empty() && self.room != Some(0) {
+        if self.writing.is_empty() && self.room != Some(0) {
             return;
         }
         let waiting = self.topics.iter().filter(|message| message.is_on(topic));

@@ -6,45 +6,57 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
+use super::message::QueuedMessage;
 
 /// How long a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) may be held back: it takes room that
 /// others wait for.
 const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 
-/// A client's limits of one topic.
-#[derive(Debug, Default)]
-pub(super) struct TopicLimits {
-    /// How many messages may wait while the client does not take all that it is offered.
-    pub(super) queue_length: Option<usize>,
-    pub(super) throttle: Option<TopicThrottle>,
-    /// Messages that the throttle holds back.
-    pub(super) held: VecDeque<HeldMessage>,
+/// The throttling that a connection's subscriptions to one topic ask for together: the smallest of each value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Throttle {
+    /// Least time between two deliveries; zero is no limit.
+    pub interval: Duration,
+    /// How many messages that may hold back, newest kept; at least 1.
+    pub held_back: usize,
+    /// How many messages may wait while the client does not take all that it is offered, newest kept, if a subscription
+    /// limits that.
+    pub queue_length: Option<usize>,
 }
 
-/// The least time between two messages of a topic.
+impl Throttle {
+    /// No limit.
+    pub const NONE: Self = Self {
+        interval: Duration::ZERO,
+        held_back: 1,
+        queue_length: None,
+    };
+}
+
+/// A client's limits of one topic.
 #[derive(Debug)]
-pub(super) struct TopicThrottle {
-    pub(super) interval: Duration,
-    /// How many messages may be held back, 1 or more.
-    pub(super) most_held: usize,
+pub(super) struct TopicLimits {
+    pub(super) throttle: Throttle,
     /// When the last message was released.
     pub(super) last: Option<Instant>,
+    /// Messages that the throttle holds back.
+    pub(super) held: VecDeque<QueuedMessage>,
 }
 
-/// A message that is held back.
-#[derive(Debug)]
-pub(super) struct HeldMessage {
-    pub(super) number: u64,
-    /// When it was produced.
-    pub(super) since: Instant,
-    pub(super) frame: Bytes,
+impl Default for TopicLimits {
+    fn default() -> Self {
+        Self {
+            throttle: Throttle::NONE,
+            last: None,
+            held: VecDeque::new(),
+        }
+    }
 }
 
 impl TopicLimits {
-    /// Whether the client has asked for nothing.
-    pub(super) const fn is_none(&self) -> bool {
-        self.throttle.is_none() && self.queue_length.is_none()
+    /// Whether messages may be held back.
+    pub(super) const fn holds_back(&self) -> bool {
+        !self.throttle.interval.is_zero()
     }
 
     /// The number of the message that was held back first.
@@ -54,22 +66,18 @@ impl TopicLimits {
 
     /// When the next message that is held back is due, if there is one.
     pub(super) fn due(&self) -> Option<Instant> {
-        let throttle = self.throttle.as_ref().filter(|_| !self.held.is_empty());
-        throttle?.next()
+        self.next().filter(|_| !self.held.is_empty())
     }
 
     /// Takes the oldest messages beyond the number that may be held back.
-    pub(super) fn trim(&mut self) -> Vec<HeldMessage> {
-        let most = self.throttle.as_ref().map_or(0, |one| one.most_held);
-        let surplus = self.held.len().saturating_sub(most);
+    pub(super) fn trim(&mut self) -> Vec<QueuedMessage> {
+        let surplus = self.held.len().saturating_sub(self.throttle.held_back);
         self.held.drain(..surplus).collect()
     }
-}
 
-impl TopicThrottle {
     /// When the next message may go; `None`: at once.
     fn next(&self) -> Option<Instant> {
-        self.last.and_then(|last| last.checked_add(self.interval))
+        self.last?.checked_add(self.throttle.interval)
     }
 
     /// Whether a long message may wait for the next time.

@@ -131,10 +131,10 @@ impl FrameReader {
         self.buffer.capacity()
     }
 
-    /// Whether a frame has begun and not ended, one that is being skipped included.
+    /// Whether a frame has begun and not ended. One that is skipped does not count: nothing of it is kept.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
-        self.state != Within::Between
+        matches!(self.state, Within::Object | Within::Line)
     }
 
     /// Ends the stream, after the last frame was taken. An unfinished frame is one malformed frame.

@@ -46,8 +46,8 @@ fn only_its_publisher_waits_for_a_message_that_is_cut_up() {
         }
         let [slow, quick] = &mut publishers;
         let places = [
-            WorkPermit::take(WorkKind::WritingLong).await,
-            WorkPermit::take(WorkKind::WritingLong).await,
+            WorkPermit::take(WorkKind::Long).await,
+            WorkPermit::take(WorkKind::Long).await,
         ];
         let publish =
             |topic, text: String| json!({"op": "publish", "topic": topic, "msg": {"data": text}});

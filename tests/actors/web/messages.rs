@@ -70,7 +70,7 @@ fn a_long_message_is_read_aside() {
         ] {
             let mut places = Vec::new();
             for _ in 0..PLACES {
-                places.push(WorkPermit::take(WorkKind::ReadingLong).await);
+                places.push(WorkPermit::take(WorkKind::Long).await);
             }
             let mut socket = open(&gateway, WIDE).await;
             let mut bytes = Vec::new();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use pendularm::protocol::outbox::MAX_AGE;
+use pendularm::protocol::outbox::{MAX_AGE, Throttle};
 
 use super::Bench;
 
@@ -70,7 +70,11 @@ fn a_message_ages_from_when_its_throttle_lets_it_go() {
 fn a_queue_length_bounds_what_waits_while_the_client_does_not_take_all() {
     let topic: Arc<str> = "/a".into();
     let mut bench = Bench::new();
-    bench.outbox.set_queue_length(&topic, Some(2));
+    let throttle = Throttle {
+        queue_length: Some(2),
+        ..Throttle::NONE
+    };
+    bench.outbox.configure(&topic, Some(throttle));
     for frame in ["1", "2", "3"] {
         bench.push("/a", frame);
     }

@@ -11,7 +11,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use pendularm::protocol::outbox::Outbox;
+use pendularm::protocol::outbox::{Outbox, Throttle};
+
+/// A throttle that holds back so many messages.
+fn throttle(interval: Duration, held_back: usize) -> Throttle {
+    Throttle {
+        interval,
+        held_back,
+        queue_length: None,
+    }
+}
 
 /// An outbox under test, with a clock of its own.
 struct Bench {
@@ -36,8 +45,8 @@ impl Bench {
     }
 
     fn throttle(&mut self, topic: &str, ms: u64, queue_length: usize) {
-        let throttle = (Duration::from_millis(ms), queue_length);
-        self.outbox.set_throttle(&Arc::from(topic), Some(throttle));
+        let throttle = throttle(Duration::from_millis(ms), queue_length);
+        self.outbox.configure(&Arc::from(topic), Some(throttle));
     }
 
     fn advance(&mut self, ms: u64) {
@@ -45,10 +54,9 @@ impl Bench {
     }
 
     fn take(&mut self, max_frames: usize, max_bytes: usize) -> Vec<Bytes> {
-        let mut batch = Vec::new();
-        self.outbox
-            .take_frames(self.now, max_frames, max_bytes, &mut batch);
-        batch
+        let before = self.outbox.writing().len();
+        self.outbox.take_frames(self.now, max_frames, max_bytes);
+        self.outbox.writing().skip(before).cloned().collect()
     }
 
     fn take_all(&mut self) -> Vec<String> {

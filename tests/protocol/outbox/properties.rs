@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use pendularm::protocol::limits::MEDIUM;
-use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES};
+use pendularm::protocol::outbox::{MAX_MESSAGE, MAX_TOPIC_BYTES, MESSAGE_BYTES, Throttle};
 use proptest::prelude::*;
 
 use super::Bench;
@@ -252,11 +252,13 @@ proptest! {
                     model.waiting.push(Waiting { frame, kind: Kind::Response });
                 }
                 Action::SetThrottle(topic, throttle) => {
-                    bench.outbox.set_throttle(&topics[topic], throttle);
+                    let asked = throttle
+                        .map_or(Throttle::NONE, |(interval, most)| super::throttle(interval, most));
+                    bench.outbox.configure(&topics[topic], Some(asked));
                     model.set_throttle(topic, throttle);
                 }
                 Action::Forget(topic) => {
-                    bench.outbox.forget(TOPICS[topic]);
+                    bench.outbox.configure(&topics[topic], None);
                     model.discard(topic);
                     model.throttles.remove(&topic);
                 }

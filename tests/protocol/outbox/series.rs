@@ -9,6 +9,8 @@ use bytes::Bytes;
 use pendularm::protocol::limits::SHORT;
 use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, MESSAGE_BYTES, Outbox};
 
+use super::throttle;
+
 /// A frame that publishes `msg` on `topic`.
 fn line(topic: &str, msg: &str) -> String {
     format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}\n")
@@ -43,9 +45,8 @@ fn fill(outbox: &mut Outbox, left: usize, now: Instant) {
 }
 
 fn take(outbox: &mut Outbox, max_frames: usize) -> Vec<Bytes> {
-    let mut batch = Vec::new();
-    outbox.take_frames(Instant::now(), max_frames, usize::MAX, &mut batch);
-    batch
+    outbox.take_frames(Instant::now(), max_frames, usize::MAX);
+    outbox.writing().cloned().collect()
 }
 
 #[test]
@@ -55,7 +56,7 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     assert_eq!(take(&mut outbox, 2), [SERIES, "next"]);
     // Another topic's throttle does not take it apart.
     let mut outbox = Outbox::new();
-    outbox.set_throttle(&Arc::from("/b"), Some((Duration::from_secs(1), 1)));
+    outbox.configure(&Arc::from("/b"), Some(throttle(Duration::from_secs(1), 1)));
     outbox.push(
         &topic(),
         Bytes::from_static(SERIES.as_bytes()),
@@ -88,9 +89,9 @@ fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
         fill(&mut outbox, kept, now);
         let left = kept / length;
         assert_eq!(outbox.dropped(), 1000 - left as u64, "{kept}");
-        let mut batch = Vec::new();
-        outbox.take_frames(now, 1, usize::MAX, &mut batch);
-        assert_eq!(left > 0, batch[0] == numbered(1000 - left), "{kept}");
+        outbox.take_frames(now, 1, usize::MAX);
+        let first = outbox.writing().next().unwrap();
+        assert_eq!(left > 0, first == &numbered(1000 - left), "{kept}");
     }
 }
 
@@ -101,16 +102,16 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
     let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
     for length in [1, 2, 8, 9, 10, 50] {
         let mut outbox = Outbox::new();
-        outbox.set_throttle(&topic, Some((Duration::from_millis(10), length)));
+        outbox.configure(&topic, Some(throttle(Duration::from_millis(10), length)));
         for series in [0..10, 10..20] {
             let series: String = series.map(numbered).collect();
             outbox.push(&topic, Bytes::from(series), now);
         }
-        let mut batch = Vec::new();
         for n in 0..30 {
             let later = now + n * Duration::from_millis(10);
-            outbox.take_frames(later, 1, usize::MAX, &mut batch);
+            outbox.take_frames(later, 1, usize::MAX);
         }
+        let batch: Vec<Bytes> = outbox.writing().cloned().collect();
         let first = 20 - length.min(19);
         let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
         assert_eq!(batch, wanted, "{length}");

@@ -11,11 +11,11 @@ use tokio::time::Instant;
 
 use super::admission::authentication::AuthError;
 use super::admission::slots::HeldSlot;
-use super::session::{ClientSession, HeldPlace, Newcomer, Opened};
+use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
 use super::websocket::WebSocket;
 use crate::actors::gateway::limits::OPENING_TIME;
-use crate::actors::gateway::messages::{Outlets, Refused, Request};
+use crate::actors::gateway::messages::{Outlets, Request};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::web::serve::{self, Gate};
@@ -23,11 +23,11 @@ use crate::web::serve::{self, Gate};
 /// Decides about the requests of one client.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    /// The ways to a client that has no place yet.
+    /// The way to a client that has no place yet.
     outlets: Cell<Option<Outlets>>,
     place: Cell<Option<HeldPlace>>,
-    /// Its slot, and why it is turned away without.
-    newcomer: Option<(HeldSlot<'a>, Option<Refused>)>,
+    /// The slot of a client that has not shown the token yet.
+    slot: Option<HeldSlot<'a>>,
 }
 
 impl Gate for HttpGate<'_> {
@@ -35,12 +35,11 @@ impl Gate for HttpGate<'_> {
         let Some(outlets) = self.outlets.take() else {
             return Ok(());
         };
-        if let Some((slot, _)) = &self.newcomer {
+        if let Some(slot) = &self.slot {
             slot.give_back();
         }
-        let slot = self.session.admission.newcomers.waiting.take();
         let due = Instant::now() + OPENING_TIME;
-        let place = self.session.wait_for_place(&outlets, &slot, due).await;
+        let place = self.session.wait_for_place(&outlets, due).await;
         let place = place.map_err(|why| {
             self.session.count_refusal(why);
             why.to_string()
@@ -58,50 +57,41 @@ impl HttpGate<'_> {
     /// Ends when the connection has to: with a sentence, if its slot is another client's.
     async fn cut_off(&self) -> Option<String> {
         let evicted = async {
-            let Some((slot, refused)) = &self.newcomer else {
-                return pending().await;
-            };
-            slot.evicted().await;
-            match *refused {
-                None => AuthError::Crowded.to_string(),
-                Some(why) => {
-                    self.session.count_refusal(why);
-                    why.to_string()
-                }
+            match &self.slot {
+                Some(slot) => slot.evicted().await,
+                None => pending().await,
             }
         };
         tokio::select! {
             () = self.session.finish.notified() => None,
-            why = evicted => Some(why),
+            () = evicted => Some(AuthError::Crowded.to_string()),
         }
     }
 }
 
 impl ClientSession {
-    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A newcomer has no place before its
-    /// first request is admitted.
+    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A newcomer gets a place once its
+    /// first request is admitted. Until then it may have a slot of those that have not shown the token.
     pub(super) async fn serve_http<S>(
         &self,
         stream: S,
         first: BytesMut,
         due: Instant,
-        client: Result<Newcomer<'_>, HeldPlace>,
+        client: Result<HeldPlace, (Outlets, Option<HeldSlot<'_>>)>,
     ) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let (newcomer, place) = match client {
-            Ok(newcomer) => (Some(newcomer), None),
-            Err(place) => (None, Some(place)),
+        let (place, newcomer) = match client {
+            Ok(place) => (Some(place), None),
+            Err(newcomer) => (None, Some(newcomer)),
         };
-        let (outlets, newcomer) = newcomer
-            .map(|newcomer| (newcomer.outlets, (newcomer.slot, newcomer.refused)))
-            .unzip();
+        let (outlets, slot) = newcomer.unzip();
         let gate = HttpGate {
             session: self,
             outlets: Cell::new(outlets),
             place: Cell::new(place),
-            newcomer,
+            slot: slot.flatten(),
         };
         let site = (&self.admission.site, self.ends.local);
         let cut_off = gate.cut_off();
@@ -119,7 +109,7 @@ impl ClientSession {
         let _ = self.registry.send(quiet).await;
         let socket = WebSocket::open(stream, behind, self.memory.clone()).await;
         Some(Opened {
-            place,
+            place: Ok(place),
             transport: Transport::WebSocket(Box::new(socket)),
             first: BytesMut::new(),
         })

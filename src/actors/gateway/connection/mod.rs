@@ -19,7 +19,6 @@ mod reader;
 mod session;
 mod timer;
 mod transport;
-mod unfinished;
 mod unread;
 #[cfg(feature = "web")]
 mod watched;
@@ -44,7 +43,7 @@ use self::transport::Transport;
 pub use self::unread::UnreadSource;
 pub use super::ends::Ends;
 use super::limits::MAX_RESPONSES_WAITING;
-use super::messages::{Configure, Deliver, Finish, Outlets, Request, Response};
+use super::messages::{Outlets, Request, ToClient};
 use super::registry::Registry;
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
@@ -137,12 +136,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
         let Some((stream, admission, ends)) = self.newcomer.take() else {
             return;
         };
-        let address = ctx.address();
         let outlets = Outlets {
-            deliver: address.clone().recipient(),
-            respond: address.clone().recipient(),
-            configure: address.clone().recipient(),
-            finish: address.recipient(),
+            mailbox: ctx.address().recipient(),
             wants_text: Arc::clone(&self.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
             backlog: self.outgoing.backlog(),
@@ -169,64 +164,41 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
 
 // ---- handlers: the writer is polled behind them ---------------------------------------------------------------------
 
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connection<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connection<S> {
     type Result = ();
 
-    fn handle(&mut self, message: Deliver, ctx: &mut Context<Self>) {
-        self.contain(ctx, |connection| connection.outgoing.accept(message));
-    }
-}
-
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connection<S> {
-    type Result = ();
-
-    fn handle(&mut self, response: Response, ctx: &mut Context<Self>) {
-        self.contain(ctx, |connection| {
-            let outgoing = &mut connection.outgoing;
-            let service = response.service;
-            let superseded = service.map_or(&[][..], Service::supersedes);
-            outgoing.push_response(response.frame, superseded);
-            if service.is_some_and(Service::is_computation) {
-                connection.computations.end();
-                connection.room_since = Instant::now();
-                connection.start_computation();
-            }
-        });
-    }
-}
-
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Configure> for Connection<S> {
-    type Result = ();
-
-    fn handle(&mut self, configure: Configure, ctx: &mut Context<Self>) {
-        self.contain(ctx, |connection| {
-            let outgoing = &mut connection.outgoing;
-            outgoing.configure(&configure.topic, configure.throttle);
-        });
-    }
-}
-
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Finish> for Connection<S> {
-    type Result = ();
-
-    fn handle(&mut self, _: Finish, _: &mut Context<Self>) {
-        self.finish();
-    }
-}
-
-// ---- helpers --------------------------------------------------------------------------------------------------------
-
-impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Does `work`; its panic ends this client and nothing else.
-    fn contain(&mut self, ctx: &mut Context<Self>, work: impl FnOnce(&mut Self)) {
-        if let Err(panic) = contain(|| work(self)) {
+    /// A panic ends this client and nothing else.
+    fn handle(&mut self, message: ToClient, ctx: &mut Context<Self>) {
+        if let Err(panic) = contain(|| self.take(message)) {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
             ctx.stop();
         }
     }
 }
 
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
 impl<S> Connection<S> {
+    /// Puts what the registry sends into the outbox.
+    fn take(&mut self, message: ToClient) {
+        let outgoing = &mut self.outgoing;
+        match message {
+            ToClient::Deliver { topic, frame, done } => {
+                outgoing.accept(topic.as_ref(), frame, done);
+            }
+            ToClient::Respond { frame, service } => {
+                outgoing.push_response(frame, service.map_or(&[], Service::supersedes));
+                if service.is_some_and(Service::is_computation) {
+                    self.computations.end();
+                    self.room_since = Instant::now();
+                    self.start_computation();
+                }
+            }
+            ToClient::Configure { topic, throttle } => outgoing.configure(&topic, throttle),
+            ToClient::Finish => self.finish(),
+        }
+    }
+
     /// Refuses the client: it gets this status, and nothing that it sends is looked at any more.
     fn refuse(&mut self, status: Bytes) {
         self.is_refused = true;

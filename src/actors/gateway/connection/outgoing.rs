@@ -9,14 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use bytes::{Buf, Bytes};
+use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::unread::UnreadSource;
 use crate::actors::gateway::limits::{LINGER, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES};
-use crate::actors::gateway::messages::{Deliver, DeliveryGuard, Throttle};
+use crate::actors::node::Done;
 use crate::actors::resources::gauges::Gauges;
-use crate::protocol::outbox::{MAX_AGE, Outbox};
+use crate::protocol::outbox::{MAX_AGE, Outbox, Throttle};
 
 /// The outgoing side of one client.
 pub(super) struct Outgoing {
@@ -28,15 +28,12 @@ pub(super) struct Outgoing {
     gauges: Arc<Gauges>,
     /// Bytes of short responses in the outbox, for the registry to look at.
     backlog: Arc<AtomicUsize>,
-    /// The frames that are being written, and how many of them have been.
-    frames: Vec<Bytes>,
-    first: usize,
-    /// When these were taken, or the client last took some of them.
+    /// When the frames that are being written were taken, or the client last took some of them.
     progress: Instant,
     /// The time since which responses have been waiting without a break.
     responses_since: Option<Instant>,
     /// Messages whose publishers wait until they have been offered to the socket.
-    underway: Vec<DeliveryGuard>,
+    underway: Vec<Done>,
 }
 
 impl Outgoing {
@@ -49,8 +46,6 @@ impl Outgoing {
             flow: FlowControl::new(unread, now),
             gauges,
             backlog: Arc::default(),
-            frames: Vec::new(),
-            first: 0,
             progress: now,
             responses_since: None,
             underway: Vec::new(),
@@ -65,15 +60,10 @@ impl Outgoing {
     // ---- putting in -------------------------------------------------------------------------------------------------
 
     /// Adds a topic message, or a series of them.
-    pub(super) fn accept(&mut self, message: Deliver) {
-        let Deliver {
-            topic,
-            frame,
-            underway,
-        } = message;
-        self.underway.extend(underway);
+    pub(super) fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes, done: Option<Done>) {
+        self.underway.extend(done);
         let now = Instant::now().into_std();
-        self.counting_dropped(|outbox| match &topic {
+        self.counting_dropped(|outbox| match topic {
             Some(topic) => outbox.push(topic, frame, now),
             None => outbox.push_feedback(frame, now),
         });
@@ -96,17 +86,7 @@ impl Outgoing {
 
     /// Sets how a topic is throttled, or forgets the topic.
     pub(super) fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
-        match throttle {
-            Some(Throttle {
-                interval,
-                held_back,
-                queue_length,
-            }) => {
-                self.outbox.set_throttle(topic, Some((interval, held_back)));
-                self.outbox.set_queue_length(topic, queue_length);
-            }
-            None => self.outbox.forget(topic),
-        }
+        self.outbox.configure(topic, throttle);
     }
 
     /// Whether each frame is written by itself.
@@ -116,16 +96,21 @@ impl Outgoing {
 
     // ---- taking out -------------------------------------------------------------------------------------------------
 
-    /// The frames that are to be written next, if any may be. Nothing is kept back from a client whose connection is
-    /// finishing.
-    pub(super) fn frames(&mut self, is_finishing: bool) -> &[Bytes] {
-        if self.frames.is_empty() {
-            self.take(is_finishing);
-        }
-        self.frames.get(self.first..).unwrap_or_default()
+    /// The frames that are to be written next.
+    pub(super) fn frames(&self) -> impl ExactSizeIterator<Item = &Bytes> {
+        self.outbox.writing()
     }
 
-    fn take(&mut self, is_finishing: bool) {
+    /// Takes the next frames out of the outbox, if all before have been written. Whether there is something to write.
+    /// Nothing is kept back from a client whose connection is finishing.
+    pub(super) fn take(&mut self, is_finishing: bool) -> bool {
+        if self.frames().len() == 0 {
+            self.take_next(is_finishing);
+        }
+        self.frames().len() > 0
+    }
+
+    fn take_next(&mut self, is_finishing: bool) {
         let (has_topics, holds_back) = (self.outbox.has_topics(), self.outbox.holds_back());
         if self.outbox.is_empty() && !holds_back {
             return;
@@ -141,13 +126,10 @@ impl Outgoing {
         let most = if self.singly { 1 } else { WRITE_FRAMES };
         let is_far_behind = !is_finishing && self.flow.is_far_behind();
         let fresh = if is_far_behind { FRESH } else { MAX_AGE };
-        let mut frames = std::mem::take(&mut self.frames);
         self.counting_dropped(|outbox| {
             outbox.allow(room, fresh);
-            outbox.take_frames(now.into_std(), most, WRITE_BYTES, &mut frames);
+            outbox.take_frames(now.into_std(), most, WRITE_BYTES);
         });
-        self.frames = frames;
-        self.first = 0;
         self.progress = now;
     }
 
@@ -158,19 +140,6 @@ impl Outgoing {
         self.outbox.written(bytes);
         if self.outbox.response_bytes() == 0 {
             self.responses_since = None;
-        }
-        let mut left = bytes;
-        while let Some(frame) = self.frames.get_mut(self.first).filter(|_| left > 0) {
-            let step = left.min(frame.len());
-            frame.advance(step);
-            left -= step;
-            if frame.is_empty() {
-                self.first += 1;
-            }
-        }
-        if self.first == self.frames.len() {
-            self.frames.clear();
-            self.first = 0;
         }
     }
 

@@ -52,13 +52,9 @@ pub(super) struct Performer {
     takes_binary: bool,
     /// Frames that come in pieces.
     pub(super) fragments: Fragments,
-    /// The room for those pieces, once they are long together.
-    pieces: Option<Permit>,
-    /// The room for the long frame that is coming.
-    pub(super) coming: Option<Permit>,
-    /// The room for the long frame that has come, until its client may be read again: then the answers to it have been
-    /// written.
-    performed: Option<Permit>,
+    /// The room of the client's long frame: while it comes, while it is performed and its answers are written, and
+    /// while pieces of one are kept.
+    pub(super) permit: Option<Permit>,
     /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
     speaks_json: bool,
 }
@@ -78,50 +74,35 @@ impl Performer {
             wants_text,
             takes_binary,
             fragments: Fragments::default(),
-            pieces: None,
-            coming: None,
-            performed: None,
+            permit: None,
             speaks_json: false,
         }
     }
 
-    /// The room for a long frame: the client has some for pieces, or it is waited for. Nobody waits who has room: that
-    /// might be what others wait for.
+    /// The room for a long frame, once there is some.
     pub(super) fn room(&self) -> impl Future<Output = Permit> + 'static {
-        let (pieces, memory) = (self.pieces.clone(), self.memory.clone());
-        async move {
-            match pieces {
-                Some(permit) => permit,
-                None => memory.long_frame().await,
-            }
+        let memory = self.memory.clone();
+        async move { memory.long_frame().await }
+    }
+
+    /// Waits for room. A client that has some does not: others might wait for that.
+    async fn take_room(&mut self) {
+        if self.permit.is_none() {
+            self.permit = Some(self.room().await);
         }
     }
 
-    async fn permit(&mut self) -> Permit {
-        match self.coming.take() {
-            Some(permit) => permit,
-            None => self.room().await,
+    /// The client may be read again: its room is given back, unless a long frame `is_coming` or pieces of one are
+    /// kept.
+    pub(super) fn give_back(&mut self, is_coming: bool) {
+        if !is_coming && self.fragments.allocated() <= SHORT {
+            self.permit = None;
         }
-    }
-
-    /// The client may be read again: the room for its last frame is given back.
-    pub(super) fn give_back(&mut self) {
-        self.performed = None;
-        if self.fragments.allocated() == 0 {
-            self.pieces = None;
-        }
-    }
-
-    /// Pieces of messages that have not come in time are forgotten, and their room is given back.
-    pub(super) fn forget_old_pieces(&mut self) {
-        self.fragments.forget_old(Instant::now().into_std());
-        self.give_back();
     }
 
     /// Performs one part of the stream.
     pub(super) async fn take(mut self, cut: FramePart) -> (Self, OpOutcome) {
         let outcome = self.perform_part(cut).await;
-        self.coming = None;
         (self, outcome)
     }
 
@@ -164,15 +145,15 @@ impl Performer {
     ) -> OpOutcome {
         self.speaks_json = true;
         if length > MEDIUM {
-            self.performed = Some(self.permit().await);
+            self.take_room().await;
         }
         let incoming = match read_frame(length, read).await {
             Ok(incoming) => incoming,
             Err(outcome) => return outcome,
         };
         let is_published = matches!(incoming.op, Ok(Op::Publish { .. } | Op::Fragment(_)));
-        if length > SHORT && !is_published && self.performed.is_none() {
-            self.performed = Some(self.permit().await);
+        if length > SHORT && !is_published {
+            self.take_room().await;
         }
         match self.assemble(incoming, length).await {
             Ok((incoming, length)) => self.act_on(incoming, length).await,
@@ -218,11 +199,8 @@ impl Performer {
             return Ok((incoming, length));
         };
         let id = incoming.id;
-        if self.pieces.is_none() && self.fragments.allocated() + length > SHORT {
-            self.pieces = Some(match self.performed.take() {
-                Some(permit) => permit,
-                None => self.permit().await,
-            });
+        if self.fragments.allocated() + length > SHORT {
+            self.take_room().await;
         }
         let whole = match self.fragments.take(piece, Instant::now().into_std()) {
             Ok(whole) => whole.ok_or(OpOutcome::Done)?,
@@ -231,11 +209,6 @@ impl Performer {
             }
         };
         let length = whole.bytes();
-        if self.fragments.allocated() == 0 {
-            self.performed = self.pieces.take();
-        } else {
-            self.performed.clone_from(&self.pieces);
-        }
         let whole = read_frame(length, move || read_message(whole.text().as_bytes())).await?;
         let whole = match whole.op {
             Ok(Op::Fragment(_)) => Incoming {
@@ -260,7 +233,7 @@ impl Performer {
     async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
         let respond = Respond {
             connection: self.id,
-            frame: cover(self.performed.as_ref(), frame).into(),
+            frame: cover(self.permit.as_ref(), frame).into(),
             service: None,
             status,
             done: None,
@@ -277,7 +250,7 @@ impl Performer {
             from: self.id,
             id,
             op,
-            permit: self.performed.clone(),
+            permit: self.permit.clone(),
         };
         if is_computation {
             return OpOutcome::Computation(request, length);
@@ -305,7 +278,7 @@ async fn read_frame(
     let incoming = if length <= SHORT {
         read()
     } else {
-        let incoming = aside(WorkKind::reading(length), read).await;
+        let incoming = aside(WorkKind::of(length), read).await;
         incoming.ok_or_else(|| OpOutcome::Refused(refusal("a frame could not be read")))?
     };
     incoming.ok_or(OpOutcome::Done)

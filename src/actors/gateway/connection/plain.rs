@@ -9,7 +9,6 @@ use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
-use tokio::time::timeout;
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
@@ -56,49 +55,30 @@ pub(super) async fn read_some<S: AsyncRead + Unpin>(
 }
 
 /// Writes some of `frames`, in order, and gives the number of bytes.
-pub(super) fn poll_write<S: AsyncWrite + Unpin>(
+pub(super) fn poll_write<'a, S: AsyncWrite + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,
-    frames: &[Bytes],
+    frames: impl ExactSizeIterator<Item = &'a Bytes>,
 ) -> Poll<io::Result<usize>> {
-    let stream = Pin::new(stream);
-    let written = if let [frame] = frames {
-        let offered = frame.get(..WRITE_BYTES).unwrap_or(frame);
-        ready!(stream.poll_write(cx, offered))?
-    } else {
-        let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
-        let mut room = WRITE_BYTES;
-        let mut count = 0;
-        for (slice, frame) in slices.iter_mut().zip(frames) {
-            let offered = frame.len().min(room);
-            *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
-            count += 1;
-            room -= offered;
-            if room == 0 {
-                break;
-            }
+    let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
+    let mut room = WRITE_BYTES;
+    let mut count = 0;
+    for (slice, frame) in slices.iter_mut().zip(frames) {
+        let offered = frame.len().min(room);
+        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
+        count += 1;
+        room -= offered;
+        if room == 0 {
+            break;
         }
-        let offered = slices.get(..count).unwrap_or_default();
-        ready!(stream.poll_write_vectored(cx, offered))?
+    }
+    let stream = Pin::new(stream);
+    let written = match slices.get(..count).unwrap_or_default() {
+        [slice] => ready!(stream.poll_write(cx, slice))?,
+        slices => ready!(stream.poll_write_vectored(cx, slices))?,
     };
     Poll::Ready(match written {
         0 => Err(io::ErrorKind::WriteZero.into()),
         written => Ok(written),
     })
-}
-
-/// Swallows a refused client's input for a bounded time.
-pub(super) async fn discard<S: AsyncRead + Unpin>(stream: &mut S) {
-    let mut chunk = BytesMut::new();
-    let swallow = async {
-        let mut swallowed = 0;
-        while swallowed < DISCARD_BYTES {
-            chunk.clear();
-            match read_some(stream, &mut chunk).await {
-                Ok(0) | Err(_) => break,
-                Ok(read) => swallowed += read,
-            }
-        }
-    };
-    let _ = timeout(DISCARD_TIME, swallow).await;
 }

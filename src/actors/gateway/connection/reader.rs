@@ -20,10 +20,8 @@ use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, yield_turn};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;
-use super::unfinished::Unfinished;
 use super::writer::ClientWriter;
-use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
+use crate::actors::gateway::limits::{FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
 use crate::actors::gateway::messages::{Disconnect, Retire};
 use crate::actors::panics::contain;
 use crate::actors::resources::memory::Permit;
@@ -31,14 +29,13 @@ use crate::protocol::limits::MEDIUM;
 use crate::protocol::wire::fragments::MAX_AGE;
 use crate::protocol::wire::frame::{FramePart, FrameReader};
 
-/// The error for a frame that takes longer than [`FRAME_TIME`](crate::actors::gateway::limits::FRAME_TIME).
+/// The error for a frame that takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
 
 type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// The reading half of a connection.
 struct ClientReader {
-    id: ConnectionId,
     step: ReadStep,
     frames: FrameReader,
     /// Bytes that have come and not been given to `frames`.
@@ -52,8 +49,9 @@ struct ClientReader {
     performing: Option<BoxFuture<(Performer, OpOutcome)>>,
     /// The room for the long frame that comes, while it is waited for.
     room: Option<BoxFuture<Permit>>,
-    unfinished: Unfinished,
-    /// Since when the client has been waited for: its bytes, or that it reads.
+    /// When the frame that has begun is late: time counts while the rest of it is waited for.
+    frame_due: Option<Instant>,
+    /// Since when a client that has ended its stream has been waited for to read.
     waits_since: Option<Instant>,
     /// The stream has ended; earlier bytes may still wait.
     has_ended: bool,
@@ -74,31 +72,42 @@ enum ReadStep {
     Discarding(usize, Instant),
 }
 
+impl ReadStep {
+    fn discarding() -> Self {
+        Self::Discarding(DISCARD_BYTES, Instant::now() + DISCARD_TIME)
+    }
+}
+
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
     /// Reads and writes until the client is gone or has all that is for it.
     pub(super) fn converse(&mut self, opened: Opened<S>, ctx: &mut Context<Self>) {
-        let has_messages = opened.transport.has_messages();
-        let id = opened.place.id();
-        let performer = Performer::new(
-            id,
-            self.registry.clone(),
-            self.memory.clone(),
-            Arc::clone(&self.wants_text),
-            has_messages,
-        );
+        let takes_binary = opened.transport.has_messages();
         self.transport = Some(opened.transport);
-        self.place = Some(opened.place);
+        let (step, performer) = match opened.place {
+            Ok(place) => {
+                let (registry, memory) = (self.registry.clone(), self.memory.clone());
+                let wants_text = Arc::clone(&self.wants_text);
+                let id = place.id();
+                let performer = Performer::new(id, registry, memory, wants_text, takes_binary);
+                self.place = Some(place);
+                (ReadStep::Frames, Some(performer))
+            }
+            Err(why) => {
+                self.refuse(refusal(&why));
+                self.finish();
+                (ReadStep::discarding(), None)
+            }
+        };
         ctx.spawn(ClientReader {
-            id,
-            step: ReadStep::Frames,
+            step,
             frames: FrameReader::new(),
             chunk: opened.first,
             messages: VecDeque::new(),
             is_cut: true,
-            performer: Some(performer),
+            performer,
             performing: None,
             room: None,
-            unfinished: Unfinished::default(),
+            frame_due: None,
             waits_since: None,
             has_ended: false,
             is_last: false,
@@ -141,7 +150,7 @@ impl ClientReader {
             match &mut self.step {
                 ReadStep::Frames => {
                     self.step = match ready!(self.poll_frames(connection, cx)) {
-                        Ok(()) => self.retire(connection),
+                        Ok(()) => Self::retire(connection),
                         // A broken stream takes no answers, and nobody waits for those that don't come.
                         Err(lost) => {
                             connection.is_refused |= lost != ClientLost::Gone;
@@ -168,7 +177,7 @@ impl ClientReader {
                     if !connection.is_refused {
                         return Poll::Ready(());
                     }
-                    self.step = ReadStep::Discarding(DISCARD_BYTES, Instant::now() + DISCARD_TIME);
+                    self.step = ReadStep::discarding();
                 }
                 ReadStep::Discarding(left, due) => {
                     let Some(transport) = &mut connection.transport else {
@@ -191,10 +200,13 @@ impl ClientReader {
 
     /// Withdraws the client's registrations, since it can no longer answer or withdraw, and waits for the responses
     /// that are still to come.
-    fn retire<S>(&self, connection: &Connection<S>) -> ReadStep {
-        let retired = connection.registry.send(Retire(self.id));
+    fn retire<S>(connection: &Connection<S>) -> ReadStep {
+        let place = connection.place.as_ref();
+        let retired = place.map(|place| connection.registry.send(Retire(place.id())));
         let answered = async move {
-            if let Ok(handled) = retired.await {
+            if let Some(retired) = retired
+                && let Ok(handled) = retired.await
+            {
                 handled.effect().await;
             }
         };
@@ -204,9 +216,12 @@ impl ClientReader {
     /// Answers that are on their way arrive before the registry answers this, and so before the end.
     fn leave<S>(&mut self, connection: &Connection<S>) -> ReadStep {
         (self.performer, self.room) = (None, None);
-        let left = connection.registry.send(Disconnect(self.id));
+        let place = connection.place.as_ref();
+        let left = place.map(|place| connection.registry.send(Disconnect(place.id())));
         ReadStep::Leaving(Box::pin(async move {
-            let _ = left.await;
+            if let Some(left) = left {
+                let _ = left.await;
+            }
         }))
     }
 
@@ -235,6 +250,7 @@ impl ClientReader {
             }
             if !self.is_cut {
                 if !connection.may_read() && !connection.is_finishing {
+                    self.frame_due = None;
                     ready!(self.poll_ahead(connection, cx))?;
                     continue;
                 }
@@ -249,7 +265,7 @@ impl ClientReader {
                 let permit = ready!(room.as_mut().poll(cx));
                 self.room = None;
                 if let Some(performer) = &mut self.performer {
-                    performer.coming = Some(permit);
+                    performer.permit = Some(permit);
                 }
             }
             if bytes >= CHUNK / 2 {
@@ -318,26 +334,27 @@ impl ClientReader {
         let Some(mut performer) = self.performer.take() else {
             return false;
         };
-        performer.give_back();
+        performer.give_back(self.is_long_coming());
         self.waits_since = None;
         let cut = match self.messages.pop_front() {
             Some((message, permit)) => {
-                performer.coming = permit;
+                performer.permit = permit.or(performer.permit);
                 Some(FramePart::Message(message))
             }
             None => self.frames.cut(),
         };
+        if cut.is_some() || !self.frames.is_unfinished() {
+            self.frame_due = None;
+        }
         let Some(cut) = cut else {
             self.is_cut = true;
-            if !self.frames.is_unfinished() {
-                self.unfinished.begin_anew();
-            } else if performer.coming.is_none() && self.frames.buffered() > MEDIUM {
+            if performer.permit.is_none() && self.is_long_coming() {
+                self.frame_due = None;
                 self.room = Some(Box::pin(performer.room()));
             }
             self.performer = Some(performer);
             return false;
         };
-        self.unfinished.begin_anew();
         match &cut {
             FramePart::Lines(_) => connection.outgoing.set_singly(false),
             FramePart::Frame(frame) => connection.outgoing.set_singly(!frame.newline()),
@@ -345,6 +362,11 @@ impl ClientReader {
         }
         self.performing = Some(Box::pin(performer.take(cut)));
         true
+    }
+
+    /// Whether a frame has begun that takes room.
+    fn is_long_coming(&self) -> bool {
+        self.frames.is_unfinished() && self.frames.buffered() > MEDIUM
     }
 
     /// The end of the stream. A frame that has begun there is incomplete.
@@ -359,7 +381,7 @@ impl ClientReader {
         Poll::Pending
     }
 
-    /// Reads on; `None` if a frame that has begun takes too long. Meanwhile pieces of messages grow old, and are
+    /// Reads on; `None` if a frame that has begun takes too long. Meanwhile, pieces of messages grow old, and are
     /// forgotten.
     fn poll_read<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
@@ -369,26 +391,25 @@ impl ClientReader {
         let Some(transport) = &mut connection.transport else {
             return Poll::Ready(Err(ClientLost::Gone));
         };
-        let is_unfinished = self.frames.is_unfinished();
-        let began = *self.waits_since.get_or_insert_with(Instant::now);
         if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
-            self.waits_since = None;
-            if is_unfinished && let Ok(ReceivedData::Bytes(received)) = read {
-                self.unfinished.wait(began.elapsed(), received);
-            }
             return Poll::Ready(read.map(Some));
         }
-        let late = is_unfinished.then(|| began + self.unfinished.time_left());
+        let is_unfinished = self.frames.is_unfinished() || transport.is_unfinished();
+        let begin = || Instant::now() + FRAME_TIME;
+        let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
+        self.frame_due = late;
         loop {
             let pieces = self.performer.as_mut();
             let oldest = pieces.and_then(|performer| performer.fragments.oldest());
             let old = oldest.map(|oldest| Instant::from_std(oldest) + MAX_AGE + LOOK_AGAIN);
             ready!(self.timer.poll(late.into_iter().chain(old).min(), cx));
             if late.is_some_and(|late| late <= Instant::now()) {
-                return Poll::Ready(Ok(None));
+                return Poll::Ready(transport.give_up(TOO_SLOW).map(|()| None));
             }
+            let is_coming = self.is_long_coming();
             if let Some(performer) = &mut self.performer {
-                performer.forget_old_pieces();
+                performer.fragments.forget_old(Instant::now().into_std());
+                performer.give_back(is_coming);
             }
         }
     }

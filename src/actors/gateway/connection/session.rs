@@ -14,10 +14,10 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::authentication::{AuthError, authenticate, opens_as_command};
+use super::admission::authentication::{AuthError, authenticate, first_op, is_command};
 use super::admission::slots::HeldSlot;
 use super::admission::{Admission, WRONG_TOKEN_TIME};
-use super::plain::{CHUNK, discard};
+use super::plain::CHUNK;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;
@@ -48,10 +48,22 @@ pub(super) struct ClientSession {
 
 /// A client that is spoken with from now on.
 pub(super) struct Opened<S> {
-    pub(super) place: HeldPlace,
+    /// Its place, or why it gets none.
+    pub(super) place: Result<HeldPlace, String>,
     pub(super) transport: Transport<S>,
     /// Bytes that have been read.
     pub(super) first: BytesMut,
+}
+
+impl<S> Opened<S> {
+    const fn new(stream: S, first: BytesMut, place: Result<HeldPlace, String>) -> Self {
+        let transport = Transport::Plain(stream);
+        Self {
+            place,
+            transport,
+            first,
+        }
+    }
 }
 
 /// The place of a client that the registry knows. Dropping it gives it back.
@@ -72,7 +84,7 @@ impl Drop for HeldPlace {
     }
 }
 
-/// How a client is served.
+/// How a client is served, by its first bytes.
 enum HowServed {
     /// Frames are exchanged with it.
     Json,
@@ -83,20 +95,10 @@ enum HowServed {
     /// Its requests are answered. The head of the first has to be complete by this time.
     #[cfg(feature = "web")]
     Http(Instant),
-    /// It is refused: not at once, if it has tried a token that is not ours.
-    Refused { why: String, is_wrong_token: bool },
+    /// It is refused, and gets this reason.
+    Refused(String),
     /// There is nobody left to serve.
     Gone,
-}
-
-/// A client that has no place yet.
-#[cfg(feature = "web")]
-pub(super) struct Newcomer<'a> {
-    pub(super) outlets: Outlets,
-    /// The slot that it takes until its first request is admitted.
-    pub(super) slot: HeldSlot<'a>,
-    /// Why it is turned away when it loses that slot. `None`: it has to show the token.
-    pub(super) refused: Option<Refused>,
 }
 
 /// Decides when the opening of a client is examined.
@@ -120,71 +122,88 @@ impl Examination<'_> {
 }
 
 impl ClientSession {
-    /// Judges a client. Returns it if it is spoken with; any other has been answered, or told why not.
+    /// Judges a client. Returns it if frames are exchanged with it, or if it is to be told why not.
     pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         let mut first = BytesMut::with_capacity(CHUNK);
-        let mut how = match &self.admission.token {
-            None => HowServed::Undecided,
-            // Nothing is asked of the registry for a client that has not shown the token.
-            Some(token) => {
-                let slot = self.admission.newcomers.unauthenticated.take();
-                match self.admit(token, &slot, &mut stream, &mut first).await {
-                    #[cfg(feature = "web")]
-                    Some(HowServed::Http(due)) => {
-                        let newcomer = Newcomer {
-                            outlets,
-                            slot,
-                            refused: None,
-                        };
-                        return self.serve_http(stream, first, due, Ok(newcomer)).await;
-                    }
-                    Some(how) => how,
-                    None => return None,
+        let mut how = HowServed::Undecided;
+        // Nothing is asked of the registry for a client that has not shown the token.
+        if let Some(token) = &self.admission.token {
+            let slot = self.admission.unauthenticated.take();
+            how = self.admit(token, &slot, &mut stream, &mut first).await;
+            match how {
+                #[cfg(feature = "web")]
+                HowServed::Http(due) => {
+                    let newcomer = Err((outlets, Some(slot)));
+                    return self.serve_http(stream, first, due, newcomer).await;
                 }
+                HowServed::Refused(why) => return Some(Opened::new(stream, first, Err(why))),
+                HowServed::Gone => return None,
+                _ => {}
             }
-        };
+        }
         let is_command = matches!(how, HowServed::Command);
         let mut place = self.connect(&outlets, is_command).await;
         if matches!(place, Err(Refused::Full { .. })) {
-            let slot = self.admission.newcomers.waiting.take();
             let due = Instant::now() + OPENING_TIME;
             if matches!(how, HowServed::Undecided) {
-                how = tokio::select! {
-                    biased;
-                    how = self.examine(&mut stream, &mut first, Examination::Kept(due)) => how,
-                    () = slot.evicted() => HowServed::Undecided,
-                };
+                let kept = Examination::Kept(due);
+                how = self.examine(&mut stream, &mut first, kept).await;
             }
             place = match how {
                 #[cfg(feature = "web")]
                 HowServed::Http(due) => {
-                    let newcomer = Newcomer {
-                        outlets,
-                        slot,
-                        refused: place.err(),
-                    };
-                    return self.serve_http(stream, first, due, Ok(newcomer)).await;
+                    let newcomer = Err((outlets, None));
+                    return self.serve_http(stream, first, due, newcomer).await;
                 }
-                HowServed::Command => self.wait_for_place(&outlets, &slot, due).await,
+                HowServed::Command => self.wait_for_place(&outlets, due).await,
                 _ => self.connect(&outlets, false).await,
             };
         }
         drop(outlets);
         match place {
-            Ok(place) => {
-                if matches!(how, HowServed::Undecided) {
-                    how = self
-                        .examine(&mut stream, &mut first, Examination::Served)
-                        .await;
-                }
-                self.serve(stream, place, first, how).await
+            Ok(_) if matches!(how, HowServed::Undecided) => {
+                let served = Examination::Served;
+                how = self.examine(&mut stream, &mut first, served).await;
             }
-            Err(why) => {
-                self.turn_away(&mut stream, how, why).await;
-                None
+            Ok(_) => {}
+            Err(why) => self.count_refusal(why),
+        }
+        let place = match (how, place) {
+            (HowServed::Gone, _) => return None,
+            (HowServed::Refused(why), _) => Err(why),
+            (_, Err(why)) => Err(why.to_string()),
+            #[cfg(feature = "web")]
+            (HowServed::Http(due), Ok(place)) => {
+                return self.serve_http(stream, first, due, Ok(place)).await;
+            }
+            (_, Ok(place)) => Ok(place),
+        };
+        Some(Opened::new(stream, first, place))
+    }
+
+    /// Has the client show the token. Closes a client that misses the deadline, and the oldest one when too many are
+    /// unauthenticated.
+    async fn admit<S>(
+        &self,
+        token: &Token,
+        slot: &HeldSlot<'_>,
+        stream: &mut S,
+        first: &mut BytesMut,
+    ) -> HowServed
+    where
+        S: AsyncRead + AsyncWrite + Unpin,
+    {
+        let shown = Examination::Token(token, Instant::now() + HEAD_TIME);
+        // A client that has sent the token gets in, also where its slot is lost in the same moment.
+        tokio::select! {
+            biased;
+            how = self.examine(stream, first, shown) => how,
+            () = slot.evicted() => {
+                refuse_evicted(stream, first).await;
+                HowServed::Gone
             }
         }
     }
@@ -193,19 +212,14 @@ impl ClientSession {
     pub(super) async fn wait_for_place(
         &self,
         outlets: &Outlets,
-        slot: &HeldSlot<'_>,
         due: Instant,
     ) -> Result<HeldPlace, Refused> {
         loop {
             let place = self.connect(outlets, true).await;
-            let is_full = matches!(place, Err(Refused::Full { .. }));
-            if !is_full || Instant::now() >= due {
+            if !matches!(place, Err(Refused::Full { .. })) || Instant::now() >= due {
                 return place;
             }
-            tokio::select! {
-                () = slot.evicted() => return place,
-                () = sleep(LOOK_AGAIN) => {}
-            }
+            sleep(LOOK_AGAIN).await;
         }
     }
 
@@ -214,73 +228,6 @@ impl ClientSession {
         if matches!(why, Refused::Full { .. }) {
             self.registry.do_send(CountRefusal);
         }
-    }
-
-    /// Tells a client that has no place why.
-    async fn turn_away<S>(&self, stream: &mut S, how: HowServed, refused: Refused)
-    where
-        S: AsyncRead + AsyncWrite + Unpin,
-    {
-        self.count_refusal(refused);
-        match how {
-            HowServed::Refused { why, .. } => self.refuse(stream, &why).await,
-            HowServed::Json | HowServed::Command | HowServed::Undecided => {
-                self.refuse(stream, &refused.to_string()).await;
-            }
-            HowServed::Gone => {}
-            // The answer is over HTTP.
-            #[cfg(feature = "web")]
-            HowServed::Http(_) => {}
-        }
-    }
-
-    /// Has the client show the token, and gives what is to be done about it then. Closes a client that misses the
-    /// deadline, and the oldest one when too many are unauthenticated.
-    async fn admit<S>(
-        &self,
-        token: &Token,
-        slot: &HeldSlot<'_>,
-        stream: &mut S,
-        first: &mut BytesMut,
-    ) -> Option<HowServed>
-    where
-        S: AsyncRead + AsyncWrite + Unpin,
-    {
-        let due = Instant::now() + HEAD_TIME;
-        // A client that has sent the token gets in, also where its slot is lost in the same moment.
-        let verdict = tokio::select! {
-            biased;
-            verdict = self.examine(stream, first, Examination::Token(token, due)) => verdict,
-            () = slot.evicted() => {
-                refuse_evicted(stream, first).await;
-                return None;
-            }
-        };
-        match verdict {
-            HowServed::Gone => None,
-            HowServed::Refused {
-                why,
-                is_wrong_token,
-            } => {
-                tokio::select! {
-                    () = self.refuse_unauthenticated(stream, &why, is_wrong_token) => {}
-                    () = slot.evicted() => {}
-                }
-                None
-            }
-            admitted => Some(admitted),
-        }
-    }
-
-    /// Tells a client that has not shown the token why it is not admitted.
-    async fn refuse_unauthenticated<S>(&self, stream: &mut S, why: &str, is_wrong_token: bool)
-    where
-        S: AsyncRead + AsyncWrite + Unpin,
-    {
-        if is_wrong_token {
-            self.delay_wrong_token().await;
-        }
-        self.refuse(stream, why).await;
     }
 
     /// Waits before a wrong token is answered. The right one is admitted at once.
@@ -314,20 +261,21 @@ impl ClientSession {
         S: AsyncRead + AsyncWrite + Unpin,
     {
         match (self.detect(stream, first, examination).await, examination) {
-            (HowServed::Json, Examination::Kept(due)) => {
-                match opens_as_command(stream, first, due).await {
-                    true => HowServed::Command,
-                    false => HowServed::Undecided,
-                }
-            }
+            (HowServed::Json, Examination::Kept(due)) => match first_op(stream, first, due).await {
+                Ok(op) if is_command(&op) => HowServed::Command,
+                _ => HowServed::Undecided,
+            },
             (HowServed::Json, Examination::Token(token, due)) => {
-                match authenticate(token, stream, first, due).await {
-                    Ok(true) => HowServed::Command,
-                    Ok(false) => HowServed::Json,
-                    Err(why) => HowServed::Refused {
-                        why: why.to_string(),
-                        is_wrong_token: why == AuthError::Wrong,
-                    },
+                let op = first_op(stream, first, due).await;
+                match op.and_then(|op| authenticate(token, op)) {
+                    Ok(op) if is_command(&op) => HowServed::Command,
+                    Ok(_) => HowServed::Json,
+                    Err(why) => {
+                        if why == AuthError::Wrong {
+                            self.delay_wrong_token().await;
+                        }
+                        HowServed::Refused(why.to_string())
+                    }
                 }
             }
             (HowServed::Gone, _) => {
@@ -335,34 +283,6 @@ impl ClientSession {
                 HowServed::Gone
             }
             (how, _) => how,
-        }
-    }
-
-    /// Serves or refuses a client that the registry knows.
-    async fn serve<S>(
-        &self,
-        mut stream: S,
-        place: HeldPlace,
-        first: BytesMut,
-        verdict: HowServed,
-    ) -> Option<Opened<S>>
-    where
-        S: AsyncRead + AsyncWrite + Unpin + 'static,
-    {
-        match verdict {
-            HowServed::Json | HowServed::Command | HowServed::Undecided => Some(Opened {
-                place,
-                transport: Transport::Plain(stream),
-                first,
-            }),
-            #[cfg(feature = "web")]
-            HowServed::Http(due) => self.serve_http(stream, first, due, Err(place)).await,
-            HowServed::Refused { why, .. } => {
-                let _ = self.registry.send(Disconnect(place.id)).await;
-                self.refuse(&mut stream, &why).await;
-                None
-            }
-            HowServed::Gone => None,
         }
     }
 
@@ -375,10 +295,7 @@ impl ClientSession {
         first: &mut BytesMut,
         examination: Examination<'_>,
     ) -> HowServed {
-        let foreign = |why: &str| HowServed::Refused {
-            why: why.to_owned(),
-            is_wrong_token: false,
-        };
+        let foreign = |why: &str| HowServed::Refused(why.to_owned());
         let mut deadline = examination.due();
         loop {
             match opening(first) {
@@ -422,18 +339,6 @@ impl ClientSession {
             if read.unwrap_or(0) == 0 {
                 return HowServed::Json;
             }
-        }
-    }
-
-    /// Tells a client why it is not served, and discards its input so that it can read the reason.
-    async fn refuse<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: &mut S, why: &str) {
-        let status = messages::status(Level::Error, why, None);
-        let tell = async {
-            stream.write_all(&status).await?;
-            stream.shutdown().await
-        };
-        if let Ok(Ok(())) = timeout(LINGER, tell).await {
-            discard(stream).await;
         }
     }
 }

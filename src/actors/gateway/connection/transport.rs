@@ -70,6 +70,30 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         })
     }
 
+    /// Whether a message has begun and not ended. The frames of a stream are the reader's.
+    pub(super) fn is_unfinished(&self) -> bool {
+        match self {
+            Self::Plain(_) => false,
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.is_unfinished(),
+        }
+    }
+
+    /// Gives up a frame that takes too long. It is an error where the transport itself tells the client `why`.
+    pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
+        match self {
+            Self::Plain(_) => {
+                let _ = why;
+                Ok(())
+            }
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => {
+                socket.refuse(why);
+                Err(ClientLost::Refused)
+            }
+        }
+    }
+
     /// Reads from a client that was refused: nothing that comes is looked at.
     pub(super) fn poll_swallow(
         &mut self,
@@ -85,10 +109,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
 
     /// Sends some of `frames`, in order, and gives the number of bytes. The rest of a frame comes first in the next
     /// call; until one is ready, `frames` stay the same.
-    pub(super) fn poll_write(
+    pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
-        frames: &[Bytes],
+        frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         match self {
             Self::Plain(stream) => plain::poll_write(stream, cx, frames),

@@ -1,17 +1,14 @@
-//! A WebSocket's stream, watched: for signs of life, for a message that takes too long, and for one that is long.
+//! A WebSocket's stream, watched: for signs of life, for a message that has begun, and for one that is long.
 //!
 //! **Invariant:** of a message that has no room nothing more is read than what needs none.
 
 use std::io;
 use std::pin::Pin;
 use std::task::{Context, Poll};
-use std::time::Duration;
 
-use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
-use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::memory::{Memory, Permit};
 use crate::protocol::limits::MEDIUM;
 
@@ -32,8 +29,6 @@ type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 /// complete. To send a byte is a sign of life, and so is to take one after a write found no room.
 pub(super) struct MonitoredStream<S> {
     stream: S,
-    /// Bytes that have come before, and are read first.
-    behind: Bytes,
     /// When the other side last gave a sign of life.
     pub(super) life: Instant,
     /// When the other side last took a byte.
@@ -42,8 +37,6 @@ pub(super) struct MonitoredStream<S> {
     is_blocked: bool,
     /// Bytes that were read since the last message was complete, without control frames: the message that comes.
     coming: usize,
-    /// Arrival time of the first of them, plus all time spent not reading.
-    began: Option<Instant>,
     /// Bytes that may still be read before the reader yields, in any number of messages.
     turn: usize,
     memory: Memory,
@@ -53,17 +46,15 @@ pub(super) struct MonitoredStream<S> {
 }
 
 impl<S> MonitoredStream<S> {
-    /// A stream on which `behind` has come so far.
-    pub(super) fn new(stream: S, behind: Bytes, memory: Memory) -> Self {
+    /// A stream of which no byte counts yet.
+    pub(super) fn new(stream: S, memory: Memory) -> Self {
         let now = Instant::now();
         Self {
             stream,
-            behind,
             life: now,
             taken: now,
             is_blocked: false,
             coming: 0,
-            began: None,
             turn: TURN,
             memory,
             permit: None,
@@ -81,15 +72,9 @@ impl<S> MonitoredStream<S> {
         self.turn == 0
     }
 
-    /// Reading goes on after this time.
-    pub(super) fn read_on(&mut self, unread: Duration) {
-        self.began = self.began.map(|began| began + unread);
-    }
-
     /// A message is complete. Returns the room that it has taken, if it is long.
     pub(super) fn end_message(&mut self) -> Option<Permit> {
         self.coming = 0;
-        self.began = None;
         self.permit.take()
     }
 
@@ -97,12 +82,11 @@ impl<S> MonitoredStream<S> {
     pub(super) fn end_control(&mut self, payload: usize) {
         self.turn = self.turn.saturating_sub(CONTROL_COST);
         self.coming = self.coming.saturating_sub(CONTROL_HEAD + payload);
-        self.began = self.began.filter(|_| self.coming > 0);
     }
 
-    /// When the message that has begun is late.
-    pub(super) fn late(&self) -> Option<Instant> {
-        self.began.map(|began| began + FRAME_TIME)
+    /// Whether a message has begun and not ended.
+    pub(super) const fn is_unfinished(&self) -> bool {
+        self.coming > 0
     }
 
     /// Waits until there is room for the message that comes, if it is long.
@@ -134,24 +118,12 @@ impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
             return Poll::Pending;
         }
         let before = buffer.filled().len();
-        let polled = if self.behind.is_empty() {
-            Pin::new(&mut self.stream).poll_read(cx, buffer)
-        } else {
-            let length = self.behind.len().min(buffer.remaining());
-            buffer.put_slice(&self.behind.split_to(length));
-            if self.behind.is_empty() {
-                // The memory is freed.
-                self.behind = Bytes::new();
-            }
-            Poll::Ready(Ok(()))
-        };
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
         let received = buffer.filled().len() - before;
         self.turn = self.turn.saturating_sub(received);
         if received > 0 {
-            let now = Instant::now();
-            self.life = now;
+            self.life = Instant::now();
             self.coming += received;
-            self.began.get_or_insert(now);
         }
         polled
     }

@@ -37,8 +37,6 @@ const FRAGMENT: usize = 32 * 1024;
 /// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
 /// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
 const WRITE_BUFFER: usize = 2 * FRAGMENT;
-/// The reason given where a message takes longer than `FRAME_TIME`.
-const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
 
 /// A stream on which the handshake has been made.
 pub(super) struct WebSocket<S> {
@@ -73,8 +71,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             .max_write_buffer_size(WRITE_BUFFER)
             .max_message_size(Some(MAX_FRAME))
             .max_frame_size(Some(MAX_FRAME));
-        let watched = MonitoredStream::new(stream, behind, memory);
-        let socket = WebSocketStream::from_raw_socket(watched, Role::Server, Some(config));
+        let watched = MonitoredStream::new(stream, memory);
+        let (part, role) = (behind.into(), Role::Server);
+        let socket = WebSocketStream::from_partially_read(watched, part, role, Some(config));
         Self {
             socket: socket.await,
             timer: Timer::default(),
@@ -109,7 +108,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         let unread = self.unread_since.take();
         let unread = unread.map_or(Duration::ZERO, |since| since.elapsed());
         self.asked = self.asked.map(|asked| asked + unread);
-        self.stream().read_on(unread);
         let message = ready!(self.poll_message(cx))?;
         self.unread_since = Some(Instant::now());
         Poll::Ready(Ok((message, self.stream().end_message())))
@@ -142,8 +140,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
                 Poll::Pending if self.stream().is_turn_over() => continue,
                 Poll::Pending => {
                     let pong_due = self.asked.map(|asked| asked + PONG_TIME);
-                    let dues = pong_due.into_iter().chain(self.stream().late());
-                    let due = dues.fold(self.next_ping, Instant::min);
+                    let due = pong_due.into_iter().fold(self.next_ping, Instant::min);
                     ready!(self.timer.poll(Some(due), cx));
                     self.look_for_life()?;
                     continue;
@@ -156,10 +153,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
 
     fn look_for_life(&mut self) -> Result<(), ClientLost> {
         let now = Instant::now();
-        if self.stream().late().is_some_and(|late| late <= now) {
-            self.close_reason = (CloseCode::Policy, TOO_SLOW);
-            return Err(ClientLost::Refused);
-        }
         if let Some(asked) = self.asked {
             if self.stream().life > asked {
                 self.asked = None;
@@ -176,6 +169,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         Ok(())
     }
 
+    /// Whether a message has begun and not ended.
+    pub(super) fn is_unfinished(&self) -> bool {
+        self.socket.get_ref().is_unfinished()
+    }
+
+    /// Refuses the peer, for a message that has begun does not end: it is told `why`.
+    pub(super) const fn refuse(&mut self, why: &'static str) {
+        self.close_reason = (CloseCode::Policy, why);
+    }
+
     /// Reads from a peer that was refused: nothing that comes is looked at.
     pub(super) fn poll_swallow(
         &mut self,
@@ -189,10 +192,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
     // ---- sending ----------------------------------------------------------------------------------------------------
 
     /// Sends some of `frames`, which stay the same until it is ready, and gives the number of bytes.
-    pub(super) fn poll_write(
+    pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
-        frames: &[Bytes],
+        frames: impl Iterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         // Waiting pongs would take the room of the message.
         ready!(self.poll_flush(cx))?;
@@ -203,7 +206,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         Poll::Ready(Ok(std::mem::take(&mut self.underway)))
     }
 
-    fn put_frames(&mut self, frames: &[Bytes]) -> io::Result<usize> {
+    fn put_frames<'a>(&mut self, frames: impl Iterator<Item = &'a Bytes>) -> io::Result<usize> {
         let mut written = 0;
         for frame in frames {
             let mut frame = frame.clone();

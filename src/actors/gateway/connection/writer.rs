@@ -92,9 +92,8 @@ impl ClientWriter {
             let Some(transport) = &mut connection.transport else {
                 return Poll::Ready(false);
             };
-            let frames = connection.outgoing.frames(is_finishing);
-            let (patience, release) = if !frames.is_empty() {
-                match transport.poll_write(cx, frames) {
+            let (patience, release) = if connection.outgoing.take(is_finishing) {
+                match transport.poll_write(cx, connection.outgoing.frames()) {
                     Poll::Ready(Ok(bytes)) => {
                         // The reader may go on, and where much was written other connections have a turn.
                         let may_read = connection.note_written(bytes);

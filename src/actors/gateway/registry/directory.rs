@@ -10,7 +10,7 @@ use crate::actors::ConnectionId;
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
 
 /// What a client may serve to others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Served {
     Service,
     Action,

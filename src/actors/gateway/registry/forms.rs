@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
 
-use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
 use crate::actors::resources::memory::{Permit, cover_message};
 use crate::protocol::messages;
 use crate::protocol::names::OWN_ID_PREFIX;
@@ -30,33 +29,15 @@ pub(super) struct Made {
     pub(super) lost: u64,
 }
 
-/// The form that a subscriber gets which has asked for `wanted`, where others get `forms`. Beside powers of two there
-/// are [`MAX_FRAGMENT_SIZES`] sizes of pieces at a time. A further one counts as the power of two below, so that nobody
-/// is refused because of what others ask for.
-pub(super) fn within_bounds(wanted: Encoding, forms: &[Encoding]) -> Encoding {
-    let is_odd = |size: &usize| !size.is_power_of_two();
-    let Some(size) = wanted.fragment_size.filter(is_odd) else {
-        return wanted;
-    };
-    let others = forms.iter().filter_map(|form| form.fragment_size);
-    if forms.contains(&wanted) || others.filter(is_odd).count() < MAX_FRAGMENT_SIZES {
-        return wanted;
-    }
-    Encoding {
-        fragment_size: Some(1 << size.ilog2()),
-        ..wanted
-    }
-}
-
-/// A message, or a series of them, that is to be made in other forms.
+/// A message, or a series of them, that is to be made in another form.
 pub(super) struct ToEncode {
     /// The topic, as the subscribers spell it.
     pub(super) spelling: Box<str>,
     pub(super) plain: Bytes,
-    /// The forms.
-    pub(super) encodings: Vec<Encoding>,
+    /// The form.
+    pub(super) encoding: Encoding,
     /// The type of the topic's messages, if it is known.
-    pub(super) type_name: Option<Box<str>>,
+    pub(super) type_name: Option<&'static str>,
     /// Messages that went out in fragments so far: their numbers make the fragments' ids.
     pub(super) fragmented: Arc<AtomicU64>,
     /// The room that a long message takes, in any form.
@@ -69,18 +50,13 @@ impl ToEncode {
         self.plain.len() > ENCODED_HERE
     }
 
-    /// Makes every form.
-    pub(super) fn make(&self) -> Vec<(Encoding, Made)> {
-        let encodings = self.encodings.iter();
-        encodings.map(|one| (*one, self.make_in(*one))).collect()
-    }
-
-    fn make_in(&self, encoding: Encoding) -> Made {
+    /// Makes the form.
+    pub(super) fn make(&self) -> Made {
         let all = self.plain.len();
         let mut made = Made::default();
         for message in series::messages(self.plain.clone()) {
             let is_alone = message.len() == all;
-            let message = match self.encode(&message, encoding) {
+            let message = match self.encode(&message) {
                 Some(Some(encoded)) => cover_message(self.permit.as_ref(), encoded),
                 Some(None) if is_alone => message,
                 // Each message lies by itself, so that to keep one keeps no other in memory.
@@ -97,9 +73,8 @@ impl ToEncode {
 
     /// One message: `None` where it can't be written so, `Some(None)` where it stays as it is.
     #[allow(clippy::option_option, reason = "one is dropped, the other is not")]
-    fn encode(&self, plain: &Bytes, encoding: Encoding) -> Option<Option<Bytes>> {
-        let spelling = &*self.spelling;
-        let type_name = self.type_name.as_deref();
+    fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
+        let (encoding, spelling, type_name) = (self.encoding, &*self.spelling, self.type_name);
         let renamed = (encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
         let plain = renamed.as_ref().unwrap_or(plain);
         if encoding.compression == Compression::None {
@@ -129,7 +104,7 @@ mod tests {
     const MIB: usize = 1024 * 1024;
 
     /// A message in another form.
-    fn encoded(msg: &str, compression: Compression, type_name: Option<&str>) -> Made {
+    fn encoded(msg: &str, compression: Compression, type_name: Option<&'static str>) -> Made {
         let plain = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
         let encoding = Encoding {
             compression,
@@ -139,12 +114,12 @@ mod tests {
         let message = ToEncode {
             spelling: "/t".into(),
             plain: plain.into(),
-            encodings: vec![encoding],
-            type_name: type_name.map(Into::into),
+            encoding,
+            type_name,
             fragmented: Arc::default(),
             permit: None,
         };
-        message.make_in(encoding)
+        message.make()
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tokio::time::Instant;
 
+use super::directory::Served;
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
@@ -43,11 +44,18 @@ pub(crate) enum RequestTerms {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum RequestKey {
     Deadline(Instant),
-    Caller(ConnectionId),
-    Provider(ConnectionId),
+    Caller(ConnectionId, Served),
+    Provider(ConnectionId, Served),
 }
 
 impl Forwarded {
+    const fn kind(&self) -> Served {
+        match self.terms {
+            RequestTerms::Call { .. } => Served::Service,
+            RequestTerms::Goal { .. } => Served::Action,
+        }
+    }
+
     fn deadline(&self) -> Option<Instant> {
         match self.terms {
             RequestTerms::Call { deadline } => Some(deadline),
@@ -57,15 +65,15 @@ impl Forwarded {
 
     fn keys(&self) -> impl Iterator<Item = RequestKey> + use<> {
         let clients = [
-            RequestKey::Caller(self.caller),
-            RequestKey::Provider(self.provider),
+            RequestKey::Caller(self.caller, self.kind()),
+            RequestKey::Provider(self.provider, self.kind()),
         ];
         let deadline = self.deadline().map(RequestKey::Deadline);
         clients.into_iter().chain(deadline)
     }
 }
 
-/// Requests of one kind, by their numbers.
+/// The requests, by their numbers.
 #[derive(Default)]
 pub(crate) struct Requests {
     outstanding: BTreeMap<u64, Forwarded>,
@@ -100,19 +108,30 @@ impl Requests {
 
     /// The numbers of the requests under a key, oldest first.
     fn numbers(&self, key: RequestKey) -> impl DoubleEndedIterator<Item = u64> + '_ {
-        let range = self.index.range((key, 0)..=(key, u64::MAX));
+        self.numbers_between(key, key)
+    }
+
+    /// The same under the keys from `first` to `last`.
+    fn numbers_between(
+        &self,
+        first: RequestKey,
+        last: RequestKey,
+    ) -> impl DoubleEndedIterator<Item = u64> + '_ {
+        let range = self.index.range((first, 0)..=(last, u64::MAX));
         range.map(|(_, number)| *number)
     }
 
-    /// Whether a request of `caller` has not ended.
+    /// Whether a call of `caller` has not ended.
     pub(crate) fn has_waiting(&self, caller: ConnectionId) -> bool {
-        self.numbers(RequestKey::Caller(caller)).next().is_some()
+        let key = RequestKey::Caller(caller, Served::Service);
+        self.numbers(key).next().is_some()
     }
 
     /// The number of the request that `provider` means by `id`, if it is that provider's. Without an id, it is the only
     /// one that waits for `provider`, if it is of `name`.
     pub(crate) fn meant(
         &self,
+        kind: Served,
         id: Option<&Payload>,
         name: Option<&str>,
         provider: ConnectionId,
@@ -120,7 +139,7 @@ impl Requests {
         let number = match id {
             Some(id) => number_of(id)?,
             None => {
-                let mut numbers = self.numbers(RequestKey::Provider(provider));
+                let mut numbers = self.numbers(RequestKey::Provider(provider, kind));
                 numbers.next().filter(|_| numbers.next().is_none())?
             }
         };
@@ -129,17 +148,19 @@ impl Requests {
             .deadline()
             .is_some_and(|deadline| Instant::now() > deadline);
         let is_meant = id.is_some() || name.is_none_or(|name| names::are_same(&request.name, name));
-        (request.provider == provider && is_meant && !is_late).then_some(number)
+        let is_theirs = request.provider == provider && request.kind() == kind;
+        (is_theirs && is_meant && !is_late).then_some(number)
     }
 
-    /// The newest request of `caller` under `id`, and its id at the provider.
-    pub(crate) fn made_under(
+    /// The newest goal of `caller` under `id`, and its id at the provider.
+    pub(crate) fn goal_made_under(
         &self,
         id: Option<&Payload>,
         name: &str,
         caller: ConnectionId,
     ) -> Option<(String, &Forwarded)> {
-        let numbers = self.numbers(RequestKey::Caller(caller)).rev();
+        let key = RequestKey::Caller(caller, Served::Action);
+        let numbers = self.numbers(key).rev();
         let mut requests = numbers.filter_map(|number| Some((number, self.get(number)?)));
         let (number, request) =
             requests.find(|(_, one)| one.id.as_ref() == id && names::are_same(&one.name, name))?;
@@ -181,20 +202,18 @@ impl Requests {
         self.take(number)
     }
 
-    /// Takes the numbers of the requests that wait for `provider`, which will not answer them.
-    pub(crate) fn take_numbers(&mut self, provider: ConnectionId) -> Vec<u64> {
-        let key = RequestKey::Provider(provider);
-        let numbers: Vec<u64> = self.numbers(key).collect();
-        for number in &numbers {
-            self.index.remove(&(key, *number));
-        }
-        numbers
+    /// The oldest request that waits for `provider`.
+    pub(crate) fn waiting_for(&self, provider: ConnectionId) -> Option<u64> {
+        let of = |kind| RequestKey::Provider(provider, kind);
+        let mut waiting = self.numbers_between(of(Served::Service), of(Served::Action));
+        waiting.next()
     }
 
     /// Forgets the requests that `caller` has made.
     pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
-        let numbers: Vec<u64> = self.numbers(RequestKey::Caller(caller)).collect();
-        for number in numbers {
+        let of = |kind| RequestKey::Caller(caller, kind);
+        let made = self.numbers_between(of(Served::Service), of(Served::Action));
+        for number in made.collect::<Vec<u64>>() {
             self.take(number);
         }
     }

@@ -17,7 +17,7 @@ mod requests;
 mod subscriptions;
 mod topics;
 
-use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,10 +32,10 @@ use self::forwarded::Requests;
 use self::kept::{Kept, KeptEntry};
 use self::places::Places;
 use self::refusal::Refusal;
-use self::topics::{Subscription, Topics};
+use self::topics::Topics;
 use super::messages::{
-    Connect, CountRefusal, Disconnect, Finish, FinishAll, Handled, Outlets, RefuseCalls, Refused,
-    Request, Response, Retire, SetTap, TakeCensus, Tap, Tapped,
+    Connect, CountRefusal, Disconnect, FinishAll, Handled, Outlets, RefuseCalls, Refused, Request,
+    Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
 };
 use crate::actors::ConnectionId;
 use crate::actors::node::{Interest, Respond};
@@ -65,10 +65,9 @@ pub struct Registry {
     topics: Topics,
     directory: Directory,
     /// Calls and goals that wait for the clients that serve them.
-    calls: Requests,
-    goals: Requests,
-    /// Calls and goals whose provider has gone.
-    orphaned: VecDeque<(Served, u64)>,
+    requests: Requests,
+    /// Clients that have gone while calls or goals waited for them.
+    gone: VecDeque<ConnectionId>,
     /// When the next cleanup is, and the task that waits for it.
     next_cleanup: Option<(Instant, SpawnHandle)>,
     nodes: Nodes,
@@ -112,8 +111,8 @@ struct Client {
 #[derive(Default)]
 struct Registrations {
     advertised: BTreeMap<Box<str>, KeptEntry>,
-    /// Its subscriptions, by its spelling of the topic.
-    subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
+    /// Topics that it subscribes to, as it spells them.
+    subscribed: BTreeSet<Arc<str>>,
     services: BTreeMap<Box<str>, KeptEntry>,
     actions: BTreeMap<Box<str>, KeptEntry>,
 }
@@ -132,9 +131,8 @@ impl Registry {
             clients: HashMap::new(),
             topics: Topics::default(),
             directory: Directory::default(),
-            calls: Requests::default(),
-            goals: Requests::default(),
-            orphaned: VecDeque::new(),
+            requests: Requests::default(),
+            gone: VecDeque::new(),
             next_cleanup: None,
             nodes: Nodes::default(),
             latched: HashMap::new(),
@@ -178,7 +176,17 @@ impl Client {
 
     /// Sends a response, of one of the runtime's own services if there is one given.
     fn respond(&self, frame: Bytes, service: Option<Service>) {
-        self.outlets.respond.do_send(Response { frame, service });
+        let response = ToClient::Respond { frame, service };
+        self.outlets.mailbox.do_send(response);
+    }
+
+    /// Sends progress of a goal, which may be lost.
+    fn deliver_feedback(&self, frame: Bytes) {
+        self.outlets.mailbox.do_send(ToClient::Deliver {
+            topic: None,
+            frame,
+            done: None,
+        });
     }
 
     /// Sets the form in which the client gets the reason of a failed call, if one is given.
@@ -271,7 +279,7 @@ impl Handler<Retire> for Registry {
     fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
         self.schedule_cleanup(ctx);
-        if !self.calls.has_waiting(id) {
+        if !self.requests.has_waiting(id) {
             return Handled::at_once();
         }
         let (answered, all_answered) = oneshot::channel();
@@ -287,8 +295,7 @@ impl Handler<Disconnect> for Registry {
 
     fn handle(&mut self, Disconnect(id): Disconnect, ctx: &mut Context<Self>) {
         self.withdraw(id);
-        self.calls.forget_caller(id);
-        self.goals.forget_caller(id);
+        self.requests.forget_caller(id);
         if let Some(client) = self.clients.remove(&id) {
             client.outlets.gone.store(true, Ordering::Relaxed);
             self.gauges.set_connections(self.clients.len() as u64);
@@ -374,10 +381,8 @@ impl Handler<RefuseCalls> for Registry {
 
     fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
         self.closed = Some(why);
-        for kind in [Served::Service, Served::Action] {
-            for request in self.requests(kind).take_all() {
-                self.fail(&request, &Refusal::Closed(why));
-            }
+        for request in self.requests.take_all() {
+            self.fail(&request, &Refusal::Closed(why));
         }
     }
 }
@@ -390,7 +395,7 @@ impl Handler<FinishAll> for Registry {
         let mut clients: Vec<_> = self.clients.iter().collect();
         clients.sort_unstable_by_key(|(id, _)| **id);
         for (_, client) in clients {
-            client.outlets.finish.do_send(Finish);
+            client.outlets.mailbox.do_send(ToClient::Finish);
         }
     }
 }
@@ -517,13 +522,6 @@ impl Registry {
         cover(self.permit.as_ref(), frame)
     }
 
-    fn requests(&mut self, kind: Served) -> &mut Requests {
-        match kind {
-            Served::Service => &mut self.calls,
-            Served::Action => &mut self.goals,
-        }
-    }
-
     /// Whether messages on the topic of that absolute name are to be made.
     fn is_wanted(&self, topic: &str) -> bool {
         self.tap.is_some() || !self.topics.subscribers(topic).is_empty()
@@ -559,7 +557,7 @@ impl Registry {
         for topic in registered.advertised.keys() {
             self.topics.remove_publisher(topic);
         }
-        for topic in registered.subscriptions.keys() {
+        for topic in &registered.subscribed {
             self.drop_subscriber(topic, id);
         }
         for service in registered.services.keys() {
@@ -568,17 +566,15 @@ impl Registry {
         for action in registered.actions.keys() {
             self.directory.withdraw(Served::Action, action, id);
         }
-        for kind in [Served::Action, Served::Service] {
-            let numbers = self.requests(kind).take_numbers(id);
-            self.orphaned
-                .extend(numbers.into_iter().map(|number| (kind, number)));
+        if self.requests.waiting_for(id).is_some() {
+            self.gone.push_back(id);
         }
     }
 
     /// Schedules the next cleanup: at once if a provider has gone, else when the first call's time is over.
     fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.orphaned.is_empty()).then(Instant::now);
-        let Some(due) = left.or_else(|| self.calls.next_deadline()) else {
+        let left = (!self.gone.is_empty()).then(Instant::now);
+        let Some(due) = left.or_else(|| self.requests.next_deadline()) else {
             return;
         };
         if let Some((at, waiting)) = self.next_cleanup {
@@ -603,16 +599,18 @@ impl Registry {
     fn clean_up_some(&mut self) {
         let now = Instant::now();
         for _ in 0..ENDED_IN_A_ROW {
-            if let Some(call) = self.calls.take_due(now) {
+            if let Some(call) = self.requests.take_due(now) {
                 self.fail(&call, &Refusal::TimedOut(call.name.to_string()));
                 continue;
             }
-            let Some((kind, number)) = self.orphaned.pop_front() else {
+            let Some(provider) = self.gone.front() else {
                 return;
             };
-            // It may have ended otherwise.
-            if let Some(request) = self.requests(kind).take(number) {
+            let waiting = self.requests.waiting_for(*provider);
+            if let Some(request) = waiting.and_then(|number| self.requests.take(number)) {
                 self.fail(&request, &Refusal::ProviderGone(request.name.to_string()));
+            } else {
+                self.gone.pop_front();
             }
         }
     }
@@ -623,7 +621,7 @@ impl Registry {
         self.topics.remove_subscriber(&name, topic, connection);
         if let Some(client) = self.clients.get_mut(&connection)
             && Topic::from_name(&name) == Some(Topic::TfWebFeedback)
-            && !names::spellings(&name).any(|one| client.registered.subscriptions.contains_key(one))
+            && !names::spellings(&name).any(|one| client.registered.subscribed.contains(one))
         {
             client.listening = Arc::default();
         }

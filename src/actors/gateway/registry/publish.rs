@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::oneshot;
 
-use super::forms::{Made, ToEncode, within_bounds};
+use super::forms::{Made, ToEncode};
 use super::subscriptions::{is_listened_to, refuse_runtime_topic};
 use super::topics::Subscriber;
 use super::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::messages::{Deliver, DeliveryGuard, Handled, Publish, Tapped};
+use crate::actors::gateway::messages::{Handled, Publish, Tapped, ToClient};
+use crate::actors::node::{Done, guard};
 use crate::actors::resources::aside::{WorkKind, aside};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::TopicMessage;
@@ -26,29 +26,6 @@ use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
-
-/// Holds a publisher back until its message has been offered to the socket of every subscriber.
-#[derive(Default)]
-pub(super) struct Backpressure {
-    underway: Option<(DeliveryGuard, oneshot::Receiver<()>)>,
-}
-
-impl Backpressure {
-    /// Makes the guard of the message for a subscriber.
-    fn underway(&mut self) -> DeliveryGuard {
-        let (underway, _) = self.underway.get_or_insert_with(|| {
-            let (underway, end) = oneshot::channel();
-            (Arc::new(underway), end)
-        });
-        Arc::clone(underway)
-    }
-
-    /// Has the message's publisher wait for `handled`, and until every subscriber has the message.
-    fn and(self, handled: Handled) -> Handled {
-        let end = self.underway.map(|(_, end)| end);
-        handled.and_by_subscribers(end)
-    }
-}
 
 impl Registry {
     /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
@@ -74,16 +51,15 @@ impl Registry {
         if listener.is_none() && !client.registered.advertised.contains_key(topic) {
             return Handled::at_once();
         }
-        let mut pace = Backpressure::default();
+        let (done, ended) = guard();
         let encode = |spelling: &str| messages::publish_raw(spelling, msg);
-        self.fan_out(topic, Some(&mut pace), encode, ctx);
+        self.fan_out(topic, Some(&done), encode, ctx);
         let Some((topic, listener)) = listener else {
-            return pace.and(Handled::at_once());
+            return Handled::by_subscribers(ended);
         };
         if let Some(tap) = &mut self.tap {
             tap(Tapped::NodeMessage(topic, msg));
         }
-        let (done, ended) = oneshot::channel();
         listener(TopicMessage {
             heard: heard.unwrap_or_else(|| msg.clone().into()),
             respond: ctx.address().recipient(),
@@ -93,7 +69,7 @@ impl Registry {
             id: origin.id,
             done,
         });
-        pace.and(Handled::by_node(ended))
+        Handled::by_node(ended)
     }
 
     /// Delivers messages of a client as they are, if it advertises the topic.
@@ -104,21 +80,21 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) -> Handled {
         let topic = &*lines.topic;
-        let mut pace = Backpressure::default();
+        let (done, ended) = guard();
         let client = self.clients.get(&from);
         if client.is_some_and(|client| client.registered.advertised.contains_key(topic)) {
             let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
-            self.fan_out(topic, Some(&mut pace), encode, ctx);
+            self.fan_out(topic, Some(&done), encode, ctx);
         }
-        pace.and(Handled::at_once())
+        Handled::by_subscribers(ended)
     }
 
     /// Delivers a message, or a series of them, to every subscriber of `topic`, an absolute name, whatever its
-    /// spelling. `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait; a live arm can't.
+    /// spelling. `encode` makes the JSON for a spelling. `done` is of a publisher that can wait; a live arm can't.
     fn fan_out(
         &self,
         topic: &str,
-        mut pace: Option<&mut Backpressure>,
+        done: Option<&Done>,
         encode: impl Fn(&str) -> Bytes,
         ctx: &mut Context<Self>,
     ) {
@@ -128,60 +104,44 @@ impl Registry {
                 continue;
             }
             let plain = cover_message(self.permit.as_ref(), encode(spelling));
-            let mut encodings = Vec::new();
+            let mut encodings: Vec<Encoding> = Vec::new();
             for subscriber in subscribers {
-                if is_sent_plain(subscriber.encoding, plain.len()) {
-                    let underway = pace.as_deref_mut().map(Backpressure::underway);
-                    deliver(subscriber, plain.clone(), underway);
-                    continue;
-                }
-                let encoding = within_bounds(subscriber.encoding, &encodings);
-                if !encodings.contains(&encoding) {
+                let encoding = subscriber.encoding;
+                if is_sent_plain(encoding, plain.len()) {
+                    deliver(subscriber, plain.clone(), done);
+                } else if !encodings.contains(&encoding) {
                     encodings.push(encoding);
                 }
             }
-            if !encodings.is_empty() {
-                let message = self.to_encode(spelling, plain, encodings);
-                let underway = pace.as_deref_mut().map(Backpressure::underway);
-                self.deliver_encoded(message, underway, ctx);
+            for encoding in encodings {
+                let message = self.to_encode(spelling, plain.clone(), encoding);
+                self.deliver_encoded(message, done, ctx);
             }
         }
     }
 
-    /// Delivers a message in other forms, where it takes long once another thread has made them.
-    fn deliver_encoded(
-        &self,
-        message: ToEncode,
-        underway: Option<DeliveryGuard>,
-        ctx: &mut Context<Self>,
-    ) {
-        let (spelling, length) = (message.spelling.clone(), message.plain.len());
+    /// Delivers a message in another form, where it takes long once another thread has made that.
+    fn deliver_encoded(&self, message: ToEncode, done: Option<&Done>, ctx: &mut Context<Self>) {
         // A node does not wait, and none of its messages is long.
-        if underway.is_none() || !message.is_long() {
-            return self.deliver_made(&spelling, length, &message.make(), underway.as_ref());
+        if done.is_none() || !message.is_long() {
+            return self.deliver_made(&message, &message.make(), done);
         }
-        let made = aside(WorkKind::writing(length), move || message.make());
-        ctx.spawn(made.into_actor(self).map(move |made, registry, _| {
-            let made = made.unwrap_or_default();
-            registry.deliver_made(&spelling, length, &made, underway.as_ref());
+        let done = done.cloned();
+        let kind = WorkKind::of(message.plain.len());
+        let making = aside(kind, move || (message.make(), message));
+        ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
+            if let Some((made, message)) = made {
+                registry.deliver_made(&message, &made, done.as_ref());
+            }
         }));
     }
 
-    fn deliver_made(
-        &self,
-        spelling: &str,
-        length: usize,
-        made: &[(Encoding, Made)],
-        underway: Option<&DeliveryGuard>,
-    ) {
-        let forms: Vec<Encoding> = made.iter().map(|(form, _)| *form).collect();
-        let is_sent = |one: &&Subscriber| !is_sent_plain(one.encoding, length);
-        let topic = &*names::absolute(spelling);
-        for subscriber in self.subscribers_as(topic, spelling).filter(is_sent) {
-            let encoding = within_bounds(subscriber.encoding, &forms);
-            let of_form = made.iter().find(|(form, _)| *form == encoding);
-            if let Some((_, made)) = of_form {
-                self.deliver_form(subscriber, made, underway);
+    /// Delivers the messages of a form to those who get it.
+    fn deliver_made(&self, message: &ToEncode, made: &Made, done: Option<&Done>) {
+        let topic = names::absolute(&message.spelling);
+        for subscriber in self.subscribers_as(&topic, &message.spelling) {
+            if subscriber.encoding == message.encoding {
+                self.deliver_form(subscriber, made, done);
             }
         }
     }
@@ -192,11 +152,11 @@ impl Registry {
         subscribers.filter(move |one| *one.spelling == *spelling)
     }
 
-    /// Delivers the forms that could be made of a message. The others count as dropped.
-    fn deliver_form(&self, subscriber: &Subscriber, made: &Made, underway: Option<&DeliveryGuard>) {
+    /// Delivers the messages that could be made in a form. The others count as dropped.
+    fn deliver_form(&self, subscriber: &Subscriber, made: &Made, done: Option<&Done>) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
-            deliver(subscriber, frame.clone(), underway.cloned());
+            deliver(subscriber, frame.clone(), done);
         }
     }
 
@@ -212,10 +172,8 @@ impl Registry {
             if is_sent_plain(subscriber.encoding, plain.len()) {
                 return deliver(subscriber, plain, None);
             }
-            let message = self.to_encode(spelling, plain, vec![subscriber.encoding]);
-            for (_, made) in message.make() {
-                self.deliver_form(subscriber, &made, None);
-            }
+            let message = self.to_encode(spelling, plain, subscriber.encoding);
+            self.deliver_form(subscriber, &message.make(), None);
         }
     }
 
@@ -227,13 +185,13 @@ impl Registry {
         }
     }
 
-    /// A JSON frame, or a series of them, that is to be made in other forms.
-    fn to_encode(&self, spelling: &str, plain: Bytes, encodings: Vec<Encoding>) -> ToEncode {
+    /// A JSON frame, or a series of them, that is to be made in another form.
+    fn to_encode(&self, spelling: &str, plain: Bytes, encoding: Encoding) -> ToEncode {
         ToEncode {
             spelling: spelling.into(),
             plain,
-            encodings,
-            type_name: self.known_type(spelling).map(Into::into),
+            encoding,
+            type_name: self.known_type(spelling),
             fragmented: Arc::clone(&self.fragmented),
             permit: self.permit.clone(),
         }
@@ -267,10 +225,10 @@ fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
-fn deliver(subscriber: &Subscriber, frame: Bytes, underway: Option<DeliveryGuard>) {
-    subscriber.outlet.do_send(Deliver {
+fn deliver(subscriber: &Subscriber, frame: Bytes, done: Option<&Done>) {
+    subscriber.mailbox.do_send(ToClient::Deliver {
         topic: Some(Arc::clone(&subscriber.spelling)),
         frame,
-        underway,
+        done: done.cloned(),
     });
 }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::directory::Served;
@@ -14,8 +13,8 @@ use super::forwarded::{Forwarded, RequestTerms};
 use super::refusal::Refusal;
 use super::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
-use crate::actors::gateway::messages::{Deliver, Handled, Tapped};
-use crate::actors::node::Feedback;
+use crate::actors::gateway::messages::{Handled, Tapped};
+use crate::actors::node::{Feedback, guard};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller, SentGoal};
 use crate::actors::wire::{Caller, Route, ServiceCall};
@@ -137,7 +136,7 @@ impl Registry {
         };
         match route {
             Ok(node) => {
-                let (done, ended) = oneshot::channel();
+                let (done, ended) = guard();
                 node(ActionRequest::Goal {
                     arguments: goal.args,
                     client: action_client,
@@ -177,7 +176,7 @@ impl Registry {
             }
             return Handled::at_once();
         };
-        let (done, ended) = oneshot::channel();
+        let (done, ended) = guard();
         node(ActionRequest::Cancel {
             from: Canceller {
                 respond: ctx.address().recipient(),
@@ -197,11 +196,7 @@ impl Handler<Feedback> for Registry {
 
     fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
         if let Some(client) = self.clients.get(&feedback.connection) {
-            client.outlets.deliver.do_send(Deliver {
-                topic: None,
-                frame: feedback.frame.write(),
-                underway: None,
-            });
+            client.deliver_feedback(feedback.frame.write());
         }
     }
 }
@@ -295,7 +290,7 @@ impl Registry {
         };
         let id = origin.id.as_ref().map_or(0, Payload::allocated);
         let entry = caller.kept.enter(id + name.len() + spelling, None)?;
-        let known_as = self.requests(kind).add(Forwarded {
+        let known_as = self.requests.add(Forwarded {
             caller: origin.from,
             id: origin.id.clone(),
             provider: provider.connection,
@@ -311,9 +306,8 @@ impl Registry {
 
     /// Asks the action server of a goal of this client to end it.
     fn forward_cancellation(&self, origin: &FrameOrigin, action: &str) -> Result<(), Refusal> {
-        let goal = self
-            .goals
-            .made_under(origin.id.as_ref(), action, origin.from);
+        let requests = &self.requests;
+        let goal = requests.goal_made_under(origin.id.as_ref(), action, origin.from);
         let Some((id, goal)) = goal else {
             let name = names::absolute(action);
             return Err(match self.directory.provider(Served::Action, &name) {
@@ -339,8 +333,9 @@ impl Registry {
         action: &str,
         values: &Payload,
     ) -> Result<(), Refusal> {
-        let meant = self.goals.meant(origin.id.as_ref(), None, origin.from);
-        let goal = meant.and_then(|number| self.goals.get(number));
+        let requests = &self.requests;
+        let meant = requests.meant(Served::Action, origin.id.as_ref(), None, origin.from);
+        let goal = meant.and_then(|number| requests.get(number));
         let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
         if !names::are_same(&goal.name, action) {
             return Err(Refusal::OfAnother(Served::Action, goal.name.to_string()));
@@ -349,11 +344,7 @@ impl Registry {
             matches!(goal.terms, RequestTerms::Goal { wants_feedback, .. } if wants_feedback);
         if let Some(sender) = self.clients.get(&goal.caller).filter(|_| is_wanted) {
             let frame = messages::action_feedback(&goal.name, goal.id.as_ref(), values);
-            sender.outlets.deliver.do_send(Deliver {
-                topic: None,
-                frame: cover_message(self.permit.as_ref(), frame),
-                underway: None,
-            });
+            sender.deliver_feedback(cover_message(self.permit.as_ref(), frame));
         }
         Ok(())
     }
@@ -407,8 +398,8 @@ impl Registry {
         kind: Served,
         name: Option<&str>,
     ) -> Option<Forwarded> {
-        let requests = self.requests(kind);
-        let number = requests.meant(origin.id.as_ref(), name, origin.from)?;
+        let requests = &mut self.requests;
+        let number = requests.meant(kind, origin.id.as_ref(), name, origin.from)?;
         requests.take(number)
     }
 
@@ -445,7 +436,7 @@ impl Registry {
 
     /// If this was the last call that its caller waited for, a client that has stopped sending may go.
     fn note_answered(&mut self, request: &Forwarded) {
-        if !self.calls.has_waiting(request.caller)
+        if !self.requests.has_waiting(request.caller)
             && let Some(client) = self.clients.get_mut(&request.caller)
         {
             client.answered = None;

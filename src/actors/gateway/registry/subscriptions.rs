@@ -5,15 +5,16 @@
 use std::sync::Arc;
 
 use super::refusal::Refusal;
-use super::topics::{Subscriber, Subscription, throttle_of};
+use super::topics::{Subscriber, Subscription};
 use super::{FrameOrigin, Registry};
-use crate::actors::gateway::messages::{Configure, Throttle};
 use crate::protocol::catalog::{Direction, Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding, Subscribe};
+use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::stamps::is_ros1_name;
+use crate::protocol::wire::payload::Payload;
 
 impl Registry {
     pub(super) fn advertise(
@@ -72,52 +73,39 @@ impl Registry {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        let subscriptions = client.registered.subscriptions.get(topic);
-        let mut subscriptions = subscriptions.into_iter().flatten();
-        let before = subscriptions.find(|one| one.id == id);
+        let known = self.topics.subscriber(&absolute, topic, origin.from);
+        let before = known
+            .as_ref()
+            .and_then(|one| one.subscription(id.as_deref()));
         let is_new = before.is_none();
         let instead = before.map(|one| &one.entry);
         let entry = client.kept.enter(topic.len() + bytes, instead)?;
-        let known = client.registered.subscriptions.get_key_value(topic);
-        let known = known.map(|(name, _)| Arc::clone(name));
-        let name = known.unwrap_or_else(|| {
-            let spelling: Arc<str> = topic.into();
-            let subscriber = Subscriber {
-                connection: origin.from,
-                spelling: Arc::clone(&spelling),
-                outlet: client.outlets.deliver.clone(),
-                encoding: Encoding::default(),
-            };
-            self.topics.add_subscriber(&absolute, subscriber);
-            spelling
-        });
-        if let Some(type_name) = subscribe.type_name.as_deref() {
-            self.topics.note_type(&absolute, type_name);
-        }
-        let subscriptions = &mut client.registered.subscriptions;
-        let subscriptions = subscriptions.entry(Arc::clone(&name)).or_default();
-        subscriptions.retain(|one| one.id != id);
-        subscriptions.push(Subscription {
-            id,
+        let subscription = Subscription {
+            id: id.clone(),
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
             encoding: encoding_for(subscribe),
             entry,
-        });
-        let throttle = throttle_of(subscriptions);
-        self.topics
-            .set_encoding(&absolute, topic, origin.from, subscriptions);
-        if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
-            // The throttle of an earlier subscription must not hold back the latched message of this one.
-            client.outlets.configure.do_send(Configure {
-                topic: Arc::clone(&name),
-                throttle: Some(Throttle::NONE),
-            });
+        };
+        if let Some(known) = known {
+            known.change(|one| one.id != id, Some(subscription));
+        } else {
+            let spelling: Arc<str> = topic.into();
+            client.registered.subscribed.insert(Arc::clone(&spelling));
+            let mailbox = client.outlets.mailbox.clone();
+            let new = Subscriber::new(origin.from, spelling, mailbox, subscription);
+            self.topics.add_subscriber(&absolute, new);
         }
-        client.outlets.configure.do_send(Configure {
-            topic: name,
-            throttle,
-        });
+        if let Some(type_name) = subscribe.type_name.as_deref() {
+            self.topics.note_type(&absolute, type_name);
+        }
+        if let Some(subscriber) = self.topics.subscriber(&absolute, topic, origin.from) {
+            if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
+                // The throttle of an earlier subscription must not hold back the latched message of this one.
+                subscriber.configure(Some(Throttle::NONE));
+            }
+            subscriber.configure(subscriber.throttle());
+        }
         // The status leaves before the first message: the topic's owner gets the news of the subscriber after it.
         let msg = format!("subscribed to {topic}");
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
@@ -144,29 +132,20 @@ impl Registry {
     }
 
     pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
-        let Some(client) = self.clients.get_mut(&origin.from) else {
+        let absolute = names::absolute(topic);
+        let subscriber = self.topics.subscriber(&absolute, topic, origin.from);
+        let Some(subscriber) = subscriber else {
             return;
         };
-        let subscriptions = &mut client.registered.subscriptions;
-        let Some((name, mut left)) = subscriptions.remove_entry(topic) else {
-            return;
-        };
-        match &origin.id {
-            None => left.clear(),
-            Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
-        }
-        let throttle = throttle_of(&left);
-        client.outlets.configure.do_send(Configure {
-            topic: name.clone(),
-            throttle,
-        });
-        if left.is_empty() {
-            self.drop_subscriber(&name, origin.from);
-        } else {
-            let absolute = names::absolute(topic);
-            self.topics
-                .set_encoding(&absolute, topic, origin.from, &left);
-            subscriptions.insert(name, left);
+        let ended = origin.id.as_ref().map(Payload::get);
+        subscriber.change(|one| ended.is_some() && one.id.as_deref() != ended, None);
+        let throttle = subscriber.throttle();
+        subscriber.configure(throttle);
+        if throttle.is_none() {
+            if let Some(client) = self.clients.get_mut(&origin.from) {
+                client.registered.subscribed.remove(topic);
+            }
+            self.drop_subscriber(topic, origin.from);
         }
     }
 }

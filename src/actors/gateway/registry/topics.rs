@@ -11,9 +11,10 @@ use actix::prelude::*;
 
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::messages::{Deliver, Throttle};
+use crate::actors::gateway::messages::ToClient;
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::op::Encoding;
+use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::ListedTopic;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
@@ -25,16 +26,6 @@ pub(crate) struct Subscription {
     pub(crate) encoding: Encoding,
     /// The part of its client's room that it takes.
     pub(crate) entry: KeptEntry,
-}
-
-/// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
-pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
-    let queue_lengths = || subscriptions.iter().map(|one| one.queue_length);
-    Some(Throttle {
-        interval: subscriptions.iter().map(|one| one.throttle).min()?,
-        held_back: queue_lengths().min()?.max(1),
-        queue_length: queue_lengths().filter(|length| *length > 0).min(),
-    })
 }
 
 /// The topics, by their absolute names.
@@ -59,9 +50,64 @@ pub(crate) struct Subscriber {
     pub(crate) connection: ConnectionId,
     /// The topic as it spells it: its messages come under that name.
     pub(crate) spelling: Arc<str>,
-    pub(crate) outlet: Recipient<Deliver>,
+    pub(crate) mailbox: Recipient<ToClient>,
     /// The encoding that its subscriptions come to.
     pub(crate) encoding: Encoding,
+    subscriptions: Vec<Subscription>,
+}
+
+impl Subscriber {
+    pub(crate) fn new(
+        connection: ConnectionId,
+        spelling: Arc<str>,
+        mailbox: Recipient<ToClient>,
+        first: Subscription,
+    ) -> Self {
+        Self {
+            connection,
+            spelling,
+            mailbox,
+            encoding: first.encoding,
+            subscriptions: vec![first],
+        }
+    }
+
+    /// The subscription under that `id`.
+    pub(crate) fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
+        let mut all = self.subscriptions.iter();
+        all.find(|one| one.id.as_deref() == id)
+    }
+
+    /// Ends the subscriptions that `stays` does not keep, and begins `new`, if there is one.
+    pub(crate) fn change(
+        &mut self,
+        stays: impl FnMut(&Subscription) -> bool,
+        new: Option<Subscription>,
+    ) {
+        self.subscriptions.retain(stays);
+        self.subscriptions.extend(new);
+        let all = self.subscriptions.iter().map(|one| one.encoding);
+        self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
+    }
+
+    /// The smallest of each value over its subscriptions; `None` if there are none.
+    pub(crate) fn throttle(&self) -> Option<Throttle> {
+        let all = &self.subscriptions;
+        let queue_lengths = || all.iter().map(|one| one.queue_length);
+        Some(Throttle {
+            interval: all.iter().map(|one| one.throttle).min()?,
+            held_back: queue_lengths().min()?.max(1),
+            queue_length: queue_lengths().filter(|length| *length > 0).min(),
+        })
+    }
+
+    /// Tells the connection how the topic is throttled.
+    pub(crate) fn configure(&self, throttle: Option<Throttle>) {
+        self.mailbox.do_send(ToClient::Configure {
+            topic: Arc::clone(&self.spelling),
+            throttle,
+        });
+    }
 }
 
 impl Topics {
@@ -122,23 +168,15 @@ impl Topics {
         users.map_or(&[], |users| &users.subscribers)
     }
 
-    /// Sets how the messages of a topic are written for a client that subscribes to it under that spelling, by what its
-    /// subscriptions come to.
-    pub(crate) fn set_encoding(
+    /// The client that subscribes to a topic under that spelling.
+    pub(crate) fn subscriber(
         &mut self,
         topic: &str,
         spelling: &str,
         client: ConnectionId,
-        subscriptions: &[Subscription],
-    ) {
-        let all = subscriptions.iter().map(|one| one.encoding);
-        let encoding = all.reduce(Encoding::merged).unwrap_or_default();
-        let users = self.by_name.get_mut(topic).into_iter();
-        for subscriber in users.flat_map(|users| &mut users.subscribers) {
-            if subscriber.connection == client && *subscriber.spelling == *spelling {
-                subscriber.encoding = encoding;
-            }
-        }
+    ) -> Option<&mut Subscriber> {
+        let mut all = self.by_name.get_mut(topic)?.subscribers.iter_mut();
+        all.find(|one| one.connection == client && *one.spelling == *spelling)
     }
 
     /// The type of a topic that clients use, if one has named it and it is known.

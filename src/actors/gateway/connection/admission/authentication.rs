@@ -11,7 +11,7 @@ use crate::actors::gateway::connection::plain::read_some;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
 use crate::protocol::op::{self, Op};
-use crate::protocol::wire::frame::{Frame, FrameReader};
+use crate::protocol::wire::frame::FrameReader;
 
 /// Why a client that has to show a token is not admitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -28,49 +28,36 @@ pub(crate) enum AuthError {
     Crowded,
 }
 
-/// Reads until `due` up to a first frame that shows the token, and returns whether it is that of a command of this
-/// program. All that was read stays in `first`.
-pub(crate) async fn authenticate<S: AsyncRead + Unpin>(
-    token: &Token,
-    stream: &mut S,
-    first: &mut BytesMut,
-    due: Instant,
-) -> Result<bool, AuthError> {
-    let frame = first_frame(stream, first, due).await?;
-    match op::read(&frame.text).op {
-        Ok(Op::Auth {
-            token: Some(shown),
-            is_command,
-        }) if token.matches(&shown) => Ok(is_command),
-        Ok(Op::Auth { token: Some(_), .. }) => Err(AuthError::Wrong),
+/// The op of a client's first frame, if it shows the token.
+pub(crate) fn authenticate(token: &Token, op: Op) -> Result<Op, AuthError> {
+    match &op {
+        Op::Auth {
+            token: Some(shown), ..
+        } if token.matches(shown) => Ok(op),
+        Op::Auth { token: Some(_), .. } => Err(AuthError::Wrong),
         _ => Err(AuthError::NotShown),
     }
 }
 
-/// Reads until `due` up to a first frame, and returns whether it is that of a command of this program. All that was
-/// read stays in `first`.
-pub(crate) async fn opens_as_command<S: AsyncRead + Unpin>(
-    stream: &mut S,
-    first: &mut BytesMut,
-    due: Instant,
-) -> bool {
-    let frame = first_frame(stream, first, due).await;
-    let op = frame.map(|frame| op::read(&frame.text).op);
-    matches!(op, Ok(Ok(Op::Auth { is_command, .. })) if is_command)
+/// Whether a first frame is that of a command of this program.
+pub(crate) const fn is_command(op: &Op) -> bool {
+    matches!(op, Op::Auth { is_command, .. } if *is_command)
 }
 
-async fn first_frame<S: AsyncRead + Unpin>(
+/// Reads until `due` up to a first frame. All that was read stays in `first`.
+pub(crate) async fn first_op<S: AsyncRead + Unpin>(
     stream: &mut S,
     first: &mut BytesMut,
     due: Instant,
-) -> Result<Frame, AuthError> {
+) -> Result<Op, AuthError> {
     let mut frames = FrameReader::new();
     let mut seen = 0;
     loop {
         frames.push(first.get(seen..).unwrap_or_default());
         seen = first.len();
         if let Some(frame) = frames.next() {
-            return frame.map_err(|_| AuthError::NotShown);
+            let frame = frame.map_err(|_| AuthError::NotShown)?;
+            return op::read(&frame.text).op.map_err(|_| AuthError::NotShown);
         }
         if seen > MAX_AUTH_BYTES {
             return Err(AuthError::TooMuch);

@@ -4,7 +4,7 @@
 //! however silent, keep nobody out who has shown it.
 
 pub(super) mod authentication;
-pub(super) mod slots;
+pub mod slots;
 
 use std::time::Duration;
 
@@ -23,9 +23,6 @@ pub const MAX_UNAUTHENTICATED: usize = 128;
 /// have not shown the token. The [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
 pub const WRONG_TOKEN_TIME: Duration = Duration::from_millis(500);
 
-/// Clients that wait for a kept place, where no other place is free. The oldest is refused when there are more.
-pub const MAX_WAITING: usize = 128;
-
 /// The conditions under which a listener admits clients.
 #[derive(Debug, Default)]
 pub struct Admission {
@@ -34,32 +31,13 @@ pub struct Admission {
     /// Says which clients are served over HTTP, and with which files.
     #[cfg(feature = "web")]
     pub site: Site,
-    /// The clients that are not admitted yet.
-    pub newcomers: Newcomers,
-}
-
-/// The clients that are not admitted yet.
-#[derive(Debug)]
-pub struct Newcomers {
     /// Slots of clients that have to show the token and have not.
-    pub(super) unauthenticated: Slots,
-    /// Slots of clients that may have a kept place, while they have not shown it or none is free.
-    pub(super) waiting: Slots,
+    pub unauthenticated: Slots,
 }
 
-impl Newcomers {
-    /// Makes room for `unauthenticated` clients that have not shown the token yet.
-    #[must_use]
-    pub fn of(unauthenticated: usize) -> Self {
-        Self {
-            unauthenticated: Slots::new(unauthenticated),
-            waiting: Slots::new(MAX_WAITING),
-        }
-    }
-}
-
-impl Default for Newcomers {
+/// Slots for [`MAX_UNAUTHENTICATED`] clients.
+impl Default for Slots {
     fn default() -> Self {
-        Self::of(MAX_UNAUTHENTICATED)
+        Self::new(MAX_UNAUTHENTICATED)
     }
 }

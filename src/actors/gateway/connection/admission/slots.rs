@@ -12,14 +12,15 @@ use tokio::sync::Notify;
 
 /// The slots, oldest first: each is notified when it is evicted.
 #[derive(Debug)]
-pub(crate) struct Slots {
+pub struct Slots {
     most: usize,
     taken: Mutex<VecDeque<Arc<Notify>>>,
 }
 
 impl Slots {
     /// Makes `most` slots, all of them free.
-    pub(crate) fn new(most: usize) -> Self {
+    #[must_use]
+    pub fn new(most: usize) -> Self {
         Self {
             most,
             taken: Mutex::default(),

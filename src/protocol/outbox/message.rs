@@ -1,0 +1,53 @@
+//! A topic message that waits in the outbox, or a series of them.
+//!
+//! **Invariant:** a message that was part of a series keeps none of the others in memory.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use crate::protocol::limits::MEDIUM;
+use crate::protocol::wire::series::messages;
+
+/// A topic message that waits, or a series of them.
+#[derive(Debug)]
+pub(super) struct QueuedMessage {
+    /// Where it stands in the order of production.
+    pub(super) number: u64,
+    /// When it was produced.
+    pub(super) since: Instant,
+    /// Its topic; feedback of a goal has none.
+    pub(super) topic: Option<Arc<str>>,
+    pub(super) frame: Bytes,
+}
+
+impl QueuedMessage {
+    pub(super) fn is_on(&self, topic: &Arc<str>) -> bool {
+        let own = self.topic.as_ref();
+        own.is_some_and(|own| Arc::ptr_eq(own, topic) || own == topic)
+    }
+
+    pub(super) fn is_older(&self, age: Duration, now: Instant) -> bool {
+        now.saturating_duration_since(self.since) > age
+    }
+
+    /// How many messages it has.
+    pub(super) fn count(&self) -> u64 {
+        messages(self.frame.clone()).count() as u64
+    }
+}
+
+/// Bytes of a message, or of a series, that count.
+pub(super) fn counted(frame: &Bytes) -> usize {
+    frame.len().min(MEDIUM)
+}
+
+/// A message that is queued without the series that it is part of, if it is: it keeps none of the others in memory.
+pub(super) fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
+    if is_part {
+        Bytes::copy_from_slice(&frame)
+    } else {
+        frame
+    }
+}
