@@ -47,9 +47,10 @@ def keep(report):
         sys.exit(f"keep-report: {size} bytes, and docs/report/ has room for {MOST}")
     shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(parents=True)
-    for name in ["report.json", *PICTURES]:
+    for name in PICTURES:
         shutil.copy(report / name, KEPT)
-    summary = json.loads((KEPT / "report.json").read_text())
+    summary = json.loads((report / "report.json").read_text())
+    (KEPT / "report.json").write_text(lists_on_lines(summary))
     facts = dict(summary["machine"]["facts"])
     load = facts["Load when started"].split(" (")[0]
     look = " It was a quick look, coarser than the report." if summary["quick"] else ""
@@ -66,6 +67,12 @@ def keep(report):
         lines += ["", f"## {section['title']}", "", *(f"- {finding}" for finding in section["findings"])]
         lines += [line for table in section["tables"] if table["name"] == "left-out" for line in ["", *rows(table)]]
     (KEPT / "README.md").write_text("\n".join(lines) + "\n")
+
+
+def lists_on_lines(summary):
+    """The summary as JSON in which each innermost list, such as a row of a table, is one line."""
+    text = json.dumps(summary, ensure_ascii=False, indent=1)
+    return re.sub(r"\[[^][{}]*\]", lambda found: re.sub(r"\s*\n\s*", " ", found[0]), text) + "\n"
 
 
 def filled(text, summary):
