@@ -12,7 +12,6 @@ use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::gateway::connection::admission::slots::Slots;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Site;
@@ -122,7 +121,7 @@ fn admission(settings: u8) -> Admission {
     Admission {
         token,
         site: Site::new(access, FOLDER.into(), &[]),
-        unauthenticated: Slots::default(),
+        ..Admission::default()
     }
 }
 
