@@ -17,8 +17,8 @@ use pendularm_benches::program::{Program, Vitals, peak, vitals};
 
 /// Longest tide.
 const TIDE: Duration = Duration::from_secs(40);
-/// Attackers at once: the default places less those of the healthy clients and of clients that are being closed.
-const AT_ONCE: usize = 200;
+/// Attackers at once. The default places suffice for the healthy clients, for these, and for as many that are being closed.
+const AT_ONCE: usize = 112;
 /// Longest time until a call or a newcomer counts as not answered. It is far beyond any answer's own limit.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How long the program has to let go: half-open clients get their answers for up to 15 s, and computations go on.
