@@ -204,6 +204,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
             Site::new(access, report, &frames)
         },
         unauthenticated: Slots::new(unauthenticated),
+        waiting: Slots::default(),
     }
 }
 

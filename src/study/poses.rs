@@ -102,7 +102,7 @@ pub(super) async fn smallest_of_all_poses<const N: usize>(
     (search.smallest, search.worst)
 }
 
-/// The most memory that a search takes, in bytes: the cells, and the list of those that the climbs start from.
+/// Memory that a search takes at most \[bytes\]: the cells, and the list of cells from which the climbs start.
 pub(super) const fn most_bytes<const N: usize>() -> usize {
     2 * MAX_POSES * size_of::<(PoseCandidate<N>, f64)>()
 }

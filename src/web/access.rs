@@ -133,9 +133,10 @@ impl Access {
         let is_named = self.origins.iter().any(|named| **named == lower);
         // A browser sends the token's cookie along from every port of its host.
         let is_strict = self.strict_origin || self.token.is_some();
-        let may_open = is_own || is_named || (is_local && !is_strict);
-        let refusal = || AccessError::Origin(shortened(&text, MAX_SHOWN));
-        may_open.then_some(()).ok_or_else(refusal)
+        if is_own || is_named || (is_local && !is_strict) {
+            return Ok(());
+        }
+        Err(AccessError::Origin(shortened(&text, MAX_SHOWN)))
     }
 
     /// Whether the request shows the token, in its query or its cookie. True if it did so in the query: a cookie is
@@ -162,11 +163,8 @@ impl Access {
         let token = self.token.as_ref()?;
         let name = cookie_name(local.port());
         // A cookie has no place for some characters of a token.
-        let value: String = token
-            .reveal()
-            .bytes()
-            .map(|byte| format!("%{byte:02X}"))
-            .collect();
+        let bytes = token.reveal().bytes();
+        let value: String = bytes.map(|byte| format!("%{byte:02X}")).collect();
         Some(format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict"))
     }
 }

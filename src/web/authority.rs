@@ -41,7 +41,7 @@ impl Host {
     /// The host's text without a full stop behind it: with one, it is the same name.
     fn bare(&self) -> String {
         let text = self.to_string();
-        text.strip_suffix('.').map_or(text.clone(), str::to_owned)
+        text.strip_suffix('.').unwrap_or(&text).to_owned()
     }
 
     /// Whether this machine alone has that name, independent of any name server.
@@ -80,8 +80,9 @@ impl Authority {
         let (host, port) = match text.rsplit_once(':') {
             // The last colon of `[::1]` is no port's.
             Some((host, port)) if !port.ends_with(']') => {
+                // `parse` alone takes a plus sign too.
                 let is_number = port.bytes().all(|byte| byte.is_ascii_digit());
-                (host, Some(is_number.then(|| port.parse().ok())??))
+                (host, Some(port.parse().ok().filter(|_| is_number)?))
             }
             _ => (text, None),
         };

@@ -46,9 +46,8 @@ pub fn find(path: &str) -> Option<Asset> {
 pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpResponse {
     let mut body = Bytes::from_static(bytes);
     if name == DOCUMENT {
-        let has_report = site.look(|folder| folder.join(report::INDEX).is_file());
-        let has_report = has_report.await;
-        if has_report.is_some_and(|(has_report, _)| has_report) {
+        let look = site.look(|folder| folder.join(report::INDEX).is_file());
+        if matches!(look.await, Some((true, _))) {
             let html = String::from_utf8_lossy(bytes);
             body = html
                 .replace("href=\"report/\" hidden", "href=\"report/\"")

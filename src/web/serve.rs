@@ -158,9 +158,11 @@ impl<G: Gate> Responder<'_, G> {
         let (parts, body) = request.into_parts();
         let has_body = !body.is_end_stream();
         let request = RequestHead(parts);
-        let body = (!has_body).then_some(()).ok_or(AccessError::Body);
-        let checked = self.check(&request);
-        let mut response = match checked.and_then(|checked| body.map(|()| checked)) {
+        let checked = match self.check(&request) {
+            Ok(_) if has_body => Err(AccessError::Body),
+            checked => checked,
+        };
+        let mut response = match checked {
             Ok((own, cookie)) => match self.gate.admit().await {
                 Ok(()) => {
                     let mut response = self.resource(&request, &own).await;

@@ -4,10 +4,13 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
+use pendularm::actors::gateway::connection::admission::{Admission, MAX_UNAUTHENTICATED};
+use pendularm::actors::gateway::connection::{Connection, Ends};
 use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, KEPT_PLACES, OPENING_TIME};
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
@@ -15,6 +18,7 @@ use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::catalog::{Direction, Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, duplex};
 use tokio::time::{Instant, sleep};
 
 /// Places that any client may have.
@@ -189,6 +193,35 @@ fn a_command_has_a_kept_place_and_waits_for_it() {
         sleep(OPENING_TIME / 2).await;
         commands.pop();
         assert_eq!(waiting.receive().await["id"], 2);
+        drop(silent);
+    });
+}
+
+/// Of more silent clients than may wait for a place the oldest is told at once.
+#[test]
+fn so_many_clients_wait_for_a_place_and_no_more() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let silent: Vec<_> = (0..ORDINARY).map(|_| gateway.connect(1024)).collect();
+        settle().await;
+        let began = Instant::now();
+        // The clients of a listener share what admits them.
+        let admission: Arc<Admission> = Arc::default();
+        let mut waiting = Vec::new();
+        for _ in 0..=MAX_UNAUTHENTICATED {
+            let (ours, theirs) = duplex(1024);
+            let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
+            let ends = Ends::default();
+            Connection::start_with(Arc::clone(&admission), ends, theirs, registry, gauges);
+            waiting.push(ours);
+        }
+        let mut told = String::new();
+        waiting[0].read_to_string(&mut told).await.unwrap();
+        assert!(told.contains("too many connections"), "{told}");
+        assert!(began.elapsed() < OPENING_TIME / 2);
+        told.clear();
+        waiting[1].read_to_string(&mut told).await.unwrap();
+        assert_elapsed(began, OPENING_TIME);
         drop(silent);
     });
 }

@@ -64,8 +64,8 @@ pub const LINGER: Duration = Duration::from_secs(5);
 /// A client that takes no byte in this time is disconnected, while responses wait or a topic message that takes shared
 /// room.
 pub const STALL_LIMIT: Duration = Duration::from_secs(20);
-/// How long a frame may take from its first byte to its last. A frame that is too long is skipped, and has as much time
-/// again for every length that a frame may have. The slowest line by which anybody would steer an arm needs less.
+/// How long a frame may take from its first byte to its last, while the rest of it is waited for. A skipped frame has
+/// no limit. The slowest line by which anybody would steer an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// How long responses that are not ready yet are kept for a client that has stopped sending: longer than other clients
 /// usually have for theirs. The client may be gone altogether, which shows only when something is sent to it.

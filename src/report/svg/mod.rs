@@ -170,7 +170,7 @@ impl Curve {
         }
     }
 
-    /// Marks so many that tooltips would be most of the file.
+    /// Markers without tooltips, for curves with thousands of points.
     pub(crate) fn cells(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
         Self {
             has_tooltips: false,

@@ -191,7 +191,7 @@ impl Peer {
         }
     }
 
-    /// Takes the frames that came before and those that come within `time`.
+    /// Takes the frames that were received already and all that arrive within `time`.
     async fn take_for(&mut self, time: Duration) -> Vec<Value> {
         let end = Instant::now() + time;
         while let Ok(Ok(frame)) = timeout_at(end, self.read()).await {

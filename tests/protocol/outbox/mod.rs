@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use pendularm::protocol::outbox::{Outbox, Throttle};
 
-/// A throttle that holds back so many messages.
+/// A throttle with this interval that holds back at most `held_back` messages.
 fn throttle(interval: Duration, held_back: usize) -> Throttle {
     Throttle {
         interval,

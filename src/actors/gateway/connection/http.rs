@@ -15,7 +15,7 @@ use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
 use super::websocket::WebSocket;
 use crate::actors::gateway::limits::OPENING_TIME;
-use crate::actors::gateway::messages::{Outlets, Request};
+use crate::actors::gateway::messages::{Outlets, Refused, Request};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::web::serve::{self, Gate};
@@ -26,8 +26,8 @@ struct HttpGate<'a> {
     /// The way to a client that has no place yet.
     outlets: Cell<Option<Outlets>>,
     place: Cell<Option<HeldPlace>>,
-    /// The slot of a client that has not shown the token yet.
-    slot: Option<HeldSlot<'a>>,
+    /// The slot of a client that has no place yet, and why it is turned away without: `None` for the missing token.
+    slot: Option<(HeldSlot<'a>, Option<Refused>)>,
 }
 
 impl Gate for HttpGate<'_> {
@@ -35,11 +35,12 @@ impl Gate for HttpGate<'_> {
         let Some(outlets) = self.outlets.take() else {
             return Ok(());
         };
-        if let Some(slot) = &self.slot {
+        if let Some((slot, _)) = &self.slot {
             slot.give_back();
         }
+        let slot = self.session.admission.waiting.take();
         let due = Instant::now() + OPENING_TIME;
-        let place = self.session.wait_for_place(&outlets, due).await;
+        let place = self.session.wait_for_place(&outlets, &slot, due).await;
         let place = place.map_err(|why| {
             self.session.count_refusal(why);
             why.to_string()
@@ -57,41 +58,45 @@ impl HttpGate<'_> {
     /// Ends when the connection has to: with a sentence, if its slot is another client's.
     async fn cut_off(&self) -> Option<String> {
         let evicted = async {
-            match &self.slot {
-                Some(slot) => slot.evicted().await,
-                None => pending().await,
-            }
+            let Some((slot, refused)) = &self.slot else {
+                return pending().await;
+            };
+            slot.evicted().await;
+            let Some(why) = *refused else {
+                return AuthError::Crowded.to_string();
+            };
+            self.session.count_refusal(why);
+            why.to_string()
         };
         tokio::select! {
             () = self.session.finish.notified() => None,
-            () = evicted => Some(AuthError::Crowded.to_string()),
+            why = evicted => Some(why),
         }
     }
 }
 
 impl ClientSession {
-    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A newcomer gets a place once its
-    /// first request is admitted. Until then it may have a slot of those that have not shown the token.
+    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A client with a slot gets a place
+    /// once its first request is admitted.
     pub(super) async fn serve_http<S>(
         &self,
         stream: S,
         first: BytesMut,
         due: Instant,
-        client: Result<HeldPlace, (Outlets, Option<HeldSlot<'_>>)>,
+        client: Result<HeldPlace, (Outlets, HeldSlot<'_>, Option<Refused>)>,
     ) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let (place, newcomer) = match client {
-            Ok(place) => (Some(place), None),
-            Err(newcomer) => (None, Some(newcomer)),
+        let (place, outlets, slot) = match client {
+            Ok(place) => (Some(place), None, None),
+            Err((outlets, slot, refused)) => (None, Some(outlets), Some((slot, refused))),
         };
-        let (outlets, slot) = newcomer.unzip();
         let gate = HttpGate {
             session: self,
             outlets: Cell::new(outlets),
             place: Cell::new(place),
-            slot: slot.flatten(),
+            slot,
         };
         let site = (&self.admission.site, self.ends.local);
         let cut_off = gate.cut_off();

@@ -136,7 +136,7 @@ impl ClientSession {
             match how {
                 #[cfg(feature = "web")]
                 HowServed::Http(due) => {
-                    let newcomer = Err((outlets, Some(slot)));
+                    let newcomer = Err((outlets, slot, None));
                     return self.serve_http(stream, first, due, newcomer).await;
                 }
                 HowServed::Refused(why) => return Some(Opened::new(stream, first, Err(why))),
@@ -147,18 +147,23 @@ impl ClientSession {
         let is_command = matches!(how, HowServed::Command);
         let mut place = self.connect(&outlets, is_command).await;
         if matches!(place, Err(Refused::Full { .. })) {
+            let slot = self.admission.waiting.take();
             let due = Instant::now() + OPENING_TIME;
             if matches!(how, HowServed::Undecided) {
                 let kept = Examination::Kept(due);
-                how = self.examine(&mut stream, &mut first, kept).await;
+                how = tokio::select! {
+                    biased;
+                    how = self.examine(&mut stream, &mut first, kept) => how,
+                    () = slot.evicted() => HowServed::Undecided,
+                };
             }
             place = match how {
                 #[cfg(feature = "web")]
                 HowServed::Http(due) => {
-                    let newcomer = Err((outlets, None));
+                    let newcomer = Err((outlets, slot, place.err()));
                     return self.serve_http(stream, first, due, newcomer).await;
                 }
-                HowServed::Command => self.wait_for_place(&outlets, due).await,
+                HowServed::Command => self.wait_for_place(&outlets, &slot, due).await,
                 _ => self.connect(&outlets, false).await,
             };
         }
@@ -212,6 +217,7 @@ impl ClientSession {
     pub(super) async fn wait_for_place(
         &self,
         outlets: &Outlets,
+        slot: &HeldSlot<'_>,
         due: Instant,
     ) -> Result<HeldPlace, Refused> {
         loop {
@@ -219,7 +225,10 @@ impl ClientSession {
             if !matches!(place, Err(Refused::Full { .. })) || Instant::now() >= due {
                 return place;
             }
-            sleep(LOOK_AGAIN).await;
+            tokio::select! {
+                () = slot.evicted() => return place,
+                () = sleep(LOOK_AGAIN) => {}
+            }
         }
     }
 

@@ -136,7 +136,7 @@ impl Registry {
         }));
     }
 
-    /// Delivers the messages of a form to those who get it.
+    /// Delivers a message in one form to the subscribers that asked for that form.
     fn deliver_made(&self, message: &ToEncode, made: &Made, done: Option<&Done>) {
         let topic = names::absolute(&message.spelling);
         for subscriber in self.subscribers_as(&topic, &message.spelling) {

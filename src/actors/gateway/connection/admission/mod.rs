@@ -33,9 +33,12 @@ pub struct Admission {
     pub site: Site,
     /// Slots of clients that have to show the token and have not.
     pub unauthenticated: Slots,
+    /// Slots of clients that may have a kept place, while they have not shown it or none is free: the oldest is refused
+    /// for the next.
+    pub waiting: Slots,
 }
 
-/// Slots for [`MAX_UNAUTHENTICATED`] clients.
+/// [`MAX_UNAUTHENTICATED`] slots.
 impl Default for Slots {
     fn default() -> Self {
         Self::new(MAX_UNAUTHENTICATED)
