@@ -152,7 +152,8 @@ pub const ATTACKS: &[Attack] = &[
                 })
                 .collect()
         },
-    ),
+    )
+    .fills(),
 ];
 
 fn deaf_topics() -> Vec<Client> {

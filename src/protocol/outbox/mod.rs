@@ -24,7 +24,7 @@ use bytes::{Buf, Bytes};
 
 use self::message::{QueuedMessage, by_itself, counted};
 pub use self::throttle::Throttle;
-use self::throttle::TopicLimits;
+use self::throttle::{HeldBack, TopicLimits};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -58,9 +58,7 @@ pub struct Outbox {
     responses: VecDeque<(u64, Bytes)>,
     /// What the client has asked for, by topic.
     limits: HashMap<Arc<str>, TopicLimits>,
-    /// Messages that are held back, and the bytes of them that count.
-    held_count: usize,
-    held_bytes: usize,
+    held: HeldBack,
     /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
     produced: u64,
     /// Bytes of queued topic messages that count, without those held back.
@@ -124,7 +122,7 @@ impl Outbox {
     /// Whether messages are held back.
     #[must_use]
     pub const fn holds_back(&self) -> bool {
-        self.held_count > 0
+        self.held.count > 0
     }
 
     /// Adds a response or a status. Messages of the topics in `supersedes` that throttling holds back are older, and
@@ -270,13 +268,13 @@ impl Outbox {
     /// How many topic messages, or series of them, wait, those held back included.
     #[must_use]
     pub fn topic_count(&self) -> usize {
-        self.topics.len() + self.held_count
+        self.topics.len() + self.held.count
     }
 
     /// Bytes of topic messages that wait, as they count, those held back included.
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
-        self.topic_bytes + self.held_bytes
+        self.topic_bytes + self.held.bytes
     }
 
     /// Topic messages dropped so far for want of room. A message that throttling replaces by a newer one is not
@@ -330,8 +328,7 @@ impl Outbox {
         let limits = self.limits.entry(Arc::clone(topic)).or_default();
         limits.throttle = throttle;
         if limits.holds_back() {
-            let surplus = limits.trim();
-            return self.forget_held(&surplus);
+            return limits.trim(&mut self.held);
         }
         limits.last = None;
         for held in self.take_held(topic) {
@@ -343,62 +340,54 @@ impl Outbox {
         }
     }
 
-    /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
-    /// newest would be left.
+    /// Gives the throttle each message by itself. Once one has to wait, those behind it have to wait too, and only the
+    /// newest of them are kept.
     fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
         let is_series = first_message(&frames) < frames.len();
         while !frames.is_empty() {
-            let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
-            if !self.offer_one(topic, frame, now) {
-                let limits = self.limits.get(topic);
-                let left = limits.map_or(0, |limits| limits.throttle.held_back);
-                for frame in messages(last_messages(frames, left)) {
-                    self.offer_one(topic, by_itself(frame, true), now);
-                }
+            let Some(limits) = self.limits.get_mut(topic) else {
                 return;
+            };
+            if !limits.held.is_empty() || !limits.is_due(now) {
+                return self.hold_back(topic, frames, is_series, now);
             }
-        }
-    }
-
-    /// Gives the throttle a message; false if it is held back.
-    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
-        let number = self.number();
-        let Some(limits) = self.limits.get_mut(topic) else {
-            return true;
-        };
-        if limits.held.is_empty() && limits.is_due(now) {
             limits.last = Some(now);
-            self.enqueue(Some(topic), now, frame);
-            return true;
+            let frame = frames.split_to(first_message(&frames));
+            self.enqueue(Some(topic), now, by_itself(frame, is_series));
         }
-        if frame.len() > MEDIUM && !limits.may_hold_long(now) {
-            self.dropped += 1;
-            return false;
-        }
-        self.held_count += 1;
-        self.held_bytes += counted(&frame);
-        limits.held.push_back(QueuedMessage {
-            number,
-            since: now,
-            topic: Some(Arc::clone(topic)),
-            frame,
-        });
-        let surplus = limits.trim();
-        self.forget_held(&surplus);
-        false
     }
 
-    /// These messages are no longer held back.
-    fn forget_held(&mut self, held: &[QueuedMessage]) {
-        self.held_count -= held.len();
-        self.held_bytes -= held.iter().map(|held| counted(&held.frame)).sum::<usize>();
+    /// Holds back the newest of these messages, as many as the throttle may.
+    fn hold_back(&mut self, topic: &Arc<str>, mut frames: Bytes, is_series: bool, now: Instant) {
+        let Some(limits) = self.limits.get_mut(topic) else {
+            return;
+        };
+        if is_series {
+            frames = last_messages(frames, limits.throttle.held_back);
+        }
+        for frame in messages(frames) {
+            if frame.len() > MEDIUM && !limits.may_hold_long(now) {
+                self.dropped += 1;
+                continue;
+            }
+            self.produced += 1;
+            let message = QueuedMessage {
+                number: self.produced,
+                since: now,
+                topic: Some(Arc::clone(topic)),
+                frame: by_itself(frame, is_series),
+            };
+            self.held.add(&message);
+            limits.held.push_back(message);
+        }
+        limits.trim(&mut self.held);
     }
 
     /// Takes all that is held back of a topic, oldest first; its throttle stays.
-    fn take_held(&mut self, topic: &str) -> Vec<QueuedMessage> {
+    fn take_held(&mut self, topic: &str) -> VecDeque<QueuedMessage> {
         let limits = self.limits.get_mut(topic);
-        let held = limits.map_or_else(Vec::new, |limits| std::mem::take(&mut limits.held).into());
-        self.forget_held(&held);
+        let held = limits.map_or_else(VecDeque::new, |limits| std::mem::take(&mut limits.held));
+        held.iter().for_each(|message| self.held.forget(message));
         held
     }
 
@@ -427,9 +416,8 @@ impl Outbox {
                 return;
             };
             limits.last = Some(now);
-            let held = limits.held.pop_front();
-            self.forget_held(held.as_slice());
-            if let Some(held) = held {
+            if let Some(held) = limits.held.pop_front() {
+                self.held.forget(&held);
                 self.enqueue(Some(&topic), now, held.frame);
             }
             self.keep_to_queue_length(&topic);
@@ -450,13 +438,13 @@ impl Outbox {
     /// Drops the oldest messages of a topic of which more wait than the client wants, while it does not take all that
     /// it is offered.
     fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
+        if self.writing.is_empty() && self.room != Some(0) {
+            return;
+        }
         let limits = self.limits.get(topic);
         let Some(most) = limits.and_then(|limits| limits.throttle.queue_length) else {
             return;
         };
-        if self.writing.is_empty() && self.room != Some(0) {
-            return;
-        }
         let waiting = self.topics.iter().filter(|message| message.is_on(topic));
         let mut surplus = waiting.count().saturating_sub(most);
         let (mut index, mut before) = (0, 0);
@@ -552,8 +540,9 @@ impl Outbox {
             let held = self.limits.values_mut();
             let held = held.filter(|one| one.first_held().is_some_and(|held| held < queued));
             if let Some(limits) = held.min_by_key(|limits| limits.first_held()) {
-                let oldest = limits.held.pop_front();
-                self.forget_held(oldest.as_slice());
+                if let Some(oldest) = limits.held.pop_front() {
+                    self.held.forget(&oldest);
+                }
                 self.dropped += 1;
             } else if let Some(QueuedMessage { frame, .. }) = first {
                 let (bytes, count) = first_messages(frame, excess);

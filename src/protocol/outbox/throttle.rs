@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::message::QueuedMessage;
+use super::message::{QueuedMessage, counted};
 
 /// How long a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) may be held back: it takes room that
 /// others wait for.
@@ -31,6 +31,25 @@ impl Throttle {
         held_back: 1,
         queue_length: None,
     };
+}
+
+/// The messages of all topics that are held back: how many, and the bytes of them that count.
+#[derive(Debug, Default)]
+pub(super) struct HeldBack {
+    pub(super) count: usize,
+    pub(super) bytes: usize,
+}
+
+impl HeldBack {
+    pub(super) fn add(&mut self, message: &QueuedMessage) {
+        self.count += 1;
+        self.bytes += counted(&message.frame);
+    }
+
+    pub(super) fn forget(&mut self, message: &QueuedMessage) {
+        self.count -= 1;
+        self.bytes -= counted(&message.frame);
+    }
 }
 
 /// A client's limits of one topic.
@@ -69,10 +88,13 @@ impl TopicLimits {
         self.next().filter(|_| !self.held.is_empty())
     }
 
-    /// Takes the oldest messages beyond the number that may be held back.
-    pub(super) fn trim(&mut self) -> Vec<QueuedMessage> {
-        let surplus = self.held.len().saturating_sub(self.throttle.held_back);
-        self.held.drain(..surplus).collect()
+    /// Drops the oldest messages beyond the number that may be held back.
+    pub(super) fn trim(&mut self, all: &mut HeldBack) {
+        while self.held.len() > self.throttle.held_back
+            && let Some(oldest) = self.held.pop_front()
+        {
+            all.forget(&oldest);
+        }
     }
 
     /// When the next message may go; `None`: at once.

@@ -7,13 +7,17 @@ use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
-use bytes::{Bytes, BytesMut};
+use bytes::{BufMut, Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
-/// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
-pub(super) const CHUNK: usize = 32 * 1024;
+/// Bytes asked of a stream at a time. It is enough for a burst of short frames, and little enough for the turns of many
+/// clients.
+pub(super) const CHUNK: usize = 16 * 1024;
+/// The same while a long frame comes. Hundreds of clients may send one each, and another client's short frame has to
+/// wait for a turn of all of them.
+pub(super) const LONG_CHUNK: usize = CHUNK / 2;
 
 /// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
 /// a socket with unread input resets it.
@@ -36,16 +40,18 @@ pub(super) fn yield_turn(cx: &mut Context<'_>) {
     let _ = pin!(tokio::task::yield_now()).poll(cx);
 }
 
-/// Appends the available bytes to `chunk`; 0 at the end of the stream.
+/// Appends the available bytes to `chunk`, at most so many; 0 at the end of the stream.
 pub(super) fn poll_read<S: AsyncRead + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,
     chunk: &mut BytesMut,
+    most: usize,
 ) -> Poll<io::Result<usize>> {
-    pin!(read_some(stream, chunk)).poll(cx)
+    chunk.reserve(most);
+    pin!(stream.read_buf(&mut chunk.limit(most))).poll(cx)
 }
 
-/// The same for a task of its own.
+/// Appends the available bytes to `chunk`, for a task of its own; 0 at the end of the stream.
 pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream: &mut S,
     chunk: &mut BytesMut,

@@ -16,7 +16,7 @@ use tokio::time::Instant;
 
 use super::Connection;
 use super::perform::{OpOutcome, Performer, refusal};
-use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, yield_turn};
+use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, LONG_CHUNK, yield_turn};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;
@@ -391,7 +391,9 @@ impl ClientReader {
         let Some(transport) = &mut connection.transport else {
             return Poll::Ready(Err(ClientLost::Gone));
         };
-        if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
+        let is_long = self.frames.is_unfinished() && self.frames.buffered() > CHUNK;
+        let most = if is_long { LONG_CHUNK } else { CHUNK };
+        if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk, most) {
             return Poll::Ready(read.map(Some));
         }
         let is_unfinished = self.frames.is_unfinished() || transport.is_unfinished();
@@ -436,7 +438,7 @@ impl ClientReader {
         if bytes >= CHUNK || self.messages.len() >= FRAMES_IN_A_ROW {
             return Poll::Pending;
         }
-        let received = ready!(transport.poll_read(cx, &mut self.chunk))?;
+        let received = ready!(transport.poll_read(cx, &mut self.chunk, CHUNK))?;
         self.take_in(received);
         Poll::Ready(Ok(()))
     }

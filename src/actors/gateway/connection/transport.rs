@@ -11,7 +11,7 @@ use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
-use super::plain::{self, ClientLost};
+use super::plain::{self, CHUNK, ClientLost};
 #[cfg(feature = "web")]
 use super::websocket::WebSocket;
 #[cfg(feature = "web")]
@@ -53,14 +53,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Appends the available bytes of a stream, or gives the next message.
+    /// Appends the available bytes of a stream, at most so many, or gives the next message.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
+        most: usize,
     ) -> Poll<Result<ReceivedData, ClientLost>> {
         Poll::Ready(match self {
-            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk)) {
+            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk, most)) {
                 Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
                 Err(_) => Err(ClientLost::Gone),
             },
@@ -101,7 +102,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
+            Self::Plain(stream) => plain::poll_read(stream, cx, chunk, CHUNK),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
         }

@@ -20,7 +20,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, ClientLost};
+use super::plain::{self, CHUNK, ClientLost};
 use super::timer::Timer;
 use super::watched::{MonitoredStream, READ_BUFFER};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
@@ -186,7 +186,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         self.begin_turn();
-        plain::poll_read(self.stream(), cx, chunk)
+        plain::poll_read(self.stream(), cx, chunk, CHUNK)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
