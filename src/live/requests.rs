@@ -195,7 +195,7 @@ impl<const N: usize> ArmRequest<N> for SetState<N> {
 impl<const N: usize> ArmRequest<N> for Pause {
     fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<bool> {
         if self.paused == Some(true) {
-            // A path that was stepped meanwhile stops again.
+            // An arm that was stepped while paused counts as paused from here.
             arm.paused_at = arm.simulation.time();
         }
         let present = arm.paused;
