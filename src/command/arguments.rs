@@ -208,7 +208,7 @@ impl Layout {
             false => self.fieldnames.join(", "),
         };
         let path = path.trim_start_matches('.');
-        let refusal = format!("unknown field {path:?}; the fields are {fields}");
+        let refusal = format!("unknown field {path:?}; known fields: {fields}");
         match name.split_once(':') {
             Some((name, value)) => {
                 let value = value.trim();
