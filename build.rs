@@ -24,8 +24,7 @@ fn main() {
     println!("cargo:rustc-env=PENDULARM_VERSION={version}{commit}");
 }
 
-/// Runs this again when the file changes. A missing file would run it at every build, so it is not
-/// listed.
+/// Runs this again when the file changes. A missing file would run it at every build, so it is not listed.
 fn watch(path: &str) {
     if Path::new(path).exists() {
         println!("cargo:rerun-if-changed={path}");

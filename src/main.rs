@@ -32,8 +32,7 @@ const BAD_USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     #[cfg(unix)]
-    // Without the handler a file beyond the size limit would kill the process. Nothing else depends
-    // on the handler.
+    // Without the handler a file beyond the size limit would kill the process. Nothing else depends on the handler.
     let _ = pendularm::actors::signals::survive_file_size_limit();
     match Options::parse(std::env::args_os()) {
         Ok(Parsed::Serve(options)) => serve(&options),

@@ -17,8 +17,7 @@ use crate::value::{Links, ValueReader, needed, read_links};
 /// Duration of a move under control \[s\]. With the default gains it settles in this time.
 const MOVE: f64 = 4.0;
 
-/// Find the cheapest method and timestep for an allowed error, and measure the error against a
-/// reference
+/// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct PlanOptions {
     /// Largest allowed error of the end effector, in m

@@ -12,8 +12,7 @@ use clap::error::{Error, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{Arg, Command};
 
-/// Reads a value from its text. A byte that is not UTF-8 becomes a character that is in no valid
-/// value.
+/// Reads a value from its text. A byte that is not UTF-8 becomes a character that is in no valid value.
 ///
 /// clap's own readers name the option if the variable is wrong (clap issue 5202).
 #[derive(Clone)]

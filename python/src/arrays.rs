@@ -40,8 +40,7 @@ pub(crate) fn collected<T>(count: usize, items: impl Iterator<Item = T>) -> PyRe
     Ok(all)
 }
 
-/// Makes an array read-only, as every array that a property returns, because writing to it would not change the
-/// object.
+/// Makes an array read-only, as every array that a property returns, because writing to it would not change the object.
 pub(crate) fn read_only<'py, T: Element, D: Dimension>(
     array: Held<'py, PyArray<T, D>>,
 ) -> PyResult<Held<'py, PyArray<T, D>>> {

@@ -144,8 +144,7 @@ fn is_too_long_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
     Ok(false)
 }
 
-/// The entries of a sequence of `count` entries; `None` if it is not a sequence, or has another
-/// length.
+/// The entries of a sequence of `count` entries; `None` if it is not a sequence, or has another length.
 pub(crate) fn entries<'py>(
     value: &Object<'py>,
     count: usize,

@@ -10,8 +10,7 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::{PyResult, Python};
 use pyo3::sync::MutexExt;
 
-/// The duration of a piece: short for a user who presses Ctrl-C, and long compared with the check
-/// for signals.
+/// The duration of a piece: short for a user who presses Ctrl-C, and long compared with the check for signals.
 const PIECE: Duration = Duration::from_millis(50);
 
 /// Advances a computation, with the interpreter's lock released, until it has a result.
@@ -39,8 +38,7 @@ pub(crate) fn until_done<T: Send>(
     }
 }
 
-/// Waits for a lock without holding the interpreter's. Its value is consistent, even after a panic of
-/// another thread.
+/// Waits for a lock without holding the interpreter's. Its value is consistent, even after a panic of another thread.
 pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
     one.lock_py_attached(py)
         .unwrap_or_else(PoisonError::into_inner)
@@ -64,8 +62,7 @@ pub(crate) struct Turn<'a> {
 }
 
 impl Turns {
-    /// Waits for this thread's turn, with the interpreter's lock released; `None` if the thread has it
-    /// already.
+    /// Waits for this thread's turn, with the interpreter's lock released; `None` if the thread has it already.
     ///
     /// # Errors
     /// Every error that a signal's handler raises, such as `KeyboardInterrupt`.

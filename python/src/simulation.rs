@@ -26,8 +26,7 @@ const STEPS_PER_LOOK: u64 = 1000;
 
 type Numbers<'py> = Held<'py, PyArray1<f64>>;
 
-/// The number of links never changes. A lock protects the state, because threads may share a
-/// simulation.
+/// The number of links never changes. A lock protects the state, because threads may share a simulation.
 #[derive(Debug)]
 enum Either {
     Two(Mutex<Loop<2>>),

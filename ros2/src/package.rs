@@ -1,5 +1,4 @@
-//! The source of the package with this project's own types, which a ROS 2 workspace builds to use the
-//! bridge.
+//! The source of the package with this project's own types, which a ROS 2 workspace builds to use the bridge.
 //!
 //! **Invariant:** types built from it have the hashes in the graph. No type has an inner type of another package, so
 //! only ROS 2's generators are needed.

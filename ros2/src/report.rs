@@ -9,8 +9,7 @@ pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "pendularm-ros2: {line}");
 }
 
-/// Prints a line, unless it is the same as the last one, so a failure that repeats every second is
-/// printed once.
+/// Prints a line, unless it is the same as the last one, so a failure that repeats every second is printed once.
 #[derive(Debug, Default)]
 pub struct Repeated(String);
 

@@ -41,8 +41,7 @@ fn is_empty(value: &Value) -> bool {
     }
 }
 
-/// A response with the arm's values, and with the outcome of the call if the type has fields for
-/// it.
+/// A response with the arm's values, and with the outcome of the call if the type has fields for it.
 #[must_use]
 pub fn response(of: &ServiceInterface, values: Value, is_success: bool, status: &str) -> Value {
     let mut members = match values {

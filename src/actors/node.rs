@@ -123,8 +123,7 @@ pub trait Asker<T>: Send {
         false
     }
 
-    /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the
-    /// answer.
+    /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
     /// Reserves memory for an answer of at most `bytes` bytes before it is computed.
@@ -168,8 +167,7 @@ impl<T> Reply<T> {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. Short answers need no
-    /// reservation.
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. Short answers need no reservation.
     ///
     /// # Errors
     /// While there is not enough.
@@ -180,8 +178,7 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Sends a client a status, before the answer, with the reason why the request has no effect
-    /// yet.
+    /// Sends a client a status, before the answer, with the reason why the request has no effect yet.
     pub fn warn(&self, why: &str) {
         if let Some(asker) = &self.asker {
             asker.warn(why);

@@ -40,8 +40,7 @@ pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     }));
 }
 
-/// Runs `work` and catches its panic. Values that `work` has changed must not be used after a
-/// panic.
+/// Runs `work` and catches its panic. Values that `work` has changed must not be used after a panic.
 ///
 /// # Errors
 /// The panic.

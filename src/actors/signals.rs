@@ -164,8 +164,7 @@ mod tests {
         rustix::process::kill_process(rustix::process::getpid(), one).unwrap();
     }
 
-    /// This is one test, because a signal is for the whole process. A shell may have started it with
-    /// SIGHUP ignored.
+    /// This is one test, because a signal is for the whole process. A shell may have started it with SIGHUP ignored.
     #[test]
     fn who_does_not_end_in_time_is_ended_and_nobody_else() {
         for (name, one) in REQUESTS.into_iter().chain(further().next()) {

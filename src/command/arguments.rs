@@ -200,8 +200,7 @@ fn check(layouts: &[Layout], kind: &str, value: &Value, path: &str) -> Result<()
 }
 
 impl Layout {
-    /// The refusal of a field. In YAML, a name and a value without a space after the colon are one
-    /// name.
+    /// The refusal of a field. In YAML, a name and a value without a space after the colon are one name.
     fn lacks(&self, name: &str, path: &str) -> String {
         let fields = match self.fieldnames.is_empty() {
             true => "none".to_owned(),

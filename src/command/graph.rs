@@ -19,8 +19,7 @@ pub enum GraphVerb {
         #[arg(short = 't', long)]
         show_types: bool,
     },
-    /// Print the type of a topic, service or action and its nodes, or the topics and services of a
-    /// node
+    /// Print the type of a topic, service or action and its nodes, or the topics and services of a node
     Info {
         /// Its name, with or without the leading slash
         name: String,

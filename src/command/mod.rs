@@ -62,8 +62,7 @@ pub struct Subject<V: Subcommand> {
     verb: V,
 }
 
-/// Runs a command and prints its result. Values are read before it connects, so a wrong one changes
-/// nothing.
+/// Runs a command and prints its result. Values are read before it connects, so a wrong one changes nothing.
 ///
 /// # Errors
 /// [`CommandError`], which has the exit status.

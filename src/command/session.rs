@@ -84,8 +84,7 @@ pub(super) struct Session {
     pub(super) is_json: bool,
 }
 
-/// The parts of a frame that commands need. Values stay as text, because a tree of them takes seventy times the
-/// memory.
+/// The parts of a frame that commands need. Values stay as text, because a tree of them takes seventy times the memory.
 #[derive(Debug, Deserialize)]
 pub(super) struct Received {
     pub(super) op: String,
@@ -296,8 +295,7 @@ impl Session {
                 "there is no topic {topic} yet; `pendularm topic list` lists all, and with a TYPE the command waits"
             )));
         }
-        // Without a type the messages have the form of ROS 2, also if the given type is one of ROS
-        // 1.
+        // Without a type the messages have the form of ROS 2, also if the given type is one of ROS 1.
         self.send(&json!({"op": "subscribe", "topic": topic})).await
     }
 

@@ -149,8 +149,7 @@ impl SubscribedTopic {
     }
 }
 
-/// The part of a message at a path: names separated by dots, items in brackets. Numbers keep their
-/// spelling.
+/// The part of a message at a path: names separated by dots, items in brackets. Numbers keep their spelling.
 fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandError> {
     let step = |value: &'a RawValue, step: &str| -> Option<&'a RawValue> {
         if let Some(index) = step.strip_suffix(']') {
@@ -224,8 +223,7 @@ async fn publish(
     let mut due = Instant::now();
     for count in 1.. {
         session.send(&publish).await?;
-        // The answer to this call arrives after the message has been handled. A refusal arrives
-        // before it.
+        // The answer to this call arrives after the message has been handled. A refusal arrives before it.
         session
             .call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))
             .await?;

@@ -32,8 +32,7 @@ pub enum ArmEvent<const N: usize> {
     },
 }
 
-/// Receives the arm's events, on the arm's thread, without blocking. Returns whether it has
-/// accepted the event.
+/// Receives the arm's events, on the arm's thread, without blocking. Returns whether it has accepted the event.
 pub type ArmListener<const N: usize> = Box<dyn FnMut(ArmNews<N>) -> bool + Send>;
 
 /// The listener, and the last event for it.

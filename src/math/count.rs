@@ -27,8 +27,7 @@ pub fn steps_in(duration: f64, timestep: f64) -> f64 {
     duration / timestep * (1.0 + ROUNDING)
 }
 
-/// The number of values in `0..count` for which `holds` is true. It is true up to some value, and false from there
-/// on.
+/// The number of values in `0..count` for which `holds` is true. It is true up to some value, and false from there on.
 #[must_use]
 pub fn partition_point(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
     // In most calls it is true for all of them.

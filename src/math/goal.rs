@@ -21,10 +21,9 @@ pub const FEEDBACK_RATE: f64 = 60.0;
 
 /// Returns the largest rounding error of a difference of two times \[s\] near `time`.
 ///
-/// A time is `base + k h`. The product and the sum each have an error of half a unit in the last place, at both
-/// ends. The same amount is added because `h` is only the double nearest to, say, 1 ms. The total is less than four
-/// times `2⁻⁵² time` (3e-12 s after an hour). Without this allowance, half a second would sometimes take one step
-/// more.
+/// A time is `base + k h`. The product and the sum each have an error of half a unit in the last place, at both ends.
+/// The same amount is added because `h` is only the double nearest to, say, 1 ms. The total is less than four times
+/// `2⁻⁵² time` (3e-12 s after an hour). Without this allowance, half a second would sometimes take one step more.
 pub(super) fn rounding(time: f64) -> f64 {
     4.0 * f64::EPSILON * time.abs()
 }
@@ -32,8 +31,7 @@ pub(super) fn rounding(time: f64) -> f64 {
 /// When a goal counts as reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria {
-    /// Greatest distance between end effector and target that counts as reached \[m\], greater than
-    /// 0.
+    /// Greatest distance between end effector and target that counts as reached \[m\], greater than 0.
     pub epsilon: f64,
     /// Simulation time that the end effector must stay there without interruption \[s\]; 0 accepts the first
     /// entry.

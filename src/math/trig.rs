@@ -1,5 +1,4 @@
-//! Sine and cosine of all joint angles of an arm at once. They are half of the cost of its
-//! dynamics.
+//! Sine and cosine of all joint angles of an arm at once. They are half of the cost of its dynamics.
 //!
 //! Every stage is done for all angles before the next begins, so that the compiler can put two of them into one
 //! register. There is no branch on the angle, except for arms that have turned more than 30,000 times. Every
@@ -27,8 +26,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use super::number::{Number, entries};
 
-/// Largest magnitude of an angle \[rad\] for which the reduction is exact. Beyond it `k` would need more than 17
-/// bits.
+/// Largest magnitude of an angle \[rad\] for which the reduction is exact. Beyond it `k` would need more than 17 bits.
 const LIMIT: f64 = 2.0e5;
 
 /// Adding this rounds to an integer, which is then in the low bits of the sum: `1.5 * 2^52`.

@@ -91,8 +91,7 @@ pub struct Options {
     #[arg(long, env = "ARM_SIM_LOG_FORMAT", value_name = "FORMAT")]
     #[arg(default_value = "text", value_parser = ValueReader(read_log_format))]
     pub log_format: LogFormat,
-    /// Secret token of at least 16 characters; prefer the variable, because other users can see
-    /// options
+    /// Secret token of at least 16 characters; prefer the variable, because other users can see options
     #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(read_token))]
     pub token: Option<Token>,
     /// Options of records.
@@ -168,8 +167,7 @@ pub enum Parsed {
     /// Prints this text on standard output.
     #[command(skip)]
     Show(String),
-    /// Find the cheapest method and timestep for an allowed error, and measure the error against a
-    /// reference
+    /// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
     Plan(PlanOptions),
     /// Measure error against run time and stability, and write a report
     #[cfg(feature = "report")]
@@ -218,8 +216,7 @@ impl From<clap::Error> for UsageError {
 }
 
 impl Options {
-    /// Reads the arguments, with the program's name first. An option that is not among them is read from its
-    /// variable.
+    /// Reads the arguments, with the program's name first. An option that is not among them is read from its variable.
     ///
     /// # Errors
     /// [`UsageError`] for the first invalid argument, option or variable.

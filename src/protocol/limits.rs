@@ -9,8 +9,7 @@ pub const MAX_FRAME: usize = 4 * 1024 * 1024;
 pub const SHORT: usize = 64 * 1024;
 /// The longest published message that needs no such permit: 256 KiB, and 16 KiB for its topic and type.
 pub const MEDIUM: usize = 272 * 1024;
-/// Deepest nesting of objects and arrays, including the frame itself. ROS messages need fewer than ten
-/// levels.
+/// Deepest nesting of objects and arrays, including the frame itself. ROS messages need fewer than ten levels.
 pub const MAX_NESTING: usize = 128;
 /// Longest topic or service name, and longest id of a subscription or a goal, in bytes. They are stored, and the id
 /// of a goal is sent 60 times a second.

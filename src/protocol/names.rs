@@ -50,8 +50,7 @@ pub fn short_type(name: &str) -> String {
     }
 }
 
-/// Whether two names are spellings of the same type. A middle part that only one of them has is
-/// ignored.
+/// Whether two names are spellings of the same type. A middle part that only one of them has is ignored.
 ///
 /// One name is compared with every known type, so only as many bytes are read as the shorter name has.
 #[must_use]

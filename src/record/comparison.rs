@@ -19,8 +19,7 @@ use crate::protocol::wire::text::excerpt;
 /// Most steps between two messages of a record. On the fastest machine a tick has a tenth of that, so a record with a
 /// slow file is not refused.
 pub const MAX_LEAP: u64 = 10_000_000;
-/// Lower bound on the time of a step, in nanoseconds. On every measured machine a step takes at least three times
-/// that.
+/// Lower bound on the time of a step, in nanoseconds. On every measured machine a step takes at least three times that.
 const SHORTEST_STEP: u64 = 10;
 /// Steps that are always allowed, so a coarse clock has no effect.
 pub const AT_ONCE: u64 = 100_000;
@@ -255,7 +254,10 @@ impl<const N: usize> Replay<N> {
         match note {
             Note::Input(input) => simulation.apply(input),
             Note::Diverged if simulation.step() => {
-                self.differs(step, "the next step was not finite in the record, but is finite now");
+                self.differs(
+                    step,
+                    "the next step was not finite in the record, but is finite now",
+                );
             }
             Note::Diverged | Note::Begin(_) => {}
         }
@@ -323,7 +325,10 @@ impl<const N: usize> Replay<N> {
         self.verdict.steps += taken;
         if taken < due {
             let at = *at;
-            self.differs(at, "the next step was finite in the record, but is not finite now");
+            self.differs(
+                at,
+                "the next step was finite in the record, but is not finite now",
+            );
             return Ok(false);
         }
         Ok(true)

@@ -103,8 +103,7 @@ impl<W: Write> McapWriter<W> {
             .library(format!("{FACTS} {VERSION}"))
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is kept in memory until it is whole, so the file is always the beginning of a
-            // valid one.
+            // A chunk is kept in memory until it is whole, so the file is always the beginning of a valid one.
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let facts = [

@@ -29,8 +29,7 @@ pub struct Access {
     pub hosts: Vec<Authority>,
     /// Origins that may open a WebSocket besides loopback's, in lower case.
     pub origins: Vec<Box<str>>,
-    /// Only the runtime's own pages and the named ones may open a WebSocket. The same applies with
-    /// a token.
+    /// Only the runtime's own pages and the named ones may open a WebSocket. The same applies with a token.
     pub strict_origin: bool,
 }
 
@@ -43,8 +42,7 @@ pub enum AccessError {
     /// Another method.
     #[error("only GET and HEAD are answered here")]
     Method,
-    /// A request with a body. Readers may disagree about its end, so a second request could be
-    /// hidden in it.
+    /// A request with a body. Readers may disagree about its end, so a second request could be hidden in it.
     #[error("a request must not have a body here")]
     Body,
     /// The request has no `Host` header, or several.
@@ -171,8 +169,7 @@ impl Access {
     }
 }
 
-/// Browsers store cookies by host, not by port, so the name distinguishes two runtimes on one
-/// machine.
+/// Browsers store cookies by host, not by port, so the name distinguishes two runtimes on one machine.
 fn cookie_name(port: u16) -> String {
     format!("pendularm_{port}")
 }

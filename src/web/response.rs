@@ -76,8 +76,7 @@ pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
     }
 }
 
-/// The bytes of a one-sentence answer to a client whose request was not read to its end. The connection is then
-/// closed.
+/// The bytes of a one-sentence answer to a client whose request was not read to its end. The connection is then closed.
 #[must_use]
 pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
     let response = text(status, sentence);

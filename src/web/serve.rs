@@ -1,5 +1,4 @@
-//! The requests of one connection and their answers. The library reads heads; this module chooses the
-//! answers.
+//! The requests of one connection and their answers. The library reads heads; this module chooses the answers.
 //!
 //! **Invariant:** reading a head and writing an answer are bounded in bytes and in time. The caller bounds the number
 //! of connections.
@@ -45,8 +44,7 @@ pub trait Gate {
 /// `due`. `local` is the address that the client has connected to. `cut_off` ends the connection. If it returns a
 /// sentence and there is no request yet, this is sent.
 ///
-/// Returns the stream and the bytes after the handshake, if it is a WebSocket now. Otherwise it has
-/// ended.
+/// Returns the stream and the bytes after the handshake, if it is a WebSocket now. Otherwise it has ended.
 pub async fn serve<S, G>(
     stream: S,
     first: BytesMut,
@@ -86,8 +84,7 @@ where
         biased;
         served = poll_fn(|cx| {
             let served = ready!(connection.poll_without_shutdown(cx));
-            // The library returns once the last answer is in its buffer. It continues to write when polled
-            // again.
+            // The library returns once the last answer is in its buffer. It continues to write when polled again.
             let may_write = served.as_ref().map_or_else(hyper::Error::is_parse, |()| true);
             if may_write && !deadline.is_flushed.get() {
                 return Poll::Pending;

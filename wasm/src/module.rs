@@ -101,8 +101,7 @@ pub extern "C" fn collect() -> usize {
     give(with_kernel!(kernel => kernel.take_frames()))
 }
 
-/// Makes the runs that are compared with the native ones. Returns the number of bytes of their
-/// text.
+/// Makes the runs that are compared with the native ones. Returns the number of bytes of their text.
 #[unsafe(no_mangle)]
 pub extern "C" fn compare() -> usize {
     give(runs::text().into_bytes())

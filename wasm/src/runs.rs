@@ -36,9 +36,8 @@ const QUESTIONS: [(&str, &str); 8] = [
 /// Steps of a run.
 pub const STEPS: u64 = 20_000;
 
-/// The text has one line for each run: each method, both numbers of links, without and with the
-/// controller. A line has the name and the bits of the last state, effort and time. After these
-/// there is one line for each answer.
+/// The text has one line for each run: each method, both numbers of links, without and with the controller. A line has
+/// the name and the bits of the last state, effort and time. After these there is one line for each answer.
 #[must_use]
 pub fn text() -> String {
     let mut text = String::new();

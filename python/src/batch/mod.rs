@@ -241,8 +241,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths`
-    /// [m].
+    /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
     #[pyo3(signature = (gravity=None, masses=None, lengths=None))]
     fn set_params(
         &self,

@@ -37,8 +37,7 @@ pub struct Gateway {
 }
 
 impl Gateway {
-    /// A gateway to the arm at that address. It informs the graph when the arm connects and
-    /// disconnects.
+    /// A gateway to the arm at that address. It informs the graph when the arm connects and disconnects.
     #[must_use]
     pub fn new(address: String, token: Option<String>, graph: Recipient<ArmPresence>) -> Self {
         Self {

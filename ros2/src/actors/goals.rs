@@ -184,8 +184,7 @@ impl<R> GoalTable<R> {
     /// Adds a caller that waits for its end.
     ///
     /// # Errors
-    /// The request, if it does not have to wait: with the result, or with `None` if there is no such goal or
-    /// no space.
+    /// The request, if it does not have to wait: with the result, or with `None` if there is no such goal or no space.
     pub fn wait(&mut self, id: GoalId, request: R) -> Result<(), (R, Option<&Value>)> {
         match self.0.iter_mut().find(|goal| goal.id == id) {
             None => Err((request, None)),

@@ -42,8 +42,7 @@ pub struct GraphBridge {
     is_arm_here: bool,
     nodes: Vec<LivelinessToken>,
     bridges: Vec<Recipient<Leave>>,
-    /// The last used number of an endpoint. No number is reused, because its endpoint may still be
-    /// closing.
+    /// The last used number of an endpoint. No number is reused, because its endpoint may still be closing.
     last_endpoint: usize,
     complaint: Repeated,
 }

@@ -90,8 +90,7 @@ impl Outlet {
 
 impl Drop for Outlet {
     fn drop(&mut self) {
-        // Zenoh waits for the end of the heartbeat's task, which is not allowed on a thread of an asynchronous
-        // runtime.
+        // Zenoh waits for the end of the heartbeat's task, which is not allowed on a thread of an asynchronous runtime.
         let parts = self.parts.take();
         std::thread::spawn(move || drop(parts));
     }

@@ -73,8 +73,7 @@ impl Handler<Requested> for ServiceBridge {
             args: translation::arguments(self.service.fields(), &mut read),
         });
         let interface = Rc::clone(&self.interface);
-        // This task is independent of the actor, so the request is answered even after the actor
-        // has ended.
+        // This task is independent of the actor, so the request is answered even after the actor has ended.
         actix_rt::spawn(async move {
             match asked.await {
                 Ok(Ok(answer)) => reply(request, &interface, answer),

@@ -16,8 +16,7 @@ const UNBOUNDED: u32 = 144;
 /// The number of a type that has fields.
 const NESTED: u32 = 1;
 
-/// The hash of a type: `RIHS01_` and 64 digits. Inner types that are not in the catalog are searched in
-/// `beside`.
+/// The hash of a type: `RIHS01_` and 64 digits. Inner types that are not in the catalog are searched in `beside`.
 #[must_use]
 pub fn type_hash(first: Type, beside: &[Type]) -> String {
     let digest = Sha256::digest(description(first, beside));

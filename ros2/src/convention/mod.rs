@@ -43,8 +43,7 @@ impl EndpointKind {
         }
     }
 
-    /// Reliability, durability, history and depth, deadline, lifespan, liveliness. Empty means the
-    /// default.
+    /// Reliability, durability, history and depth, deadline, lifespan, liveliness. Empty means the default.
     fn qos(self) -> String {
         match self {
             Self::LatchedPublisher => ":1:,1:,:,:,,".to_owned(),

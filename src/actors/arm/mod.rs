@@ -1,5 +1,4 @@
-//! The arm and the nodes that drive it: simulation, inverse kinematics, goals, paths and timed
-//! trials.
+//! The arm and the nodes that drive it: simulation, inverse kinematics, goals, paths and timed trials.
 //!
 //! **Invariant:** only `sim` steps the arm. The others send it messages.
 

@@ -25,8 +25,7 @@ const EXTENSION: &str = "mcap";
 /// Destination of a record.
 pub(super) struct TapeTarget {
     pub(super) path: PathBuf,
-    /// Size limit in bytes, with which other records in the folder are also counted; `None` for the operator's
-    /// own.
+    /// Size limit in bytes, with which other records in the folder are also counted; `None` for the operator's own.
     pub(super) limit: Option<u64>,
 }
 
@@ -224,8 +223,7 @@ fn take_entries(
             Ok(entry) => {
                 counts.written(entry.content.allocated());
                 match scribe.write(&entry) {
-                    // A frame that cannot be read back is a fault of the runtime, but does not end the
-                    // record.
+                    // A frame that cannot be read back is a fault of the runtime, but does not end the record.
                     Err(error @ RecordError::Frame(_)) => {
                         tracing::warn!(%error, "a message is not recorded");
                     }

@@ -12,8 +12,7 @@ use std::time::{Duration, Instant};
 
 use crate::actors::resources::work_clock;
 
-/// Longer than the time between two calls of a client on the same machine, and short compared with a
-/// tick.
+/// Longer than the time between two calls of a client on the same machine, and short compared with a tick.
 pub const MOMENT: Duration = Duration::from_micros(50);
 
 thread_local! {

@@ -1,5 +1,4 @@
-//! Priorities of threads, if there are more threads than cores: the arm and the gateway before work for one
-//! client.
+//! Priorities of threads, if there are more threads than cores: the arm and the gateway before work for one client.
 //!
 //! **Invariant:** a thread lowers its priority once, when it starts.
 

@@ -126,8 +126,7 @@ impl ActionClient {
         });
     }
 
-    /// Sends the reason why the goal was not accepted. In this case clients expect a text in
-    /// `values`.
+    /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.
     pub fn refuse(&self, why: &str) {
         self.conclude(why.to_owned(), GoalStatus::Unknown);
     }

@@ -149,8 +149,7 @@ impl Caller {
         Ok(())
     }
 
-    /// Sends the caller a status, before the answer, with the reason why the request has no effect
-    /// yet.
+    /// Sends the caller a status, before the answer, with the reason why the request has no effect yet.
     pub(super) fn warn(&self, why: &str) {
         let status = Respond::status(self.connection, Level::Warning, why, self.id());
         self.registry.do_send(status);

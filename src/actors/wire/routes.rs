@@ -1,5 +1,4 @@
-//! The table of routes: the node that serves a service or an action, and that subscribes to or
-//! publishes a topic.
+//! The table of routes: the node that serves a service or an action, and that subscribes to or publishes a topic.
 //!
 //! **Invariant:** arguments are read here or aside, never on the thread of the node.
 
@@ -79,8 +78,7 @@ impl Nodes {
     }
 }
 
-/// Reads arguments of `length` bytes. Long ones are read on another thread, while the client's next
-/// frames wait.
+/// Reads arguments of `length` bytes. Long ones are read on another thread, while the client's next frames wait.
 pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
     if length > LONG_ARGUMENTS {
         // The task is boxed, so only one kind is compiled, and not one for each service.

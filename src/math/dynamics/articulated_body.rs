@@ -240,8 +240,7 @@ impl<T: Number> Carried<T> {
         }
     }
 
-    /// The acceleration of the tip that carries this, as a function of its joint's acceleration,
-    /// times `W`.
+    /// The acceleration of the tip that carries this, as a function of its joint's acceleration, times `W`.
     #[inline(always)]
     fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
         Hinge {

@@ -11,8 +11,7 @@
 //! | q̈ | joint accelerations | n, rad/s² | [`textbook`], [`forward_dynamics`] |
 //!
 //! [`textbook`] evaluates this equation directly. The arm itself steps with [`forward_dynamics`], a recursion
-//! along the links. It needs no matrix and loses up to ten digits less on uneven arms. A test compares the
-//! two.
+//! along the links. It needs no matrix and loses up to ten digits less on uneven arms. A test compares the two.
 //!
 //! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i` with unit vectors `u_i = (cos φ_i, sin φ_i)`,
 //! the Lagrangian is

@@ -9,8 +9,7 @@ use super::program::{Arity, Operation, Precedence};
 
 /// A part that is still to be written.
 enum Part {
-    /// The operand that ends at this operation. It gets parentheses if its level is below the given
-    /// one.
+    /// The operand that ends at this operation. It gets parentheses if its level is below the given one.
     Operand {
         root: usize,
         level: Precedence,

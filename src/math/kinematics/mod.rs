@@ -109,8 +109,7 @@ pub enum Unreachable {
         /// `l1 + l2` \[m\].
         limit: f64,
     },
-    /// With this orientation the last link would have to start nearer to the base than the others can
-    /// fold.
+    /// With this orientation the last link would have to start nearer to the base than the others can fold.
     #[error(
         "phi = {} puts the wrist {} m from the base, closer than the {} m to which links 1 and 2 can fold",
         Shown(*.phi), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)

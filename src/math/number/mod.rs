@@ -21,8 +21,7 @@ pub(super) use register::{Wide, apart};
 #[cfg(feature = "batch")]
 pub use registers::Registers;
 
-/// An array with an entry for each `$i`. Its length is that of the destination; `$any` is any number of the
-/// type.
+/// An array with an entry for each `$i`. Its length is that of the destination; `$any` is any number of the type.
 ///
 /// A loop replaces [`std::array::from_fn`], because the compiler may compile its closures as separate functions. The
 /// wide registers are not enabled there, and every operation would be a call.

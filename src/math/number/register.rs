@@ -95,8 +95,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     }
 }
 
-/// Runs a closure with the machine's registers enabled, in a separate function that is compiled once for all
-/// callers.
+/// Runs a closure with the machine's registers enabled, in a separate function that is compiled once for all callers.
 #[inline(never)]
 pub(in crate::math) fn apart<S: Simd, R>(simd: S, work: impl FnOnce() -> R) -> R {
     simd.vectorize(work)

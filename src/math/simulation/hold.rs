@@ -12,8 +12,7 @@ use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::pid::{Control, Pid};
 
-/// Most steps of a control period. Whole numbers up to it are exact as `f64`, and so many steps
-/// take years.
+/// Most steps of a control period. Whole numbers up to it are exact as `f64`, and so many steps take years.
 const MOST_STEPS: u64 = 1 << 53;
 
 /// The time between two runs of the law, and whether their results are delayed.
@@ -133,8 +132,7 @@ impl<const N: usize> Hold<N> {
         });
     }
 
-    /// The control for the step that begins now, from `state`, and the held values after it. The law runs if it is
-    /// due.
+    /// The control for the step that begins now, from `state`, and the held values after it. The law runs if it is due.
     #[must_use]
     pub fn begin_step(&self, pid: &Pid<N>, state: &State<N>) -> (Control<N>, Held<N>) {
         let mut held = self.held;

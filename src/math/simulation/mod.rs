@@ -139,8 +139,7 @@ impl<const N: usize> Simulation<N> {
         self.advance(1) == 1
     }
 
-    /// Takes up to `steps` steps and returns their number: all of them, unless the simulation diverges
-    /// or has diverged.
+    /// Takes up to `steps` steps and returns their number: all of them, unless the simulation diverges or has diverged.
     pub fn advance(&mut self, steps: u64) -> u64 {
         self.advance_with(steps, |_| ControlFlow::Continue(()))
     }
@@ -266,8 +265,7 @@ impl<const N: usize> Simulation<N> {
         control
     }
 
-    /// Adds the disturbance to the effort of the step that begins now, or ends the disturbance if its
-    /// time is over.
+    /// Adds the disturbance to the effort of the step that begins now, or ends the disturbance if its time is over.
     #[cold]
     fn add_disturbance(&mut self, effort: &mut [f64; N]) {
         match self.disturbance {

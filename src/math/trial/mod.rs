@@ -50,8 +50,7 @@ impl TrialClock {
         }
     }
 
-    /// This is a difference, not a running sum, so the rounding error does not grow with the number of
-    /// calls.
+    /// This is a difference, not a running sum, so the rounding error does not grow with the number of calls.
     fn elapsed(&self) -> f64 {
         self.carried + (self.latest - self.origin)
     }
@@ -112,8 +111,7 @@ pub struct Trial {
     targets_reached: u64,
     pursuit: Pursuit,
     view: View,
-    /// The number of goals sent so far. It never restarts, so an answer to an older start is
-    /// recognised.
+    /// The number of goals sent so far. It never restarts, so an answer to an older start is recognised.
     tickets: u64,
 }
 
@@ -330,8 +328,7 @@ impl Trial {
         match conclusion.outcome {
             Outcome::Reached => {
                 self.targets_reached += 1;
-                // The status shows this until the next goal is accepted, so that clients can see
-                // it.
+                // The status shows this until the next goal is accepted, so that clients can see it.
                 self.view.action_status = ActionStatus::Reached;
                 self.view.error = Some(conclusion.final_distance);
                 let next = sample().map(|target| self.ask(target, 1));
@@ -352,8 +349,7 @@ impl Trial {
 
     /// Drops the present goal and pursues `target`.
     fn replace(&mut self, target: Target) -> Vec<TrialCommand> {
-        // The new goal preempts the old one only if it is accepted, so the old one is cancelled
-        // first.
+        // The new goal preempts the old one only if it is accepted, so the old one is cancelled first.
         let mut commands = self.abandon();
         commands.push(self.ask(target, 1));
         // The status shows the target once its goal has been accepted, with that goal's setpoint.

@@ -55,8 +55,7 @@ impl Changes {
 /// An action for the actor of the trial. Several actions are executed in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TrialCommand {
-    /// Cancel this goal. The id prevents cancelling another client's goal. A rejection means that it has
-    /// already ended.
+    /// Cancel this goal. The id prevents cancelling another client's goal. A rejection means that it has already ended.
     CancelGoal {
         /// The goal's id.
         goal_id: String,

@@ -1,5 +1,4 @@
-//! The catalog: every node, topic, service and action of the runtime, with its name, type, direction, owner and
-//! fields.
+//! The catalog: every node, topic, service and action of the runtime, with its name, type, direction, owner and fields.
 //!
 //! The registry, the tables of docs/protocol.md and the tests are checked against it. No other file has names such
 //! as `/joint_states`. Fields are in documented order, which is also the order of a positional `args` array.

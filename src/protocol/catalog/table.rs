@@ -2,9 +2,8 @@
 //!
 //! **Invariant:** a table is an enum, so a `match` on rows must handle every row.
 
-/// Defines an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which returns the
-/// row. A variant after the rows holds another table. A row with `if` and a feature exists only with that
-/// feature.
+/// Defines an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which returns the row. A
+/// variant after the rows holds another table. A row with `if` and a feature exists only with that feature.
 macro_rules! table {
     (
         $(#[$about:meta])*

@@ -68,8 +68,7 @@ pub fn with_parts(first: Type) -> Vec<Type> {
     found
 }
 
-/// The text that defines a type and all types in it, in the format of `.msg` files, with units in
-/// comments.
+/// The text that defines a type and all types in it, in the format of `.msg` files, with units in comments.
 #[must_use]
 pub fn full_text(name: &str) -> Option<String> {
     find(name).map(definition)

@@ -286,8 +286,7 @@ impl Encoder {
 
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
-        // The frame may wait for long, and only its bytes are counted, so its spare capacity is
-        // freed.
+        // The frame may wait for long, and only its bytes are counted, so its spare capacity is freed.
         self.text.shrink_to_fit();
         Bytes::from(self.text)
     }

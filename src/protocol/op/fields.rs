@@ -285,8 +285,7 @@ impl<'a> Fields<'a> {
         Some(value)
     }
 
-    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's
-    /// name.
+    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
         self.rejections
             .refuse(&format!("{}{name}", self.prefix), reason);

@@ -32,8 +32,7 @@ pub use reader::{OPS, read, read_start};
 pub const MAX_ARGS: usize = 16 * 1024;
 /// Longest `throttle_rate`: a year, longer than any connection.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
-/// Largest `queue_length`. The [outbox](super::outbox) bounds held messages by bytes, and no message has fewer than
-/// 40.
+/// Largest `queue_length`. The [outbox](super::outbox) bounds held messages by bytes, and no message has fewer than 40.
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
 /// Longest `timeout` of a forwarded call: a day.
 pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
@@ -173,8 +172,7 @@ pub struct Subscribe {
     pub type_name: Option<String>,
     /// Least time between deliveries; zero for no throttling; at most [`MAX_THROTTLE`].
     pub throttle: Duration,
-    /// Most messages that may wait or be held by throttling; 0 if it is not given; at most
-    /// [`MAX_QUEUE_LENGTH`].
+    /// Most messages that may wait or be held by throttling; 0 if it is not given; at most [`MAX_QUEUE_LENGTH`].
     pub queue_length: usize,
     /// The form of its messages.
     pub encoding: Encoding,
@@ -193,8 +191,7 @@ pub struct Encoding {
 }
 
 impl Encoding {
-    /// Combines two subscriptions of one client: the denser encoding, the smaller pieces, and all
-    /// names of stamps.
+    /// Combines two subscriptions of one client: the denser encoding, the smaller pieces, and all names of stamps.
     #[must_use]
     pub fn merged(self, other: Self) -> Self {
         let compression = self.compression.max(other.compression);
@@ -276,8 +273,7 @@ pub enum Arguments {
     Object(Payload),
     /// Fields in documented order.
     Positional(Payload),
-    /// Any other value. The node that serves the call refuses it, because some services echo their values even
-    /// then.
+    /// Any other value. The node that serves the call refuses it, because some services echo their values even then.
     Neither(Payload),
 }
 

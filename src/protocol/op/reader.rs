@@ -515,8 +515,7 @@ impl OpReader<'_> {
 const USUAL: usize = 4 * 1024;
 
 impl OpReader<'_> {
-    /// The arguments. Long ones for a node of the runtime are reduced to its `fields`, which must not
-    /// be too long.
+    /// The arguments. Long ones for a node of the runtime are reduced to its `fields`, which must not be too long.
     fn args(&self, fields: Option<&'static [Field]>) -> Result<Arguments, Problem> {
         let Some(raw) = self.get("args") else {
             return Ok(Arguments::none());

@@ -137,8 +137,7 @@ impl Rejections {
         text::shortened(&sentences.join("; "), MAX_STATUS)
     }
 
-    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's
-    /// name.
+    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, field: &str, reason: &impl fmt::Display) {
         self.push(RejectedField::refused(field, reason));
     }

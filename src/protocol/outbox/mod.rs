@@ -39,8 +39,7 @@ pub const MAX_AGE: Duration = Duration::from_secs(1);
 /// The same after a message has been too old, until the queue is empty. The client is then slower than its topics.
 /// Its messages are late by this time and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
-/// Bytes counted for a waiting message besides its own: reference count, queue entry, and the allocator's
-/// overhead.
+/// Bytes counted for a waiting message besides its own: reference count, queue entry, and the allocator's overhead.
 pub const MESSAGE_BYTES: usize = 160;
 
 /// The outgoing queue of one connection.
@@ -129,8 +128,7 @@ impl Outbox {
         self.held_count > 0
     }
 
-    /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are
-    /// discarded.
+    /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
             self.take_held(topic);
@@ -410,8 +408,7 @@ impl Outbox {
         self.next_due().map(|(due, _)| due)
     }
 
-    /// The topic with the earliest due message, and its time. A client has at most about 200
-    /// topics.
+    /// The topic with the earliest due message, and its time. A client has at most about 200 topics.
     fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
         let limits = self.limits.iter();
         let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
@@ -502,8 +499,7 @@ impl Outbox {
         self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)
     }
 
-    /// Drops a message, or a whole series, except the newest of the topic. Returns `true` if nothing
-    /// is left.
+    /// Drops a message, or a whole series, except the newest of the topic. Returns `true` if nothing is left.
     fn drop_but_newest(&mut self, index: usize) -> bool {
         let mut rest = self.topics.range_mut(index..);
         let Some(message) = rest.next() else {

@@ -196,8 +196,7 @@ fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) 
     }
 }
 
-/// Writes any JSON value. The recursion is as deep as a frame may be nested, which the frame's reader has
-/// checked.
+/// Writes any JSON value. The recursion is as deep as a frame may be nested, which the frame's reader has checked.
 fn untyped(out: &mut Sink, value: Branch<'_, '_>) {
     match value.kind() {
         BranchKind::Null => out.push(NULL),

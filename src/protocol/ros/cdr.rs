@@ -184,11 +184,7 @@ mod tests {
         let expected = [&HEADER[..], &uuid, &[3, 0, 0, 0, 4, 0, 0, 0, 255]].concat();
         assert_eq!(encode(one, &msg), expected);
         let cut = json!({"goal_info": {"goal_id": {"uuid": [7]}}});
-        assert_eq!(
-            encode(one, &cut)[4..8],
-            [7, 0, 0, 0],
-            "absent fields are 0"
-        );
+        assert_eq!(encode(one, &cut)[4..8], [7, 0, 0, 0], "absent fields are 0");
     }
 
     #[test]

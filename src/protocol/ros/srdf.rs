@@ -9,8 +9,7 @@ use crate::protocol::messages::scene::{END_EFFECTOR, WORLD, link_name};
 /// The name of the group.
 const GROUP: &str = "arm";
 
-/// The semantic description of an arm with these joints. Links can pass through each other, so no collision is
-/// checked.
+/// The semantic description of an arm with these joints. Links can pass through each other, so no collision is checked.
 #[must_use]
 pub fn describe_semantics(joint_names: &[&str]) -> String {
     let mut xml = format!(

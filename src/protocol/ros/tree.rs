@@ -50,8 +50,7 @@ impl<'a> MessageTree<'a> {
     #[must_use]
     pub fn room(text: &[u8]) -> usize {
         let is_in_front = |byte: &u8| u8::from(matches!(byte, b',' | b':' | b'[' | b'{'));
-        // The counts of a chunk are sums in bytes, so many are added at a time. No chunk has more
-        // than 255 of them.
+        // The counts of a chunk are sums in bytes, so many are added at a time. No chunk has more than 255 of them.
         let chunks = text.chunks(usize::from(u8::MAX));
         let counts = chunks.map(|chunk| chunk.iter().map(is_in_front).sum::<u8>());
         let in_front: usize = counts.map(usize::from).sum();
@@ -61,8 +60,7 @@ impl<'a> MessageTree<'a> {
     /// Reads a JSON text.
     ///
     /// # Errors
-    /// If it is not JSON, is nested deeper than 127 levels, or has a number beyond the range of
-    /// doubles.
+    /// If it is not JSON, is nested deeper than 127 levels, or has a number beyond the range of doubles.
     pub fn read(text: &'a [u8]) -> Result<Self, serde_json::Error> {
         let mut nodes = Vec::with_capacity(Self::room(text) / NODE_BYTES);
         let mut reader = serde_json::Deserializer::from_slice(text);
@@ -235,8 +233,7 @@ impl<'t, 'a> Branch<'t, 'a> {
         found.last().map(|(_, value)| value)
     }
 
-    /// The value at that path. Each part is a slash with the name of a member, or `0` for an array's first
-    /// entry.
+    /// The value at that path. Each part is a slash with the name of a member, or `0` for an array's first entry.
     #[must_use]
     pub fn pointer(self, way: &str) -> Option<Self> {
         way.split('/')

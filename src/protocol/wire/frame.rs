@@ -131,8 +131,7 @@ impl FrameReader {
         self.buffer.capacity()
     }
 
-    /// Whether a frame has begun and not ended. A skipped frame does not count, because none of it is
-    /// kept.
+    /// Whether a frame has begun and not ended. A skipped frame does not count, because none of it is kept.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         matches!(self.state, Within::Object | Within::Line)
@@ -149,8 +148,7 @@ impl FrameReader {
         error
     }
 
-    /// Moves the incomplete frame to the front of the buffer once the finished part is longer: constant time per
-    /// byte.
+    /// Moves the incomplete frame to the front of the buffer once the finished part is longer: constant time per byte.
     fn compact(&mut self) {
         let rest = self.buffer.len() - self.start;
         if self.start < rest {
@@ -343,8 +341,7 @@ const fn is_space(byte: u8) -> bool {
 pub struct Frame {
     /// The text, with `NaN` and its like made [acceptable](json::accept_literals).
     pub text: String,
-    /// Whether a line end was right after it. Older raw-TCP clients send none, and need each frame in a separate
-    /// write.
+    /// Whether a line end was right after it. Older raw-TCP clients send none, and need each frame in a separate write.
     pub newline: bool,
 }
 
@@ -377,8 +374,7 @@ pub enum FrameError {
     /// Text after the one object of a message.
     #[error("malformed frame: a message must be one JSON object, but more text follows it")]
     MoreBehind,
-    /// Longer than the limit, which it holds. The limit is [`MAX_FRAME`], unless the reader has
-    /// another.
+    /// Longer than the limit, which it holds. The limit is [`MAX_FRAME`], unless the reader has another.
     #[error("frame longer than {0} bytes, skipped")]
     TooLong(usize),
     /// Not UTF-8.
@@ -517,8 +513,7 @@ struct Nesting {
     brackets: u128,
     in_string: bool,
     escaped: bool,
-    /// Whether there was an `N` or an `I` outside strings. Only then can there be a `NaN` or an
-    /// `Infinity`.
+    /// Whether there was an `N` or an `I` outside strings. Only then can there be a `NaN` or an `Infinity`.
     has_literals: bool,
 }
 

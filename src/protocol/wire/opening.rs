@@ -58,8 +58,7 @@ const METHODS: [&[u8]; 10] = [
 ];
 /// The first bytes of a TLS record with a hello.
 const TLS_HELLO: &[u8] = &[0x16, 0x03];
-/// A BSON document begins with its length in four bytes, little-endian. Below 16 MiB one of them is
-/// 0.
+/// A BSON document begins with its length in four bytes, little-endian. Below 16 MiB one of them is 0.
 const BSON_LENGTH: usize = 4;
 
 /// Determines the protocol from all bytes sent so far.

@@ -23,8 +23,7 @@ const MIDDLE: &[u8] = b"\",\"msg\":{";
 const END: &[u8] = b"}\n";
 /// Longest number whose value is certainly finite: the largest `f64` has 309 digits.
 const MAX_DIGITS: usize = 308;
-/// Levels that fit into one word, including the message itself. The general reader handles deeper
-/// messages.
+/// Levels that fit into one word, including the message itself. The general reader handles deeper messages.
 const MAX_LEVELS: u32 = 60;
 
 /// Consecutive messages of a client on a topic of clients.
@@ -127,9 +126,8 @@ fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
     bytes.get(end..)?.starts_with(END).then(|| end + END.len())
 }
 
-/// The end of the JSON object whose brace is right before `at`. `None` if it is not valid or not complete, or if
-/// it needs the general reader: an escape, a byte beyond ASCII, an exponent, a very long number or very deep
-/// nesting.
+/// The end of the JSON object whose brace is right before `at`. `None` if it is not valid or not complete, or if it
+/// needs the general reader: an escape, a byte beyond ASCII, an exponent, a very long number or very deep nesting.
 fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
     // One bit per open level, 1 for a bracket. The leading 1 marks their number.
     let mut levels: u64 = 0b10;

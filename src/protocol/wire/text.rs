@@ -1,5 +1,4 @@
-//! Clients' text in messages of the runtime and in the log: shortened, with control characters
-//! escaped.
+//! Clients' text in messages of the runtime and in the log: shortened, with control characters escaped.
 //!
 //! **Invariant:** clients' text in a message of the runtime has a bounded length.
 

@@ -30,8 +30,7 @@ use crate::study::planner::{self, Candidate, PlanError, Planned, Task, plan};
 pub struct SuggestGains<const N: usize> {
     /// Time in which every move must settle \[s\], greater than 0.
     pub settling_time: Option<f64>,
-    /// The required ratio of the smallest timestep limit over all poses to the timestep, at least
-    /// 1.
+    /// The required ratio of the smallest timestep limit over all poses to the timestep, at least 1.
     pub margin: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub timestep: Option<f64>,

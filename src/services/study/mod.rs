@@ -18,8 +18,7 @@ use crate::math::arm::State;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 
-/// Bytes of the longest number with its comma, and of the number itself while the answer is
-/// computed.
+/// Bytes of the longest number with its comma, and of the number itself while the answer is computed.
 pub(crate) const NUMBER_BYTES: usize = 25 + 8;
 
 /// The computation of a call, done in pieces.

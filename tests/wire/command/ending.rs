@@ -84,7 +84,11 @@ fn server(says: &'static [u8], closes: bool) -> SocketAddr {
 fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
     for (says, closes, word) in [
         (&b""[..], true, "closed"),
-        (b"HTTP/1.1 400 Bad Request\r\n", false, "cannot read a frame"),
+        (
+            b"HTTP/1.1 400 Bad Request\r\n",
+            false,
+            "cannot read a frame",
+        ),
         (b"{\"op\":", true, "within a frame"),
         (b"[1, 2]\n", false, "cannot read a frame"),
         (b"", false, "no answer or message within 0.2 s"),

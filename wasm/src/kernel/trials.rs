@@ -16,8 +16,7 @@ use pendularm::services::trial::{NotStarted, STATUS_PERIOD, StartTrial, Terms, s
 use super::Kernel;
 
 impl<const N: usize> Kernel<N> {
-    /// Advances the trial to the present time, executes its commands, and passes it the news of its
-    /// goals.
+    /// Advances the trial to the present time, executes its commands, and passes it the news of its goals.
     pub(super) fn advance_trial(&mut self) {
         loop {
             let commands = self.trial.tick(self.arm.pose().simulated);

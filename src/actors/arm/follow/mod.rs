@@ -163,8 +163,7 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
 impl<const N: usize> Handler<Barrier> for PathFollower<N> {
     type Result = AtomicResponse<Self, ()>;
 
-    /// Checks the arm first: a reset may have ended the goal, and this must be sent before the reset is
-    /// answered.
+    /// Checks the arm first: a reset may have ended the goal, and this must be sent before the reset is answered.
     fn handle(&mut self, _: Barrier, _: &mut Context<Self>) -> Self::Result {
         if self.active.is_none() {
             return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));

@@ -1,5 +1,4 @@
-//! Goals on the arm: their start, their end, and the barriers before the arm reports that it is at
-//! rest.
+//! Goals on the arm: their start, their end, and the barriers before the arm reports that it is at rest.
 //!
 //! `ik_action` owns the goal and gets its news. `live/goals.rs` checks the steps.
 //!

@@ -1,5 +1,4 @@
-//! Messages between the arm and other nodes or the runtime. Requests that clients can also send are in
-//! `services`.
+//! Messages between the arm and other nodes or the runtime. Requests that clients can also send are in `services`.
 //!
 //! **Invariant:** every message is a plain value, independent of the actor that handles it.
 
@@ -71,9 +70,8 @@ pub struct TrackGoal<const N: usize> {
     pub owner: Recipient<GoalJudged<N>>,
 }
 
-/// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before
-/// it reports that it is at rest. Also from `ik_trial`, which so gets all news of goals that the arm sent before the
-/// time.
+/// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before it
+/// reports that it is at rest. Also from `ik_trial`, which so gets all news of goals that the arm sent before the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;

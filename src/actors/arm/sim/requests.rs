@@ -1,5 +1,4 @@
-//! Calls and messages of clients to the arm. The requests are in `services::arm`, and their effects in
-//! `live`.
+//! Calls and messages of clients to the arm. The requests are in `services::arm`, and their effects in `live`.
 //!
 //! **Invariant:** the arm advances to now before it answers.
 

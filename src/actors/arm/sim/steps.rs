@@ -27,8 +27,7 @@ impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
 impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
     type Result = ();
 
-    /// The steps do not depend on wall time, and the arm continues from their end when it is
-    /// resumed.
+    /// The steps do not depend on wall time, and the arm continues from their end when it is resumed.
     fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
         let asked = match self.arm.begin_steps(ask) {

@@ -26,8 +26,7 @@ use crate::options::MAX_CLIENTS;
 /// Most computations at once, waiting or running: one for each connection.
 pub const MAX_ADMITTED: usize = MAX_CLIENTS;
 /// The refusal when there are too many computations.
-pub const BUSY: &str =
-    "busy: too many computations of all clients wait; try again later";
+pub const BUSY: &str = "busy: too many computations of all clients wait; try again later";
 /// Pause between two tries of computations that cannot begin.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
 /// Computations that try at the same time.

@@ -1,7 +1,6 @@
 //! The arm's parameters in the form of a ROS 2 node: `/arm_sim/get_parameters` and the four other services.
 //!
-//! They are read and set by the arm's own requests, as in rosapi, with the same checks and the same
-//! messages.
+//! They are read and set by the arm's own requests, as in rosapi, with the same checks and the same messages.
 //!
 //! **Invariant:** the answer has one entry for each entry of the request, in the same order.
 

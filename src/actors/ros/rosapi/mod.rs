@@ -1,8 +1,7 @@
 //! `/rosapi/*`: lists topics, services, nodes and parameters. Topics and services of clients come from the
 //! registry; parameters and time come from the arm.
 //!
-//! Parameters are read and set by the arm's own requests, with the same checks and the same
-//! messages.
+//! Parameters are read and set by the arm's own requests, with the same checks and the same messages.
 //!
 //! **Invariant:** nothing is stored between two calls. Topics and services are requested from the registry, and
 //! values from the arm.
@@ -34,8 +33,7 @@ use crate::protocol::ros::urdf;
 
 /// Pause between two tries to reserve memory for a long list.
 const ROOM_RETRY: Duration = Duration::from_millis(10);
-/// The number of clients' topics, services and actions above which an answer may be too long to be written in
-/// one turn.
+/// The number of clients' topics, services and actions above which an answer may be too long to be written in one turn.
 const MANY: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------

@@ -264,8 +264,7 @@ impl<const N: usize> TfRepublisher<N> {
             let sources = sources.iter().map(String::as_str);
             seen_from(stamp, target, sources, &pose.lengths, &pose.positions)
         };
-        // A message is sent at the nearest tick: the next tick would be later than this one is
-        // early.
+        // A message is sent at the nearest tick: the next tick would be later than this one is early.
         let soon = now + PERIOD / 2;
         if let Some(due) = self.topic.as_mut().filter(|due| **due <= soon) {
             *due = next(*due, TOPIC_PERIOD, now);

@@ -4,9 +4,8 @@
 //! gravity or none has. State, parameters, gains, setpoint, timestep, disturbance and number of steps may differ.
 //! The number of lanes depends on the processor at run time: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
-//! The formulas are those of one arm, with another number type ([`crate::math::number`]): two registers at a
-//! time. A few such pairs take each step in turn, so the processor executes one pair while another waits for its
-//! results.
+//! The formulas are those of one arm, with another number type ([`crate::math::number`]): two registers at a time. A
+//! few such pairs take each step in turn, so the processor executes one pair while another waits for its results.
 //!
 //! **Invariant:** every simulation ends in the state of [`Simulation::advance`], bit for bit, in every batch.
 
@@ -77,8 +76,7 @@ impl Registers {
     }
 }
 
-/// Takes up to `steps` steps with every arm. An arm takes fewer steps only if it diverges or has
-/// diverged.
+/// Takes up to `steps` steps with every arm. An arm takes fewer steps only if it diverges or has diverged.
 ///
 /// ```
 /// use pendularm::math::{arm::Arm, pid::Gains, simulation::{Simulation, batch}};

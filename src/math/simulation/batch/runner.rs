@@ -85,8 +85,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
                 }
                 let mut next = lanes.next::<HAS_GRAVITY>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
-                    // This part is a separate function, so the loop's other values stay in
-                    // registers.
+                    // This part is a separate function, so the loop's other values stay in registers.
                     let mut parted = next;
                     let first = index * Wide::<S, K>::LANES;
                     part(lanes, &mut parted, &mut self.jobs[first..], step);

@@ -12,8 +12,7 @@ use crate::protocol::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
 use crate::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
 use crate::protocol::names;
 
-/// Most topics of clients in one answer, and most services: more than a screen shows. The first by name are
-/// listed.
+/// Most topics of clients in one answer, and most services: more than a screen shows. The first by name are listed.
 pub const MAX_LISTED: usize = 4096;
 
 /// The topics, services and actions that clients have registered, at most [`MAX_LISTED`] of each. Names are shared

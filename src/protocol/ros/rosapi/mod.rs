@@ -38,8 +38,7 @@ pub enum AnswerError {
     OfTheArm,
 }
 
-/// The `values` for a call about `asked`, the name in its request; `asked` is empty if the request has no
-/// name.
+/// The `values` for a call about `asked`, the name in its request; `asked` is empty if the request has no name.
 ///
 /// # Errors
 /// If the type is unknown, or if the call is for the arm.
