@@ -1,5 +1,5 @@
-# shellcheck shell=bash Source this in scripts that test a program. They define `work`, a separate folder, and
-# `fail`, and end with `stop_program`.
+# shellcheck shell=bash
+# Source this in scripts that test a program. They define `work`, a separate folder, and `fail`, and end with `stop_program`.
 server=
 
 stop_program() {
