@@ -1,7 +1,7 @@
-//! Gives the program its version: the package's, and the commit that a release build is made from.
+//! Sets the program's version: the package's version, and the commit of a release build.
 //!
-//! The commit comes from the file `COMMIT` of a packed archive, or else from git. Where neither says, it is left out.
-//! Development builds leave it out too, because every commit would compile everything again.
+//! The commit comes from the file `COMMIT` of a packed archive, or else from git. If neither has it, it is omitted.
+//! Development builds omit it too, because otherwise every commit would recompile everything.
 
 use std::env;
 use std::fs;
@@ -12,7 +12,7 @@ use std::process::Command;
 const COMMIT: &str = "COMMIT";
 /// The files on which the program depends.
 const SOURCES: [&str; 5] = ["src", "page", "build.rs", "Cargo.toml", "Cargo.lock"];
-/// Git's files that tell of a commit or a checkout.
+/// Git's files that change with a commit or a checkout.
 const HEADS: [&str; 3] = ["HEAD", "logs/HEAD", "packed-refs"];
 
 fn main() {
@@ -24,7 +24,7 @@ fn main() {
     println!("cargo:rustc-env=PENDULARM_VERSION={version}{commit}");
 }
 
-/// Has this run again when the file changes. One that is missing would have it run at every build.
+/// Runs this again when the file changes. A missing file would run it at every build, so it is not listed.
 fn watch(path: &str) {
     if Path::new(path).exists() {
         println!("cargo:rerun-if-changed={path}");
@@ -40,7 +40,7 @@ fn packed() -> Option<String> {
 }
 
 fn of_git() -> Option<String> {
-    // An unpacked archive may lie in somebody else's repository.
+    // An unpacked archive may be inside another repository.
     let top = fs::canonicalize(git(&["rev-parse", "--show-toplevel"])?).ok()?;
     if top != env::current_dir().ok()?.canonicalize().ok()? {
         return None;

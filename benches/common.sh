@@ -1,11 +1,12 @@
-# Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
-# Needs: `root` (this project). Sets: `benches`, `target`, `built`, `core`. A kept run names the processor, never the machine or a path.
+# Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: the folder of results, and the
+# environment of a measurement. Needs: `root` (this project). Sets: `benches`, `target`, `built`, `core`. A kept run
+# names the processor, never the machine or a path.
 
 benches=$root/benches
 target=${CARGO_TARGET_DIR:-$root/target}
 built=$target/release
 
-# ARGS=--quick is a form for CI, in which no figure means anything.
+# ARGS=--quick is for CI. Its figures have no meaning.
 quick=
 case " ${ARGS:-} " in *" --quick "*) quick=1 ;; esac
 
@@ -19,7 +20,7 @@ build() {
     fi
 }
 
-# The last core, which interrupts visit least; without taskset, wherever the system likes.
+# The last core, which has the fewest interrupts; without taskset, any core.
 core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
 pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
 
@@ -34,7 +35,7 @@ machine() {
     echo "$name-$(getconf _NPROCESSORS_ONLN)-cores" | tr '[:upper:]' '[:lower:]' | tr -cs 'a-z0-9\n' '-'
 }
 
-# Where this run writes: a kept folder with KEEP=1, else one that is forgotten.
+# The folder of this run: a kept one with KEEP=1, otherwise a temporary one.
 results_folder() {
     if [ "${KEEP:-}" = 1 ]; then
         mkdir -p "$benches/results/$(date +%F)-$(machine)"
@@ -45,7 +46,7 @@ results_folder() {
     fi
 }
 
-# Prints what the figures hang on. $1: the command that was given.
+# Prints the environment of the figures. $1: the given command.
 environment() {
     echo "command:   $1"
     echo "date:      $(date -u +%FT%TZ)"
@@ -65,7 +66,7 @@ install_peers() {
     [ ${#missing[@]} -gt 0 ] || return 0
     { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; } || fail "missing: ${missing[*]}; install Debian's packages of that name"
     say "installing ${missing[*]}"
-    # Programs to be started here, no services.
+    # They are used as programs, not as services.
     { apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install --quiet=2 --yes --no-install-recommends "${missing[@]}"; } \
         >"$scratch/apt.log" 2>&1 || { cat "$scratch/apt.log" >&2; fail "apt-get could not install ${missing[*]}"; }
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# `make bench`: every figure of our own, one after another, on the release build. `make bench-peers` compares with others.
-# Ends in a table of figures and bars. ARGS=--quick is a short pass for CI. KEEP=1 keeps the output, with what it hangs on, in benches/results/<date>-<processor>/.
+# `make bench`: all figures of pendularm itself, one after another, on the release build. `make bench-peers` compares
+# with others. It ends with a table of figures and bars. ARGS=--quick is a short run for CI. KEEP=1 keeps the output
+# with its environment in benches/results/<date>-<processor>/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"
@@ -19,7 +20,7 @@ program=$built/pendularm
 folder=$(results_folder)
 environment "make bench" >"$folder/environment.txt"
 
-# The ratio of medians wanders with where the system puts the servers' threads, so several rounds, each with new servers.
+# The ratio of medians depends on the cores of the servers' threads, so there are several rounds, each with new servers.
 roundtrips() {
     local round
     for round in 1 2 3 4 5; do
@@ -28,7 +29,7 @@ roundtrips() {
     done
 }
 
-# Figures next to what they should be. "Missed" may be the machine's doing: see the load.
+# Figures beside their bars. A busy machine may cause "missed": see the load.
 summary() {
     awk -v folder="$folder" '
         function verdict(name, figure, bar, good) { printf "%-62s %10s   %-18s  %s\n", name, figure, bar, good ? "held" : "MISSED" }

@@ -1,6 +1,6 @@
-// Actions on all settings at once: the page applies them, undoes the last change, goes back to the defaults, sets a scene;
-// and the reset that belongs to it.
-// Invariant: every change can be undone, and what the runtime refused is said.
+// Actions on all settings at once: apply them, undo the last change, return to the defaults, set a scene; and the matching
+// reset.
+// Invariant: every change can be undone, and refusals are shown.
 
 import { announce, byId } from "./dom.js";
 import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, setState } from "./runtime.js";
@@ -10,7 +10,7 @@ import { state, tell, watch } from "./store.js";
 const undo = new Undo();
 let applying = false;
 
-/** Before any change that the page makes. */
+/** Call this before every change by the page. */
 export function remember() {
   if (applying) return;
   undo.remember(presentSettings(state), performance.now());
@@ -42,7 +42,7 @@ export async function takeBack() {
   announce("Undone.");
 }
 
-/** Applies what is given, and gives the refusals. The controller comes last, so that it never acts on half of the settings. */
+/** Applies the given settings, and returns the refusals. The controller is last, so it never acts with half of the settings. */
 export async function apply(/** @type {import("./settings.js").Settings} */ { integrator, params, gains, period, controller, setpoint, start }) {
   applying = true;
   tell("anew");
@@ -59,12 +59,12 @@ export async function apply(/** @type {import("./settings.js").Settings} */ { in
   return answers.filter((answer) => !answer.result).map((answer) => answer.status);
 }
 
-/** Sets all of the settings, from the starting pose, then running or paused; gives the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
+/** Sets all settings, from the starting pose, then running or paused. Returns the refusals. @param {import("./settings.js").Settings} settings @param {boolean} paused */
 export async function setScene({ controller, setpoint, ...rest }, paused) {
   await enable(false);
   const refusals = await apply({ ...rest, controller: null, setpoint: null });
   const answer = await reset();
-  // A reset takes the setpoint to the starting pose, so it is sent after it.
+  // A reset changes the setpoint to the starting pose, so the setpoint is sent after it.
   refusals.push(...await apply({ integrator: null, params: null, gains: null, period: null, controller, setpoint }));
   if (state.paused !== paused) await pause(paused);
   return answer.result ? refusals : [...refusals, answer.status];
@@ -77,13 +77,13 @@ export async function resetArm() {
   return answer;
 }
 
-/** The way out of a blow-up in one click: a smaller timestep, then the reset; everything else stays, the setpoint too. */
+/** Recovers from a divergence in one click: a smaller timestep, then a reset. Everything else stays, including the setpoint. */
 export async function recover(timestep) {
   const set = await setIntegrator({ timestep });
   return set.result ? beginAnew() : set;
 }
 
-/** From the starting pose with all settings as they are; the setpoint stays too. */
+/** Restarts from the starting pose with the present settings, including the setpoint. */
 export async function beginAnew() {
   const setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;
   const answer = await reset();

@@ -1,6 +1,6 @@
 // Pointing at the arm's canvas: a drag sends goals for the end effector, places the setpoint, or lifts the arm itself.
-// Arrow keys do the same for those who use no pointer.
-// Invariant: one request at a time leaves while aiming, at a bounded rate, and the last place is always sent.
+// Arrow keys do the same without a pointer.
+// Invariant: while aiming, one request is sent at a time, at a bounded rate, and the last position is always sent.
 
 import { warn } from "./dom.js";
 import { endEffector, showAim, toWorld } from "./arm_view.js";
@@ -11,14 +11,14 @@ import { cancelGoal, sendGoal, sendSetpoint, setState, solve } from "./runtime.j
 import { state } from "./store.js";
 
 const INTERVAL_MS = 100;
-/** Between two requests a lifted arm falls: in so short a time by a few millimetres [ms]. */
+/** Time between two requests. A lifted arm falls a few millimetres in it [ms]. */
 const LIFT_MS = 20;
 const ARROW_M = 0.05;
-/** A finger covers this much around its middle. */
+/** The radius that a finger covers [px]. */
 const FINGER_PX = 36;
-/** A finger that moved less has tapped. */
+/** A finger that moved less counts as a tap [px]. */
 const TAP_PX = 10;
-/** After the last arrow key the place counts as chosen. */
+/** Time after the last arrow key until the position counts as chosen. */
 const SETTLE_MS = 600;
 
 /** @typedef {"goal" | "setpoint" | "arm"} Mode what a drag moves */
@@ -26,13 +26,13 @@ const SETTLE_MS = 600;
 let aim = null;
 let pointer = null;
 let settle = 0;
-let lastPlace = null; // of those sent, or about to be
+let lastPlace = null; // of the sent or next request
 
 const send = latestOnly(async (place) => {
   report(place, place.mode === "setpoint" ? await placeSetpoint(place) : await sendGoal({ ...goalOptions(), x: place.x, y: place.y }));
 }, INTERVAL_MS);
 
-/** Puts the arm where the pointer is, and keeps it there until it is let go. */
+/** Moves the arm to the pointer, and holds it there until it is released. */
 const lift = latestOnly(async (place) => {
   report(place, await putArm(place));
   if (aim?.mode === "arm" && !place.refused) lift(lastPlace);
@@ -51,13 +51,13 @@ function report(place, answer) {
   }
 }
 
-/** A target that was refused stays in sight for a moment, so that one sees what was meant. */
+/** A refused target stays visible for a moment, so the user sees it. */
 function finish(place) {
   showAim(place.refused ? place : null);
   if (place.refused) setTimeout(() => { if (!aim && lastPlace === place) showAim(null); }, 1500);
 }
 
-/** The pose with the end effector at a place, within half a turn of where each joint is; a diverged arm has lost count of turns. */
+/** The pose with the end effector at a position, each joint within half a turn of its present angle. A diverged arm has no useful count of turns. */
 async function poseAt({ x, y }) {
   const answer = await solve({ x, y });
   return { answer, pose: answer.values.positions?.map((q, i) => (state.diverged ? q : nearestTurn(q, state.position[i]))) };
@@ -94,14 +94,14 @@ function moveTo(wished, mode) {
 
 function end() {
   pointer = null;
-  // Once more at rest, since it has begun to fall.
+  // Sent once more at rest, because the arm has begun to fall.
   if (aim?.mode === "arm") lift(lastPlace);
   aim = null;
-  // Otherwise the answer to the last place, which is still to come, takes the mark away.
+  // Otherwise the pending answer to the last position removes the mark.
   if (lastPlace?.answered) finish(lastPlace);
 }
 
-/** The mode chosen beside the view, since a touch screen has no keys; shift means the setpoint. @returns {Mode} */
+/** The mode chosen beside the view, because a touch screen has no keys. Shift means the setpoint. @returns {Mode} */
 function modeOf(event) {
   /** @type {HTMLInputElement} */
   const chosen = document.querySelector("input[name=drag]:checked");
@@ -123,7 +123,7 @@ export function startAim(canvas) {
     const box = canvas.getBoundingClientRect();
     return toWorld(event.clientX - box.left, event.clientY - box.top);
   };
-  // A finger that begins on the end effector drags it; anywhere else it scrolls the page, and a tap chooses the place.
+  // A finger that starts on the end effector drags it. Elsewhere it scrolls the page, and a tap chooses the position.
   let tap = null;
   canvas.addEventListener("touchstart", (event) => { if (isOnEnd(canvas, event.touches[0])) event.preventDefault(); }, { passive: false });
   canvas.addEventListener("pointerdown", (event) => {

@@ -1,6 +1,6 @@
-// The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves.
-// World coordinates are metres, x to the right and y up, the base in the middle.
-// Invariant: nothing is drawn while nothing is seen to change. All that lies behind the arm is drawn ten times a second at most.
+// The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves. World
+// coordinates are metres, x to the right and y up, the base in the middle.
+// Invariant: nothing is drawn without a visible change. Everything behind the arm is drawn at most ten times a second.
 
 import { arrowHead, circle, DASHED, line, links, write as writeText } from "./chart.js";
 import { fixed, significant } from "./format.js";
@@ -11,11 +11,11 @@ import { onFrame, Surface, wake } from "./surface.js";
 import { colors } from "./theme.js";
 import { drawTrail, SECONDS as TRAIL_SECONDS } from "./trail.js";
 
-/** A joint that would be seen elsewhere by less has not moved [px]. */
+/** A joint that moves less on the screen counts as not moved [px]. */
 const SEEN = 0.1;
 const NO_DASH = [];
 const BOTH_WAYS = [-1, 1];
-const ROOM = 1.14; // of the reach, so that circles and labels have space
+const ROOM = 1.14; // of the reach, as space for circles and labels
 const EFFORT_RADIUS = 19; // px
 
 const x = new Float64Array(MOST_LINKS + 1);
@@ -26,13 +26,13 @@ const REST = new Float64Array(MOST_LINKS); // stretched along +x, where the grav
 
 let surface;
 let context;
-let behind; // all that lies behind the arm: grid, circles, trail and ghost
+let behind; // everything behind the arm: grid, circles, trail and ghost
 let behindTime = NaN;
 let stale = true;
 let behindStale = true;
-let fullEffort = 1; // N m, all that gravity could ask for
+let fullEffort = 1; // N m, the largest gravity load
 let scale = 100; // pixels per metre
-/** Where the pointer aims, while it does: { x, y, phi, mode, refused }; see `aim.js`. */
+/** The aimed position of the pointer, while it aims: { x, y, phi, mode, refused }; see `aim.js`. */
 let aim = null;
 
 export function startArmView(canvas) {
@@ -51,12 +51,12 @@ export function redraw() {
   wake();
 }
 
-/** The trail moves on, if time does; between, only its latest piece is drawn. */
+/** The trail is updated when time advances. In between only its latest piece is drawn. */
 export function redrawTrail() {
   if (behindTime !== state.time) redraw();
 }
 
-/** Whether the arm would be seen otherwise than it was drawn last. */
+/** Whether the arm looks different from its last drawing. */
 export function hasMoved() {
   const pixels = scale * reach(lengths());
   for (let i = 0; i < state.links; i += 1) {
@@ -88,13 +88,13 @@ function resized() {
   redraw();
 }
 
-/** Metres from the base, for a place on the canvas in CSS pixels; rounded to a tenth of a millimetre. */
+/** Metres from the base for a position on the canvas in CSS pixels, rounded to a tenth of a millimetre. */
 export function toWorld(px, py) {
   const round = (value) => Math.round(value * 1e4) / 1e4;
   return { x: round((px - surface.width / 2) / scale), y: round((surface.height / 2 - py) / scale) };
 }
 
-/** Where the end effector is [m]. */
+/** The position of the end effector [m]. */
 export function endEffector() {
   const n = state.links;
   joints(n, state.position, lengths(), x, y);
@@ -109,7 +109,7 @@ function py(metres) {
   return surface.height / 2 - metres * scale;
 }
 
-/** No more frame is needed after it. */
+/** No further frame is needed after it. */
 function drawArm() {
   if (!stale && !hasMoved()) return false;
   stale = false;
@@ -130,8 +130,7 @@ function drawArm() {
   return false;
 }
 
-/** Paints all that lies behind an arm of `n` links, 0 where it is not known. Between two paintings the trail's latest piece is drawn
- * on each frame. */
+/** Paints everything behind an arm of `n` links, 0 if unknown. Between two paintings each frame draws the trail's latest piece. */
 function paintBehind(n) {
   behindStale = false;
   const paint = behind.getContext("2d", { alpha: false });
@@ -172,7 +171,7 @@ function drawTarget(n) {
   context.globalAlpha = 1;
 }
 
-/** A thin line of what is left to go. */
+/** A thin line for the remaining distance. */
 function drawWay(n, target, color) {
   joints(n, state.position, lengths(), x, y);
   context.globalAlpha = 0.6;
@@ -204,7 +203,7 @@ function drawLinks(n) {
   joints(n, state.position, l, x, y);
   const room = Math.min(1, Math.min(surface.width, surface.height) / 420); // smaller on a telephone
   for (let i = 0; i < n; i += 1) {
-    // Heavier rods of the same length are drawn thicker, within reason.
+    // Heavier rods of the same length are drawn thicker, up to a limit.
     const thickness = room * Math.min(26, Math.max(7, 14 * Math.sqrt(state.params.masses[i] / l[i])));
     line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), colors.panel, thickness + 4);
     line(context, px(x[i]), py(y[i]), px(x[i + 1]), py(y[i + 1]), state.diverged ? colors.bad : colors.joints[i], thickness);
@@ -233,7 +232,7 @@ function base(room) {
   context.globalAlpha = 1;
 }
 
-/** Effort as an arc around its joint: counter-clockwise is positive, a half turn is all that gravity could ask for. */
+/** Effort as an arc around its joint: counter-clockwise is positive, and a half turn is the largest gravity load. */
 function drawEfforts(n, room) {
   context.lineWidth = 3;
   for (let i = 0; i < n; i += 1) {
@@ -251,7 +250,7 @@ function drawEfforts(n, room) {
   }
 }
 
-/** The clock stands over the upper end of the vertical axis [px]. */
+/** The clock covers the upper end of the vertical axis [px]. */
 const CLOCK = 56;
 const LABEL = "11px system-ui, sans-serif";
 
@@ -281,7 +280,7 @@ function drawGrid(context) {
   context.font = LABEL;
   context.fillStyle = colors.muted;
   context.lineWidth = 1;
-  // All lines first, so that none crosses out a label.
+  // All lines first, so that no line crosses a label.
   for (const [labels, size, vertical] of [[false, width, true], [false, height, false], [true, width, true], [true, height, false]]) {
     const most = Math.floor(size / 2 / scale / metres);
     for (let i = -most; i <= most; i += 1) {
@@ -300,7 +299,7 @@ function drawGrid(context) {
   }
 }
 
-/** Text with a rim of the background, so that lines behind it do not cross it out. */
+/** Text with an outline in the background's colour, so that it is readable over lines. */
 function write(context, text, x, y) {
   context.strokeStyle = colors.page;
   context.lineWidth = 4;

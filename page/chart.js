@@ -1,7 +1,6 @@
-// One chart: a frame with two scales, their marks and titles; in it lines, areas, dots. The strokes that other pictures use; and
-// charts of what they are given: a map of limits, bars of a deviation, two errors, the arm of a scene.
-// Invariant: it draws on any context, of the screen or of a picture to be saved. Axes are fixed where a student compares one setting
-// with the next.
+// One chart: a frame with two scales, marks and titles, and lines, areas and dots in it. Also the strokes of other pictures,
+// and four charts: a map of limits, bars of a deviation, two errors, the arm of a scene.
+// Invariant: it draws on any context, of the screen or of a saved picture. Axes are fixed where a student compares settings.
 
 import { significant } from "./format.js";
 import { joints, reach } from "./mechanics.js";
@@ -38,7 +37,7 @@ export function links(context, n, x, y, px, py, color, width) {
   context.stroke();
 }
 
-/** A circle; filled with `fill`, its edge in `edge`, where they are given. @param {any} context @param {number} x @param {number} y @param {number} radius @param {string} fill */
+/** A circle, filled with `fill`. @param {any} context @param {number} x @param {number} y @param {number} radius @param {string} fill */
 export function circle(context, x, y, radius, fill, edge = "", width = 1) {
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);
@@ -52,7 +51,7 @@ export function circle(context, x, y, radius, fill, edge = "", width = 1) {
   context.stroke();
 }
 
-/** Filled as the context is. @param {any} context @param {number} tipX @param {number} tipY @param {number} angle @param {number} size */
+/** Filled with the context's fill style. @param {any} context @param {number} tipX @param {number} tipY @param {number} angle @param {number} size */
 export function arrowHead(context, tipX, tipY, angle, size) {
   context.beginPath();
   context.moveTo(tipX + size * Math.cos(angle), tipY + size * Math.sin(angle));
@@ -71,7 +70,7 @@ export function write(context, text, x, y, align, color = colors.muted, font = T
   context.fillText(text, x, y);
 }
 
-/** Room for large labels and titles on both axes. */
+/** Space for large labels and titles on both axes. */
 export const ROOMY = { left: 78, right: 16, top: 16, bottom: 40, font: TEXT };
 
 export class Chart {
@@ -126,7 +125,7 @@ export class Chart {
     context.restore();
   }
 
-  /** What is drawn stays within the chart. @param {() => void} draw */
+  /** Clips the drawing to the chart. @param {() => void} draw */
   inside(draw) {
     const { context, left, right, top, bottom } = this;
     context.save();
@@ -164,14 +163,14 @@ export class Chart {
     for (let i = 0; i < count; i += 1) {
       const value = up(i);
       const y = Number.isFinite(value) ? this.y(/** @type {number} */ (value)) : NaN;
-      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // no error at all has no place on a logarithmic scale
+      if (Number.isFinite(y)) pencil.to(this.x(across(i)), y); // an error of 0 has no place on a logarithmic scale
       else pencil.lift();
     }
     pencil.lift();
     this.end();
   }
 
-  /** A line through few points, wherever they are. @param {number[][]} points @param {string} color @param {Style} style */
+  /** A line through a few points, in any order. @param {number[][]} points @param {string} color @param {Style} style */
   path(points, color, style = {}) {
     this.begin(color, style);
     for (const [x, y] of points) this.context.lineTo(this.x(x), this.y(y));
@@ -204,7 +203,7 @@ export class Chart {
 /** @typedef {{factor: number, limit: number, [other: string]: number}} Row the limit at a multiple of the gains [s] */
 
 /**
- * A map of what is stable: limits over gains, and the dot of the loop in force. Points beyond the rows that are known are neither.
+ * A map of stability: limits over gains, and the dot of the active loop. Points beyond the known rows are not coloured.
  * @param {Chart} chart @param {Row[]} rows @param {number} at place of the dot @param {number} factor
  */
 export function drawMap(chart, rows, at, factor) {
@@ -222,7 +221,7 @@ export function drawMap(chart, rows, at, factor) {
     context.strokeStyle = colors.muted;
     context.lineWidth = 1;
     context.strokeRect(left, top, right - left, bottom - top);
-    chart.words("stable", left + 10, chart.y(1) - 14, "left"); // the very low gains of the lower edge hold the arm at no timestep
+    chart.words("stable", left + 10, chart.y(1) - 14, "left"); // the very low gains at the lower edge cannot hold the arm
     chart.words("shakes", right - 10, top + 16, "right");
   }
   circle(context, chart.x(across.within(at)), chart.y(up.within(factor)), 7, colors.accent, colors.panel, 2);
@@ -230,14 +229,14 @@ export function drawMap(chart, rows, at, factor) {
 
 /** @typedef {import("./surface.js").Surface} Surface */
 
-/** Of a bar that is long, its thickness at most [px]. */
+/** Largest thickness of a long bar [px]. */
 const THICK = 40;
 const NONE = { place: () => 0, marks: [] };
 const ERRORS = new LogScale(1e-10, 1, []);
 ERRORS.marks = ERRORS.powers(6, (value) => (value === 1 ? "1" : powerOfTen(value)));
 
 /** A bar for each control step; negative ones are red. @param {Surface} surface @param {number[]} bars speed at each step [rad/s] */
-export function drawBars({ context, width, height }, bars, name = "look of the controller") {
+export function drawBars({ context, width, height }, bars, name = "measurement of the controller") {
   const largest = Math.max(...bars.map(Math.abs));
   if (!(largest > 0)) return;
   const up = { place: (/** @type {number} */ value) => 0.5 + (0.46 * value) / largest, marks: /** @type {[number, string][]} */ ([1, 0, -1].map((part) => [part * largest, significant(part * largest, 2)])) };

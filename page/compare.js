@@ -1,7 +1,8 @@
-// All methods at one timestep against a reference. The runtime computes the same arm from the same state offline. The runs are drawn
-// over one another and played back together, with error, energy and a joint's angle over time. The panel Error has other timesteps.
-// Invariant: the runs that are compared are the runtime's answers; the live arm is not touched. All are shown at the same instant; a
-// run that ends early is drawn as far as it goes, its last pose as a ghost.
+// All methods at one timestep against a reference. The runtime computes the same arm from the same state offline. The runs are
+// drawn together and played back together, with error, energy and a joint's angle over time. The panel Error has other
+// timesteps.
+// Invariant: the compared runs are the runtime's answers, and the live arm does not change. All are shown at the same time. A
+// run that ends early is drawn up to its end, with its last pose as a ghost.
 
 import { Chart, circle, links as drawLinks } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
@@ -19,8 +20,8 @@ import { colors } from "./theme.js";
 const REFERENCE_PART = 1 / 8;
 /** Enough samples for a smooth trail, few enough to draw at once. */
 const MOST_SAMPLES = 600;
-const SECONDS = 5; // where no duration is given
-/** Errors smaller than this are rounding [rad]. */
+const SECONDS = 5; // default duration
+/** Smaller errors are rounding [rad]. */
 const SMALLEST = 1e-13;
 const ROOM = { left: 50 };
 const COLUMNS = /** @type {const} */ ([["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]]);
@@ -34,13 +35,13 @@ const from = option({ label: "start", choices: [["now", "as it is"], ["rest", "s
 const controller = option({ label: "controller", choices: [["off", "off"], ["on", "on"]] });
 let said;
 let surfaces = /** @type {Surface[]} */ ([]);
-/** The runs that are shown, the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy: number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]} */
+/** The shown runs, with the reference last. @type {{color: string, away: (number | null)[] | null, times: number[], energy: number[], poses: (number[] | null)[], trail: (number[] | null)[], last: number}[]} */
 let runs = [];
 let instants = /** @type {number[]} */ ([]); // of the reference's samples [s]
 let lengths = /** @type {number[]} */ ([]);
-let at = 0; // the instant that is shown
+let at = 0; // the shown time
 let playing = false;
-let began = 0; // when it would have been at the first instant [ms]
+let began = 0; // the clock at the first sample [ms]
 
 export function startCompare() {
   said = panel(byId("compare-form"), [timestep, seconds, from, controller], [["Compare", () => busy(said.buttons[0], "Computing…", compare), { type: "submit", class: "primary" }]]);
@@ -67,7 +68,7 @@ export function startCompare() {
 
 async function compare() {
   if (state.links === 0 || !state.params) {
-    said.show("There is no arm to compare with: not connected.");
+    said.show("There is no arm to compare: not connected.");
     return;
   }
   const n = state.links;
@@ -75,7 +76,7 @@ async function compare() {
   const still = from.input.value === "rest";
   const step = (timestep.number() ?? 1e3 * state.integrator.timestep) / 1e3;
   const asked = seconds.number() ?? SECONDS;
-  // A whole number of steps from sample to sample, so that all runs are sampled at the same instants.
+  // A whole number of steps between samples, so all runs are sampled at the same times.
   const every = Math.max(1, Math.ceil(asked / step / MOST_SAMPLES));
   const intervals = Math.max(1, Math.round(asked / step / every));
   const lasts = intervals * every * step;
@@ -145,7 +146,7 @@ function stop() {
   setText(byId("compare-play"), "Play");
 }
 
-/** Gives whether it plays on. */
+/** Returns whether it continues to play. */
 function playOn(now) {
   if (!playing || state.tab !== "compare") return false;
   while (at < instants.length - 1 && instants[at] < (now - began) / 1000) at += 1;
@@ -178,12 +179,12 @@ function drawArms({ context, width, height }) {
     if (!q) return;
     joints(lengths.length, q, lengths, x, y);
     context.globalAlpha = ended ? 0.25 : 0.85;
-    drawLinks(context, lengths.length, x, y, px, py, colors[color], 3 + 2 * (runs.length - k)); // where they agree, all are seen
+    drawLinks(context, lengths.length, x, y, px, py, colors[color], 3 + 2 * (runs.length - k)); // so equal runs are all visible
   });
   context.globalAlpha = 1;
 }
 
-/** From the smallest error that is no rounding to the largest. */
+/** From the smallest error above rounding to the largest. */
 function errorScale() {
   const values = runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
   return LogScale.around(values.length > 0 ? values : [SMALLEST], 6, powerOfTen);

@@ -1,5 +1,5 @@
 // The settings: integrator and timestep, controller and gains, gravity, masses, lengths and setpoint.
-// Invariant: a control changes only to values that the runtime accepted. A refusal is shown beside it.
+// Invariant: a control shows only values that the runtime accepted. A refusal is shown beside it.
 
 import { byId, el, setText, warn } from "./dom.js";
 import { busy, numberField, refusal } from "./field.js";
@@ -10,14 +10,14 @@ import { enable, sendSetpoint, setGains, setIntegrator, setParams, setPeriod, su
 import { LOOP, set, state, watch } from "./store.js";
 
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
-/** The same for both clocks, so that places on their sliders compare [ms]. */
+/** The same range for both clocks, so their sliders can be compared [ms]. */
 const CLOCK = { unit: "ms", low: 0.01, high: 200, log: true };
 
 const ECHO_MS = 300;
 
-let placed = []; // the setpoint that was sent last
+let placed = []; // the last sent setpoint
 let placedAt = -Infinity;
-let perJoint = []; // functions that take the stored values into the fields of each joint
+let perJoint = []; // functions that write the stored values to the fields of each joint
 let controllerSaid;
 let suggestButton;
 let suggestSaid;
@@ -49,7 +49,7 @@ function startIntegrator() {
   watch("integrator", check);
 }
 
-/** The timestep and the control period, one above the other, each with its limit. */
+/** The timestep and the control period, each with its limit. */
 function startClocks() {
   const timestep = numberField({ label: "timestep", ...CLOCK, commit: (ms) => setIntegrator({ timestep: seconds(ms) }) });
   const period = numberField({ label: "control period", ...CLOCK, zero: true, zeroText: "every step", commit: (ms) => setPeriod({ period: seconds(ms) }) });
@@ -88,7 +88,7 @@ export function switchController(on) {
   return controllerSaid.report(enable(on));
 }
 
-/** Asks for gains for the present arm, and sets them: a change like any other, which can be undone. */
+/** Requests gains for the present arm and sets them. The change can be undone. */
 export function takeSuggestion() {
   return busy(suggestButton, "Searching…", async () => {
     const { result, values } = await suggestSaid.report(suggestGains());
@@ -97,7 +97,7 @@ export function takeSuggestion() {
   });
 }
 
-/** Moves the setpoint of the chosen joint by `angle` [rad]; from where the arm is, if none is known. */
+/** Moves the setpoint of the chosen joint by `angle` [rad], from the present pose if no setpoint is known. */
 export function nudgeSetpoint(angle) {
   if (state.links === 0) return;
   const present = presentSetpoint();
@@ -105,13 +105,13 @@ export function nudgeSetpoint(angle) {
   if (!answer.result) warn(answer.status);
 }
 
-/** The setpoint, or the one just sent: a held key is faster than the way to the runtime and back. */
+/** The setpoint, or the one just sent, because a held key repeats faster than the runtime answers. */
 function presentSetpoint() {
   if (performance.now() - placedAt < ECHO_MS && placed.length === state.links) return placed;
   return Array.from((state.setpointKnown ? state.setpoint : state.position).subarray(0, state.links));
 }
 
-/** There is no answer to a trajectory: it comes back over its topic once it counts. */
+/** There is no answer to a trajectory. It arrives on its topic when it takes effect. */
 function place(positions) {
   if (state.connection !== "open") return { result: false, status: "not connected", values: {} };
   placed = positions;
@@ -124,7 +124,7 @@ export function chooseJoint(joint) {
   if (state.links > 0) set("joint", (joint + state.links) % state.links);
 }
 
-// Fields that there are one of per joint
+// Fields with one entry per joint
 
 function makeJointFields(links) {
   perJoint = [];
@@ -147,7 +147,7 @@ function radios(name) {
   return /** @type {any} */ ([...document.getElementsByName(name)]);
 }
 
-/** One field per joint of an array that is `stored`; a change sends all of the `values`, which may be newer. */
+/** One field per joint of the `stored` array. A change sends all `values`, which may be newer. */
 function fill(id, links, /** @type {any} */ { name, stored, values = stored, send, ...options }) {
   const fields = Array.from({ length: links }, (_, joint) => numberField({
     label: `${name} ${joint + 1}`, short: String(joint + 1), className: `joint${joint + 1}`, ...options, commit: (value) => send(values().with(joint, value)),

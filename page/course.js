@@ -22,15 +22,15 @@ import { DEFAULTS } from "./settings.js";
  * @property {Question} question
  */
 
-/** A period that is a fifth to a quarter beyond the limit: the arm shakes, and stays finite [s]. @type {Record<number, number>} */
+/** A period 20 % to 25 % beyond the limit: the arm shakes, but its state stays finite [s]. @type {Record<number, number>} */
 export const BEYOND = { 2: 0.0055, 3: 0.0038 };
-/** A period that is well within it [s]. @type {Record<number, number>} */
+/** A period well below the limit [s]. @type {Record<number, number>} */
 const WITHIN = { 2: 0.004, 3: 0.002 };
-/** Short enough that the simulation adds nothing to see [s]. */
+/** Short enough that the simulation's error is not visible [s]. */
 const FINE = 0.0001;
 /** Four methods. */
 const ALL = 4;
-/** By so much the method's own error has to fall. */
+/** The required reduction of the method's error. */
 const MUCH = 100;
 const SOME_SCENES = 3;
 
@@ -49,12 +49,12 @@ export const STEPS = [
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
     question: {
       text: "What does the controller do between two measurements?", answers: ["It holds the torques as they are", "It corrects them all the time", "It sets them to zero"], right: 0,
-      because: "A computer looks only now and then. From one look to the next it holds each torque. This is called a hold.",
+      because: "A computer measures only at certain times. Between two measurements it holds each torque. This is called a hold.",
     },
   },
   {
     id: "slow", title: "Slow the controller down",
-    text: "Now the controller looks less often. The time between two looks is its period. Guess first: when does the arm begin to shake?",
+    text: "Now the controller measures less often. The time between two measurements is its period. Guess first: when does the arm begin to shake?",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: "period",
     guess: {
@@ -69,57 +69,57 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the speed of the last joint at one look of the controller, after a tiny push. The arm moves in slow motion: two looks a second.",
+    text: "Each bar is the speed of the last joint at one measurement, after a tiny push. The arm moves in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
     task: { text: "Shorten the period until the bars shrink.", done: ({ shrinks }) => shrinks },
     question: {
       text: "Beyond the limit each bar points the other way. Why?", answers: ["Each correction overshoots", "Gravity pulls it back", "The method rounds"], right: 0,
-      because: "The torque is held too long. It pushes past the target, and beyond the limit each time further.",
+      because: "The torque is held too long. It pushes the joint past the target, and beyond the limit further each time.",
     },
   },
   {
     id: "method", title: "A better method?",
-    text: "The method computes the motion between two looks. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of the period move?",
+    text: "The method computes the motion between two measurements. Runge–Kutta 4 is far more exact than Euler. Try all four: does the limit of the period move?",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "velocity", dial: "period", methods: true,
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
-      text: "Why does a better method not help?", answers: ["The controller still looks as rarely", "Euler is exact enough", "The gains are too low"], right: 0,
-      because: "The limit comes from the hold between two looks. A real robot has the same limit, without any method.",
+      text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The gains are too low"], right: 0,
+      because: "The limit comes from the hold between two measurements. A real robot has the same limit, without any method.",
     },
   },
   {
     id: "timestep", title: "A finer timestep?",
-    text: "The simulation has a clock of its own, the timestep. A shorter one makes the computed motion more exact. The method and the control period, above the chart, stay the same.",
+    text: "The simulation has its own clock, the timestep. A shorter one makes the computed motion more exact. The method and the control period, above the chart, stay the same.",
     scene: (links) => controlled(links, WITHIN[links], { integrator: { method: "midpoint", timestep: WITHIN[links] } }),
     chart: "errors", dial: "timestep",
     task: { text: "Make the error of the method 100 times smaller.", done: ({ gain }) => gain >= MUCH },
     question: {
-      text: "Which error stayed?", answers: ["That of the hold", "That of the method", "None"], right: 0,
+      text: "Which error did not change?", answers: ["That of the hold", "That of the method", "None"], right: 0,
       because: "A finer timestep improves the simulation. Only a shorter period improves the control.",
     },
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping against less mass reacts faster, so the controller must look more often. The limit is about T = 2 λmin(Kd⁻¹ M), with the mass matrix M and the smallest eigenvalue λmin.",
+    text: "More damping or less mass makes the arm react faster, so the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M), with the mass matrix M and the smallest eigenvalue λmin.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
     question: {
       text: "You halve the damping. What does the limit do?", answers: ["It halves", "It doubles", "It stays"], right: 1,
-      because: "In the formula the damping is below the line: half of it gives twice the time.",
+      because: "In the formula the damping is in the denominator: half of it gives twice the time.",
     },
   },
   {
     id: "energy", title: "Without a controller",
-    text: "Nothing drives this swing, so its energy should stay. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
+    text: "Nothing drives this swing, so its energy should stay constant. Euler at 5 ms adds a little at every step. Choose methods and watch the total.",
     scene: (links) => ({ ...structuredClone(DEFAULTS[links]), integrator: { method: "euler", timestep: 0.005 }, controller: false }),
     chart: "energy", dial: "timestep", methods: true,
     task: { text: "Find a method that keeps the energy at 5 ms.", done: ({ methods }) => methods.has("rk4") || methods.has("verlet") },
     question: {
-      text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, it only gains it more slowly", "Yes, below 0.1 ms"], right: 1,
+      text: "Can Euler keep the energy with a shorter step?", answers: ["Yes, below 1 ms", "No, the energy only grows more slowly", "Yes, below 0.1 ms"], right: 1,
       because: "Without damping every Euler step makes a swing a little wider, however short the step is.",
     },
   },
@@ -128,26 +128,26 @@ export const STEPS = [
     text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of the hold.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
-    task: { text: "Measure, and find where more work buys nothing.", done: ({ measured }) => measured },
+    task: { text: "Measure. Find where more run time no longer reduces the error.", done: ({ measured }) => measured },
     question: {
-      text: "Your controller looks every 4 ms. What does Runge–Kutta 4 buy at 0.25 ms?", answers: ["A better robot", "Nearly nothing", "A longer limit"], right: 1,
-      because: "The error of the hold is far larger than the error of the method. Work on the larger one.",
+      text: "Your controller measures every 4 ms. What does Runge–Kutta 4 at 0.25 ms improve?", answers: ["The robot", "Nearly nothing", "The limit"], right: 1,
+      because: "The error of the hold is far larger than the error of the method. Reduce the larger one first.",
     },
   },
   {
     id: "extreme", title: "Stiff and extreme",
-    text: "Thirty-nine arms that are hard to simulate: light links, strong gains, wild numbers. A picture starts its scene; some need three links. Its sentence says what a correct simulation does.",
+    text: "Thirty-nine arms that are hard to simulate: light links, high gains, extreme numbers. Click a picture to start its scene. Some scenes need three links. The sentence describes a correct simulation.",
     scene: (links) => structuredClone(DEFAULTS[links]),
     chart: "pictures", dial: null,
     task: { text: "Start three of them.", done: ({ scenes }) => scenes >= SOME_SCENES },
     question: {
-      text: "A last link of one milligram: why are short steps needed?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
+      text: "Why does a last link of one milligram need short steps?", answers: ["It is hard to see", "It reacts very fast", "It stores much energy"], right: 1,
       because: "The same gain moves less mass faster, and a fast motion needs a short step.",
     },
   },
   {
     id: "own", title: "Your own arm",
-    text: "Fill in your arm and your gains. The sheet says which period and which timestep they allow, why, and what a better method buys.",
+    text: "Fill in your arm and your gains. The sheet shows the largest period and timestep that they allow, the reason, and the benefit of a better method.",
     scene: (links) => controlled(links, 0.001),
     chart: "form", dial: null,
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },
@@ -158,22 +158,22 @@ export const STEPS = [
   },
 ];
 
-/** Actions of the student in a step so far; a task looks at them. */
+/** Actions of the student in the present step. A task checks them. */
 export function nothingSeen() {
   return {
-    methods: /** @type {Set<string>} */ (new Set()), // that were in force
+    methods: /** @type {Set<string>} */ (new Set()), // methods used
     reached: false, // whether a goal was reached
     shook: false, // whether the arm shook beyond the limit
     shrinks: false, // whether the bars shrink
-    gain: 1, // by what the method's error has fallen
-    stable: false, // whether the loop in force is stable
+    gain: 1, // factor by which the method's error has decreased
+    stable: false, // whether the active loop is stable
     measured: false, // whether the ladder is complete
-    scenes: 0, // that were run
+    scenes: 0, // number of started scenes
     sheet: false, // whether a sheet was made
   };
 }
 
-/** Whether a deviation dies away: its last bars against its first ones. @param {number[]} bars */
+/** Whether a deviation decays: its last bars compared with its first ones. @param {number[]} bars */
 export function shrinks(bars) {
   const largest = (/** @type {number[]} */ some) => Math.max(...some.map(Math.abs));
   const third = Math.floor(bars.length / 3);

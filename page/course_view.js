@@ -1,6 +1,6 @@
-// Shows the course, a step at a time: sets its scene, draws its chart, ticks its task, checks its answer.
-// Invariant: an arm that others watch changes only when somebody clicks: a link that names a step shows it, and waits for Start.
-// The arm of the page in one file belongs to its page: there the step begins at once.
+// Shows the course, one step at a time: sets its scene, draws its chart, ticks its task, checks its answer.
+// Invariant: a shared arm changes only after a click: a link to a step shows the step, and waits for Start. In the page in one
+// file the arm belongs to the page, so the step begins at once.
 
 import { remember, setScene } from "./actions.js";
 import { Chart, drawBars, drawErrors, drawMap, drawPicture, ROOMY } from "./chart.js";
@@ -24,9 +24,9 @@ import { ENERGIES, StripChart } from "./strip_chart.js";
 import { climb, climbRows, deviation } from "./study.js";
 import { Surface } from "./surface.js";
 
-const SHAKES = 2; // rad/s: beyond the limit, and seen to
+const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
-const STEPS_SHOWN = 40; // looks of the arm in slow motion
+const STEPS_SHOWN = 40; // measurements per second in slow motion
 const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];
@@ -48,7 +48,7 @@ const FACTORS = new LogScale(0.25, 4, [0.25, 0.5, 1, 2, 4].map((one) => [one, `$
 const CHARTS = {
   velocity: { caption: () => "Speed of the joints [rad/s]", draw: strip([{ column: VELOCITY }]) },
   energy: { caption: () => "Energy [J]", draw: strip(ENERGIES) },
-  bars: { caption: () => "A tiny push, look by look", draw: () => drawBars(surface, now.bars), ask: askBars },
+  bars: { caption: () => "A tiny push, at each measurement", draw: () => drawBars(surface, now.bars), ask: askBars },
   errors: { caption: () => `Two errors of one move: ${shortName(state.integrator?.method)}, control period ${duration(period())}`, draw: () => drawErrors(surface, now.errors), ask: askErrors },
   map: { caption: () => "Which period is stable", draw: paintMap, ask: askMap },
   ladder: { caption: () => "Error over run time", draw: () => drawLadder(surface, now.runs) },
@@ -56,8 +56,8 @@ const CHARTS = {
   form: { caption: () => "My arm" },
 };
 
-let at = 0; // the step that is shown
-let now = anew(); // what has happened in it; another object once its scene is set anew
+let at = 0; // the present step
+let now = anew(); // the actions in it; a new object when its scene is set again
 let surface;
 let dial; // { field, show } of the present step
 let stripTime = NaN;
@@ -65,7 +65,7 @@ let stripTime = NaN;
 function anew() {
   return {
     began: false, // whether it was started
-    ready: false, // whether its scene is set: what is seen before is of another one
+    ready: false, // whether its scene is set; before that the arm shows another one
     guessed: -1,
     answered: -1,
     ticked: false,
@@ -74,10 +74,10 @@ function anew() {
     errors: /** @type {{error: number | null, sampling: number | null} | null} */ (null),
     firstError: NaN,
     runs: /** @type {import("./ladder.js").Rung[]} */ ([]),
-    runsKey: "", // the settings that `runs` are about
-    asked: "", // those that the chart is about
+    runsKey: "", // the settings of `runs`
+    asked: "", // the settings of the chart
     border: /** @type {import("./chart.js").Row[]} */ ([]),
-    borderAsked: "", // the arm and the gains besides damping that the border is about
+    borderAsked: "", // the arm and the gains without damping of the border
   };
 }
 
@@ -97,7 +97,7 @@ export function startCourse() {
   rest();
 }
 
-/** The step that is shown, as a link says it; empty in the workbench. */
+/** The present step in the form of a link; empty in the workbench. */
 export function stepInLink() {
   return state.view === "course" ? `step=${at + 1}&` : "";
 }
@@ -111,7 +111,7 @@ export function chooseLinks(links) {
   location.reload();
 }
 
-/** Ten times a second at most, while something changes. */
+/** At most ten times a second, while something changes. */
 export function moveCourse() {
   if (state.view === "course" && stripTime !== newest()) surface.redraw();
 }
@@ -129,7 +129,7 @@ function go(to) {
   byId("course-title").focus();
 }
 
-/** Sets the scene of the step; done again, it begins anew. */
+/** Sets the scene of the step, or restarts it. */
 async function begin() {
   now = anew();
   const mine = now;
@@ -159,7 +159,7 @@ async function slowMotion(mine) {
   }
 }
 
-/** The time between two looks of the controller [s]. */
+/** The control period [s]. */
 function period() {
   return state.integrator ? stepsPerUpdate(state) * state.integrator.timestep : NaN;
 }
@@ -181,7 +181,7 @@ function show() {
   setText(byId("course-number"), `Step ${at + 1} of ${STEPS.length}`);
   setText(byId("course-title"), one.title);
   setText(byId("course-text"), one.text);
-  setText(byId("course-status"), now.began || state.links === 0 ? "" : "Press “Start”: it sets the arm for everybody who watches.");
+  setText(byId("course-status"), now.began || state.links === 0 ? "" : "Press “Start” to set the arm. Other viewers see the change.");
   setText(byId("course-start"), now.began ? "Restart step" : "Start");
   byId("course-start").disabled = state.links === 0;
   byId("course-back").disabled = at === 0;
@@ -228,9 +228,9 @@ function gallery(links) {
 }
 
 /**
- * The sentence under a scene's picture, and the action of a click on it; null where a click does nothing.
- * A scene of another arm needs that arm: the file loads it, a server has to be started with it.
- * @param {import("./scenes.js").Scene} scene @param {number} links of the present arm
+ * The sentence under a scene's picture, and the action of a click on it; null if a click does nothing. A
+ * scene with another number of links needs that arm: the file loads it, and a server must be started with
+ * it. @param {import("./scenes.js").Scene} scene @param {number} links of the present arm
  */
 function offer(scene, links) {
   if (scene.links === links) return { text: scene.expected, act: () => runScene(scene) };
@@ -251,10 +251,10 @@ async function runScene(scene) {
   look();
 }
 
-/** The clock that a step is about: its slider, how long it takes now, and its limit [ms]. */
+/** The clock of a step: its slider, its present value and its limit [ms]. */
 function clock(one) {
   if (one.dial !== "timestep") return { label: "control period", unit: "ms", low: 0.5, high: 20, commit: (ms) => setPeriod({ period: seconds(ms) }), value: () => 1e3 * period(), limit: () => 1e3 * controlPeriodLimit(state) };
-  const inErrors = one.chart === "errors"; // there the period stays
+  const inErrors = one.chart === "errors"; // there the period does not change
   const commit = (ms) => setIntegrator({ timestep: inErrors ? partOfPeriod(ms) : seconds(ms) });
   return { label: "timestep", unit: "ms", low: 0.1, high: inErrors ? 4 : 100, commit, value: () => 1e3 * (state.integrator?.timestep ?? NaN), limit: () => 1e3 * limitInForce(state).limit };
 }
@@ -265,7 +265,7 @@ function makeDial(one) {
   dial = null;
   place.replaceChildren();
   place.hidden = !one.dial || (one.guess && now.guessed < 0);
-  // While the scene is being set its values would replace the student's.
+  // While the scene is being set, its values would replace the student's.
   place.inert = now.began && !now.ready;
   if (!one.dial || state.links === 0) return;
   const { value, limit, ...options } = one.dial === "damping"
@@ -277,7 +277,7 @@ function makeDial(one) {
   dial.show();
 }
 
-/** The timestep nearest to `ms` that is a whole part of the control period, so that the period stays [s]. */
+/** The timestep nearest to `ms` that divides the control period, so the period does not change [s]. */
 function partOfPeriod(ms) {
   const whole = state.period?.period ?? 0;
   return Number((whole / Math.max(1, Math.round(whole / (ms / 1e3)))).toPrecision(9));
@@ -296,7 +296,7 @@ function showBig() {
   setText(byId("course-caption"), caption);
   setAttribute(byId("course-chart"), "aria-label", caption);
   byId("course-big").classList.toggle("bad", !unknown && ["beyond", "never", "diverged"].includes(kind));
-  if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm flew apart. Press “Restart step”.");
+  if (kind === "diverged" && one.chart !== "pictures") setText(byId("course-status"), "The arm diverged. Press “Restart step”.");
 }
 
 function showTask() {
@@ -329,7 +329,7 @@ function ask(place, { text, answers, right, because }, chosen, choose) {
 
 // The events
 
-/** At every news of the runtime. */
+/** At every message of the runtime. */
 function look() {
   if (state.view !== "course" || state.links === 0 || !state.integrator || !state.gains) return;
   const one = STEPS[at];
@@ -357,7 +357,7 @@ function look() {
   showTask();
 }
 
-/** Asks anew what the chart shows, once the settings that it is about have changed. */
+/** Requests the chart's data again, when its settings have changed. */
 function refresh({ chart }) {
   if (now.runs.length > 0 && now.runsKey !== settingsKey()) {
     now.runs = [];
@@ -380,7 +380,8 @@ const inquire = latestOnly(async ({ ask, mine }) => {
 async function askBars(common) {
   const mine = now;
   const rest = new Array(state.links).fill(0);
-  // Without gravity, so that nothing but the push is seen. It is one of speed, which the fastest motion of the loop answers.
+  // Without gravity, so only the push is visible. It is a push of the velocity, which excites the fastest motion of the
+  // loop.
   const bars = await deviation({ ...common, params: { ...state.params, gravity: 0 }, setpoint: rest }, rest, period());
   if (!bars) return;
   mine.bars = bars;
@@ -396,7 +397,7 @@ async function askErrors(common) {
   mine.seen.gain = mine.firstError / (values.error ?? NaN);
 }
 
-/** The border of the map: the damping moves the dot, not the border. */
+/** The border of the map. The damping moves the dot, not the border. */
 async function askMap() {
   const mine = now;
   const about = () => JSON.stringify([state.params, state.gains.kp, state.gains.ki]);

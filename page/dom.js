@@ -1,7 +1,7 @@
-// Makes elements from code, and says aloud to screen readers what others see happen: goals reached, refusals, a lost connection.
-// Text is always text, never markup, whatever the runtime sends.
-// Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need. Only events are said aloud:
-// values that change all the time are in texts that are read when asked for.
+// Creates elements from code, and announces events to screen readers: reached goals, refusals, a lost connection. Text from the
+// runtime is always text, never markup.
+// Invariant: there is no `innerHTML` and no style attribute, because the page's policy forbids them. Only events are announced.
+// Values that change continuously are in texts that are read on request.
 
 /** `el("p", { class: "note" }, "text", child)`; `on...` properties are listeners. */
 /** @returns {any} */
@@ -17,7 +17,7 @@ export function el(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** Fills a table: a row of heads, then rows that begin with a head of their own; a head is its text, or its text and its class. */
+/** Fills a table: a row of heads, then rows that begin with their own head. A head is its text, or its text and its class. */
 export function fillTable(table, heads, rows) {
   const head = (scope, one) => el("th", { scope, class: [one].flat()[1] }, [one].flat()[0]);
   table.replaceChildren(
@@ -31,26 +31,26 @@ export function byId(id) {
   return document.getElementById(id);
 }
 
-/** Gives the page this address; within another page it may have none of its own. @param {string | URL} address */
+/** Sets the page's address. Inside a frame this may be forbidden. @param {string | URL} address */
 export function setAddress(address) {
   try {
     history.replaceState(history.state, "", address);
   } catch {
-    // then it stays as it is
+    // then it does not change
   }
 }
 
-/** Writes text only where it differs: most readouts stay as they are from one time to the next. */
+/** Writes text only if it differs, because most readouts rarely change. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** The same for an attribute, `class` among them. */
+/** The same for an attribute, including `class`. */
 export function setAttribute(element, name, text) {
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
 }
 
-/** A choice that outlives the page; null where there is none, or where storage is forbidden. @param {string} key @returns {string | null} */
+/** A stored choice; null if there is none, or if storage is forbidden. @param {string} key @returns {string | null} */
 export function remembered(key) {
   try {
     return localStorage.getItem(key);
@@ -59,12 +59,12 @@ export function remembered(key) {
   }
 }
 
-/** Keeps a choice; where storage is forbidden it lasts as long as the page. @param {string} key @param {string} choice */
+/** Stores a choice. If storage is forbidden, it lasts as long as the page. @param {string} key @param {string} choice */
 export function keepChoice(key, choice) {
   try {
     localStorage.setItem(key, choice);
   } catch {
-    // then the page alone knows it
+    // then only the page has it
   }
 }
 
@@ -78,7 +78,7 @@ function say(id, text) {
   lastText = text;
   lastTime = now;
   const region = byId(id);
-  // Emptied first, since a region that does not change is not read again.
+  // Emptied first, because screen readers do not repeat an unchanged region.
   region.textContent = "";
   requestAnimationFrame(() => {
     region.textContent = text;

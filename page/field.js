@@ -1,5 +1,5 @@
-// A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
-// Invariant: the field has the value in force, except while somebody is changing it.
+// A number of the runtime: label, slider, input, and the runtime's answer to the last change.
+// Invariant: the field has the present value, except while a user changes it.
 
 import { el, setText, warn } from "./dom.js";
 import { plain, significant } from "./format.js";
@@ -10,7 +10,7 @@ const SLIDER_STEPS = 400;
 const SEND_MS = 70;
 let nextId = 1;
 
-/** Where a refusal is shown, until its cause is gone; `describes` are the controls that it is about. */
+/** The place for a refusal, shown until its cause is gone. `describes` are its controls. */
 export function refusal(...describes) {
   const text = el("p", { class: "refusal", id: `refusal-${nextId}` });
   nextId += 1;
@@ -23,10 +23,10 @@ export function refusal(...describes) {
     }
     if (status) warn(status);
   };
-  // There is a connection again, or all settings are set anew.
+  // Call this after a new connection, or when all settings are set again.
   watch("connection", (now) => { if (now === "open") show(""); });
   watch("anew", () => show(""));
-  /** Shows what came of a call, and gives its answer. @param {Promise<{result: boolean, status: string, values: any}>} call */
+  /** Shows the outcome of a call, and returns its answer. @param {Promise<{result: boolean, status: string, values: any}>} call */
   const report = async (call) => {
     const answer = await call;
     show(answer.result ? "" : answer.status);
@@ -35,7 +35,7 @@ export function refusal(...describes) {
   return { element: text, show, report };
 }
 
-/** Says `text` on the button while `work` goes on, and takes no click meanwhile. @param {HTMLButtonElement} button @param {string} text @param {() => Promise<any>} work */
+/** Shows `text` on the button and disables it while `work` runs. @param {HTMLButtonElement} button @param {string} text @param {() => Promise<any>} work */
 export async function busy(button, text, work) {
   if (button.disabled) return;
   const before = button.textContent;
@@ -47,9 +47,9 @@ export async function busy(button, text, work) {
 }
 
 /**
- * A form: options, buttons, and where a refusal is shown; gives the latter, and the buttons. A button of the type submit is pressed by
- * Enter too.
- * @param {HTMLElement} place @param {{input: HTMLElement, element: HTMLElement}[]} options @param {[string, () => void, object?][]} buttons @param {...HTMLElement} last
+ * A form: options, buttons, and the place for a refusal. Returns the latter, and the buttons. A button of the type
+ * submit is pressed by Enter too. @param {HTMLElement} place @param {{input: HTMLElement, element: HTMLElement}[]}
+ * options @param {[string, () => void, object?][]} buttons @param {...HTMLElement} last
  */
 export function panel(place, options, buttons, ...last) {
   const made = buttons.map(([text, act, attributes]) => el("button", { type: "button", onclick: act, ...attributes }, text));
@@ -62,7 +62,7 @@ export function panel(place, options, buttons, ...last) {
 /**
  * @param {object} options
  * @param {string} options.label what it is, for everybody
- * @param {string} [options.short] what is shown instead of the label, where its place says the rest
+ * @param {string} [options.short] what is shown instead of the label, if the place explains the rest
  * @param {string} options.unit
  * @param {number} options.low left end of the slider @param {number} options.high right end
  * @param {boolean} [options.log] whether the slider goes by ratios; with `low` > 0, or `zero` at its left end
@@ -80,7 +80,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
   const limit = el("span", { class: "mark", hidden: true });
   const track = el("span", { class: "track" }, slider, limit);
   if (zeroText) track.append(el("small", { class: "left-end", "aria-hidden": "true" }, zeroText));
-  input.placeholder = "–"; // until the runtime has said
+  input.placeholder = "–"; // until the runtime has answered
   const said = refusal(input);
   let accepted = NaN;
   let marked = NaN;
@@ -136,7 +136,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
     element: el("div", { class: "field" },
       el("label", { for: id, title: label }, el("span", { class: "visually-hidden" }, label), el("span", { "aria-hidden": "true" }, short)),
       track, input, el("span", { class: "unit" }, unit), said.element),
-    /** The runtime's value. Not shown while its own change is under way or somebody types. */
+    /** Sets the runtime's value. It is not shown while a change is pending or the user types. */
     accept(value) {
       if (value === accepted) return;
       const typing = document.activeElement === input && input.value !== plain(accepted);
@@ -145,7 +145,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
       said.show("");
       show();
     },
-    /** Marks the limit of what is stable on the slider, where there is one within its ends. */
+    /** Marks the stability limit on the slider, if it is within its range. */
     mark(value) {
       if (Object.is(value, marked)) return;
       marked = value;
@@ -161,16 +161,16 @@ export function numberField({ label, short = label, unit, low, high, log = false
 }
 
 /**
- * A number that only a later request needs: nothing is sent when it changes. Empty: left out. With `choices`, values and their texts,
- * one of them is chosen instead.
- * @param {{label: string, unit?: string, value?: string | number, placeholder?: string, choices?: [string, string][]}} options
+ * A number for a later request: nothing is sent when it changes. An empty field is omitted. With `choices`, values and
+ * their texts, one of them is chosen instead. @param {{label: string, unit?: string, value?: string | number,
+ * placeholder?: string, choices?: [string, string][]}} options
  */
 export function option({ label, unit = "", value = "", placeholder = "", choices = [] }) {
   const input = choices.length > 0 ? el("select", {}, ...choices.map(([name, text]) => el("option", { value: name }, text))) : el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {
     element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, ...(unit ? [el("span", { class: "unit" }, unit)] : []))),
     input,
-    /** `undefined` where nothing is given. */
+    /** `undefined` if the field is empty. */
     number: () => (input.value === "" ? undefined : Number(input.value)),
   };
 }

@@ -1,8 +1,8 @@
-// Numbers as people read them: few digits, a true minus, powers of ten where a number is huge or tiny.
-// Invariant: a value that is not finite is shown as a dash, never as text of the language.
+// Numbers for people: few digits, a true minus, powers of ten for very large and very small numbers.
+// Invariant: a value that is not finite is shown as a dash.
 
 const MINUS = "\u2212";
-/** A figure in a caption has no more. */
+/** Most digits of a number in a caption. */
 const MOST_DIGITS = 5;
 
 /** @param {number} value @param {number} digits */
@@ -13,7 +13,7 @@ export function fixed(value, digits) {
   return text.startsWith("-") ? (Number(text) === 0 ? text.slice(1) : MINUS + text.slice(1)) : text;
 }
 
-/** Those digits behind the point, or fewer to keep it short: its place is small. @param {number} value @param {number} digits */
+/** These digits after the point, or fewer if space is small. @param {number} value @param {number} digits */
 export function short(value, digits) {
   const before = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
   return fixed(value, Number.isFinite(before) ? Math.max(0, Math.min(digits, MOST_DIGITS - before)) : digits);
@@ -42,17 +42,17 @@ export function duration(seconds) {
   return `${significant(seconds * 1e9, 3)} ns`;
 }
 
-/** A number that an input can hold and a student can edit: four digits, its exponent whole. @param {number} value */
+/** A number for an input field: four digits, with an integer exponent. @param {number} value */
 export function plain(value) {
   return Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "";
 }
 
-/** Milliseconds as seconds, without the digits that a division leaves behind. @param {number} ms */
+/** Milliseconds as seconds, without rounding digits of the division. @param {number} ms */
 export function seconds(ms) {
   return Number((ms / 1e3).toPrecision(15));
 }
 
-/** A number with all its digits, for links and files; empty where it is not finite. @param {number} value */
+/** A number with all its digits, for links and files; empty if it is not finite. @param {number} value */
 export function exact(value) {
   return Number.isFinite(value) ? String(value) : "";
 }
@@ -60,7 +60,7 @@ export function exact(value) {
 /** The integrators in the order of their keys: name, full name, order as a Runge-Kutta method; Verlet is none. @type {[string, string, number?][]} */
 export const METHODS = [["euler", "Euler", 1], ["midpoint", "Midpoint", 2], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4", 4]];
 
-/** The same where there is little room. @param {string | undefined} method */
+/** The short name, for small spaces. @param {string | undefined} method */
 export function shortName(method) {
   return methodName(method).replace("Runge–Kutta 4", "RK 4");
 }

@@ -1,17 +1,18 @@
 // The last five minutes of the arm, one row per joint state: the source of the plots, the trail and the CSV file.
-// Invariant: rows are in order of simulation time, without repeats; a reset begins anew. Its memory is taken once.
+// Invariant: rows are in order of simulation time, without repetitions. A reset clears them. The memory is
+// allocated once.
 
 import { energies, gravityLoad } from "./mechanics.js";
 import { toFragment } from "./settings.js";
 import { MOST_LINKS, state } from "./store.js";
 
-/** Five minutes at 60 rows a second: 2.9 MB, taken once. */
+/** Five minutes at 60 rows a second: 2.9 MB, allocated once. */
 const ROWS = 18000;
 
-/** Slopes at both ends together that one smooth motion can have: so many times the change, and this much around a turning point [rad]. */
+/** Largest sum of the slopes at both ends of a smooth motion: a multiple of the change, plus an allowance at a turning point [rad]. */
 const [STEEP, TURNING] = [6, 0.5];
 
-/** Where each quantity begins in a row; per-joint ones have an entry for each of three joints. */
+/** The index of each quantity in a row. Per-joint ones have an entry for each of three joints. */
 export const TIME = 0;
 export const ENERGY = 1;
 export const KINETIC = 2;
@@ -23,17 +24,17 @@ export const EFFORT = VELOCITY + MOST_LINKS;
 export const LOAD = EFFORT + MOST_LINKS;
 const WIDTH = LOAD + MOST_LINKS;
 
-/** A ring of rows of numbers: the newest are kept. */
+/** A ring buffer of rows of numbers. */
 export const record = {
   data: new Float64Array(ROWS * WIDTH),
   length: 0, // rows
-  head: 0, // the row that is written next
+  head: 0, // the next row to write
 
   clear() {
     this.length = 0;
   },
 
-  /** Makes room for one row, and gives the index in `data` where it begins. */
+  /** Reserves one row, and returns its index in `data`. */
   push() {
     const offset = this.head * WIDTH;
     this.head = (this.head + 1) % ROWS;
@@ -41,18 +42,18 @@ export const record = {
     return offset;
   },
 
-  /** Where row `i` begins in `data`; row 0 is the oldest. @param {number} i */
+  /** The index of row `i` in `data`. Row 0 is the oldest. @param {number} i */
   at(i) {
     return ((this.head - this.length + i + ROWS) % ROWS) * WIDTH;
   },
 
-  /** Where the newest row begins; only if there is one. */
+  /** The index of the newest row. There must be one. */
   last() {
     return this.at(this.length - 1);
   },
 };
 
-/** Takes the latest joint state, if simulation time went on since the one before. */
+/** Adds the latest joint state, if simulation time has advanced. */
 export function take() {
   const { data } = record;
   if (record.length > 0 && state.time <= data[record.last() + TIME]) return;
@@ -74,9 +75,9 @@ export function take() {
 }
 
 /**
- * Positions between the rows that begin at `a` and `b`, at `s` from 0 to 1, by the cubic with the velocities of both. Where an arm
- * shakes these are of many turns between two rows, which nobody has seen: then it goes straight.
- * @param {number} a @param {number} b @param {number} s @param {Float64Array} position
+ * Positions between the rows that begin at `a` and `b`, at `s` from 0 to 1, by the cubic with the velocities of both.
+ * If the arm shakes, these velocities would give many turns between two rows. Then the line is straight. @param
+ * {number} a @param {number} b @param {number} s @param {Float64Array} position
  */
 export function between(a, b, s, position) {
   const { data } = record;
@@ -112,7 +113,7 @@ const COLUMNS = /** @type {[string, string, number][]} */ ([
   ["gravity_load", "N m", LOAD],
 ]);
 
-/** The file's text, for an arm with `links` links. @param {number} links @param {Settings | null} settings those in force now */
+/** The file's text, for an arm with `links` links. @param {number} links @param {Settings | null} settings the present ones */
 export function csvText(links, settings) {
   const names = ["time [s]"];
   const offsets = [TIME];
@@ -136,7 +137,7 @@ export function csvText(links, settings) {
   return `${lines.join("\r\n")}\r\n`;
 }
 
-/** The time of the newest row [s]; NaN where there is none. */
+/** The time of the newest row [s]; NaN if there is none. */
 export function newest() {
   return record.length > 0 ? record.data[record.last() + TIME] : NaN;
 }

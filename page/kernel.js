@@ -1,13 +1,13 @@
-// The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. Where workers are forbidden, it runs
-// in the page's own thread.
-// Invariant: its callers cannot tell it from a WebSocket to the runtime.
+// The arm in this page: its kernel runs in a worker, behind the interface of a WebSocket. If workers are forbidden, it runs in
+// the page's own thread.
+// Invariant: for its callers it behaves like a WebSocket to the runtime.
 
-/** The kernel, gzip in base64, in the page that is one file; the page of a server has none. */
+/** The kernel, as gzip in base64, in the page in one file. A server's page has none. */
 const carried = document.querySelector("#kernel-module");
 /** Whether the arm is in this page. */
 export const isAlone = carried !== null;
 
-/** Numbers of links that the address may ask for; without one there are two. */
+/** Numbers of links allowed in the address. The default is two. */
 const LINKS = /(?:^|[?#&])links=([23])(?:&|$)/;
 
 /** @param {string} text base64 of gzip */
@@ -18,8 +18,9 @@ export async function unpack(text) {
 }
 
 /**
- * Starts the kernel, and gives the function that takes frames. Its text is the worker's script too, so it knows nothing outside.
- * @param {BufferSource} bytes @param {number} links @param {number} seed @param {(frame: string) => void} tell
+ * Starts the kernel, and returns the function that takes frames. Its text is also the worker's script, so it uses
+ * nothing outside. @param {BufferSource} bytes @param {number} links @param {number} seed @param {(frame: string) =>
+ * void} tell
  */
 async function run(bytes, links, seed, tell) {
   const TICK_MS = 1000 / 60;
@@ -79,7 +80,7 @@ onmessage = async ({ data }) => {
 };`;
 
 export class Kernel {
-  /** The one that runs, for a script around the page: it may send frames too, and hear those that come. @type {Kernel | null} */
+  /** The running kernel, for a script around the page, which may also send and receive frames. @type {Kernel | null} */
   static current = null;
 
   constructor() {
@@ -101,7 +102,7 @@ export class Kernel {
       await this.beginWorker(start);
     } catch {
       const { take, stop } = await run(bytes, links, start.seed, (frame) => this.onmessage({ data: frame }));
-      // As a socket would, it answers later.
+      // It answers later, like a socket.
       this.send = (frame) => setTimeout(() => this.readyState === WebSocket.OPEN && take(frame));
       this.stop = stop;
     }
@@ -109,7 +110,7 @@ export class Kernel {
     this.onopen();
   }
 
-  /** Fulfilled once the worker runs; rejected where it may not. */
+  /** Fulfilled once the worker runs; rejected if workers are forbidden. */
   beginWorker(start) {
     const address = URL.createObjectURL(new Blob([SCRIPT], { type: "text/javascript" }));
     const worker = new Worker(address);

@@ -1,5 +1,5 @@
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
-// Invariant: no shortcut acts while somebody types, and all can be switched off.
+// Invariant: no shortcut acts while the user types, and all can be switched off.
 
 import { resetArm, takeBack } from "./actions.js";
 import { chooseJoint, nudgeSetpoint, switchController } from "./controls.js";
@@ -12,7 +12,7 @@ import { push } from "./tasks_panel.js";
 import { setPaused, singleStep, togglePause } from "./transport.js";
 
 const NUDGE = 0.05; // rad, as on the classic page
-/** A held key repeats faster than a push is worth sending. */
+/** A held key repeats faster than pushes are sent. */
 const PUSH_MS = 90;
 const SWITCH = "pendularm-shortcuts";
 
@@ -43,7 +43,7 @@ const shortcuts = [
 /** @type {Map<string, () => void>} */
 const actions = new Map(shortcuts.map(([key, , act]) => /** @type {any} */ ([key, act])));
 
-/** After key 0, choosing an integrator sets the arm going again, as it did there. */
+/** After key 0, choosing an integrator resumes the arm, as on the classic page. */
 async function useMethod(method, name) {
   const goOn = stoppedByZero;
   stoppedByZero = false;
@@ -75,7 +75,7 @@ function pressed(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing) return;
   const { target, key } = event;
   const typing = target.matches("input:not([type=range], [type=radio], [type=checkbox]), select, textarea");
-  // An element that has the focus keeps the keys that it needs itself.
+  // The focused element keeps the keys that it uses itself.
   const own = key === " " && target.matches("button, input, summary, select");
   if (typing || own) return;
   if (!byId("shortcuts-on").checked && key !== "?") return;

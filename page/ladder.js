@@ -1,25 +1,24 @@
-// Figures of offline runs. Error against run time: which runs to ask for, and what their answers say. A comparison: how far each run
-// lies from the reference over time, where it ended, what it gained.
-// Invariant: a run without an error is told apart from one that diverged; neither becomes a number. A run that ended early has figures
-// up to its end, and says when.
+// Figures of offline runs. Error against run time: the requested runs and their results. A comparison: the distance of each run
+// from the reference over time, its end, and its energy gain.
+// Invariant: a run without an error and a diverged run are shown differently, and neither as a number. A run that ended early
+// has figures up to its end, with its time.
 
 import { duration, fixed, METHODS, shortName, significant } from "./format.js";
 
-/** Timesteps, from long to short, each half of the one before [s]. */
+/** Timesteps from long to short, each half of the previous one [s]. */
 export const TIMESTEPS = Array.from({ length: 8 }, (_, k) => 0.032 / 2 ** k);
 
 /** @typedef {{method: string, timestep: number, error: number | null, sampling: number | null, uncertainty: number | null, wall: number, evaluations: number, divergedAt: number | null}} Rung */
 
-/** All runs, the cheapest first, so that the picture grows evenly. @returns {{method: string, timestep: number}[]} */
+/** All runs, the cheapest first, so the picture grows steadily. @returns {{method: string, timestep: number}[]} */
 export function rungs() {
   return TIMESTEPS.flatMap((timestep) => METHODS.map(([method]) => ({ method, timestep })));
 }
 
 /**
- * @param {{method: string, timestep: number}} rung
- * @param {{times: number[], error: number | null, sampling_error?: number | null, error_uncertainty?: number | null, wall_time: number, evaluations: number}} values
- * @param {number} seconds that were asked for
- * @returns {Rung}
+ * @param {{method: string, timestep: number}} rung @param {{times: number[], error: number | null, sampling_error?:
+ * number | null, error_uncertainty?: number | null, wall_time: number, evaluations: number}} values @param {number}
+ * seconds the requested duration @returns {Rung}
  */
 export function read({ method, timestep }, values, seconds) {
   const divergedAt = endOf(values.times, seconds, timestep);
@@ -38,7 +37,7 @@ export function read({ method, timestep }, values, seconds) {
 
 /** The runtime gives no error below this many times its uncertainty. */
 const CLEAR = 4;
-/** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
+/** With a larger uncertainty the reference could not follow the motion [rad]. */
 const FOLLOWED = 1e-3;
 
 /** A run's cell in the table: the error of the method, and with a controller the error of the hold. @param {Rung} rung */
@@ -49,15 +48,15 @@ export function errorText({ error, sampling, uncertainty, divergedAt }) {
   return uncertainty < FOLLOWED ? `< ${significant(CLEAR * uncertainty, 1)}` : "too wild to follow";
 }
 
-/** The error of the whole run: of the two errors that are known, the larger [rad]; null if none is. @param {Rung} rung */
+/** The error of the whole run: the larger of the two known errors [rad]; null if none is known. @param {Rung} rung */
 export function total({ error, sampling }) {
   return error == null && sampling == null ? null : Math.max(error ?? 0, sampling ?? 0);
 }
 
-/** The one move that is measured, so that two measurements compare: out of rest, stretched out. @type {Record<number, number[]>} */
+/** The measured move, always the same so that results can be compared: from rest, stretched out. @type {Record<number, number[]>} */
 export const MOVE_TO = { 2: [0.9, -1.3], 3: [0.9, -1.3, 0.8] };
 
-/** The move in words, with the settings that its result depends on. */
+/** A text for the move, with the settings that its result depends on. */
 export function stamp(/** @type {any} */ { links, enabled, params, gains, period }, /** @type {number} */ seconds) {
   const list = (/** @type {number[]} */ values) => values.map((one) => significant(one, 3)).join(", ");
   const arm = `masses ${list(params.masses)} kg, lengths ${list(params.lengths)} m, gravity ${significant(params.gravity, 3)} m/s²`;
@@ -67,19 +66,19 @@ export function stamp(/** @type {any} */ { links, enabled, params, gains, period
   return `Move to (${list(MOVE_TO[links])}) rad, ${start}; controller ${clock}, kp ${list(gains.kp)}, ki ${list(gains.ki)}, kd ${list(gains.kd)}; ${arm}.`;
 }
 
-/** How far the reference itself may be off [rad]; null if no run says. @param {Rung[]} rungs */
+/** The uncertainty of the reference [rad]; null if no run has it. @param {Rung[]} rungs */
 export function uncertaintyOf(rungs) {
   const known = rungs.flatMap(({ uncertainty }) => (uncertainty === null ? [] : [uncertainty]));
   return known.length > 0 ? Math.max(...known) : null;
 }
 
-/** When a run ended before its time, because it diverged [s]; null if it did not. @param {number[]} times @param {number} duration @param {number} timestep */
+/** The time at which a run diverged [s]; null if it did not. @param {number[]} times @param {number} duration @param {number} timestep */
 export function endOf(times, duration, timestep) {
   const last = times.at(-1) ?? 0;
   return last < duration - timestep * (1 + 1e-6) ? last : null;
 }
 
-/** For each method the cheapest run that is as good as `wanted` [rad]. @param {Rung[]} rungs @param {number} wanted */
+/** For each method the cheapest run with an error of at most `wanted` [rad]. @param {Rung[]} rungs @param {number} wanted */
 export function cheapest(rungs, wanted) {
   const good = rungs.filter((one) => (total(one) ?? Infinity) <= wanted);
   return METHODS.flatMap(([method]) => {
@@ -101,7 +100,7 @@ export function cheapest(rungs, wanted) {
  */
 
 /**
- * The largest difference of a joint from the reference, at each of the instants that both are sampled at [rad]; null where one has ended.
+ * The largest difference of a joint from the reference at each common sample [rad]; null if one has ended.
  * @param {Run} run @param {Run} reference @returns {(number | null)[]}
  */
 export function distances(run, reference) {
@@ -112,7 +111,7 @@ export function distances(run, reference) {
   });
 }
 
-/** From this distance on it is another motion [rad]. */
+/** At a larger distance it is another motion [rad]. */
 const PARTED = 0.1;
 
 /** A line of the table. @param {Run} run @param {(number | null)[]} away @param {number} seconds */

@@ -1,5 +1,5 @@
-// Error against run time, live: all methods over a ladder of timesteps, on one named move of the loop in force.
-// Invariant: every point is a run of the runtime's own, and the result goes as soon as the settings that it is about change.
+// Error against run time, live: all methods over a series of timesteps, on one named move of the active loop.
+// Invariant: every point is a run of the runtime, and the result is removed as soon as its settings change.
 
 import { Chart, DASHED, line, STRONG, TEXT, write } from "./chart.js";
 import { announce, byId, fillTable, setText } from "./dom.js";
@@ -12,7 +12,7 @@ import { climb } from "./study.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 
-const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
+const WANTED = 1e-3; // rad: the accuracy in the sentence
 const SECONDS = 2;
 const INVITATION = "Runs this arm on one fixed move, with every method at eight timesteps, and compares each run with the exact motion.";
 
@@ -23,24 +23,24 @@ let said;
 const seconds = option({ label: "duration", unit: "s", value: SECONDS });
 /** @type {Rung[]} */
 let found = [];
-let asked = ""; // the settings that `found` is about
-let running = 0; // counts the measurements that were begun; only the newest goes on
+let asked = ""; // the settings of `found`
+let running = 0; // the number of started measurements; only the newest continues
 
 export function startLadder() {
   surface = new Surface(byId("ladder"), () => drawLadder(surface, found));
   said = panel(byId("ladder-form"), [seconds], [["Measure", () => busy(said.buttons[0], "Measuring…", measure), { type: "submit", class: "primary" }]]);
   setText(byId("ladder-text"), INVITATION);
-  // The measurement is of another loop.
+  // The measurement belongs to another loop.
   watch(["links", "params", "gains", "period", "enabled"], () => { if (asked && asked !== settingsKey()) forget(INVITATION); });
 }
 
-/** All that a measurement depends on, as a text. */
+/** All settings that a measurement depends on, as a text. */
 export function settingsKey() {
   const { links, params, gains, period, enabled } = state;
   return JSON.stringify([links, params, enabled, enabled ? [gains, period?.period, period?.delay] : null]);
 }
 
-/** No figure is shown, and none that is on its way will be. @param {string} text what stands there instead */
+/** Shows no figure, and ignores pending ones. @param {string} text the text in its place */
 function forget(text) {
   running += 1;
   found = [];
@@ -76,10 +76,10 @@ function describe(about) {
     TIMESTEPS.map((timestep) => [duration(timestep), ...METHODS.map(([method]) => cellOf(method, timestep))]));
 }
 
-/** @param {Rung[]} best of each method the cheapest run that is good enough */
+/** @param {Rung[]} best the cheapest sufficient run of each method */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const truths = controlled ? " Solid lines: what the method costs. Dashed: what the controller’s hold costs; no method lowers it." : "";
+  const truths = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces." : "";
   if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${truths}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
@@ -115,7 +115,7 @@ export function drawLadder({ context, width, height }, found) {
       line(context, x - CROSS, y - CROSS, x + CROSS, y + CROSS, color, 1.75);
       line(context, x - CROSS, y + CROSS, x + CROSS, y - CROSS, color, 1.75);
     }
-    // The methods by their colours, side by side, so that no two names overprint.
+    // The methods in their colours, side by side, so that names do not overlap.
     chart.words(shortName(method), chart.left + (i * (chart.right - chart.left)) / METHODS.length, 10, "left", color, STRONG);
   });
 }

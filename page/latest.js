@@ -1,5 +1,5 @@
-// Sends the newest of many values: at most one call under way, and no more often than `intervalMs`.
-// Invariant: the last value offered is always sent in the end; values between may be skipped.
+// Sends the newest of many values: at most one pending call, and at most one call per `intervalMs`.
+// Invariant: the last value is always sent. Values in between may be skipped.
 
 export function latestOnly(send, intervalMs) {
   let waiting = null;

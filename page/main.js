@@ -1,5 +1,5 @@
-// Starts the page: every part takes its place, then the runtime is called; frames are drawn when something has changed.
-// Invariant: while nothing changes nothing is drawn, and no timer runs.
+// Starts the page: sets up every part, then connects to the runtime. Frames are drawn when something has changed.
+// Invariant: without a change nothing is drawn, and no timer runs.
 
 import { remember, startActions } from "./actions.js";
 import { startAim } from "./aim.js";
@@ -22,13 +22,14 @@ import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
 import { startShare, startTabs, startViews } from "./views.js";
 
-/** Plots and the trail change this often [ms], all in one frame; the arm itself moves in every frame. */
+/** Interval of plots and trail [ms], all in one frame. The arm itself moves in every frame. */
 const BEAT_MS = 100;
-/** Figures change at every so many beats; faster can't be read. */
+/** Figures change every few intervals, because faster changes cannot be read. */
 const FIGURES = 2;
 const SENTENCE_MS = 1000;
 
-// The token is in a cookie now, out of a script's reach: it need not stay in the address, its history and what is copied of it.
+// The token is in a cookie now, which scripts cannot read. So it is removed from the address, and is not in the history
+// or in copied links.
 const address = new URL(location.href);
 if (address.searchParams.has("token")) {
   address.searchParams.delete("token");
@@ -53,12 +54,12 @@ startAim(byId("arm"));
 startCourse();
 startViews();
 
-// On a small screen what is not needed at once is folded away.
+// On a small screen less important parts are folded.
 if (matchMedia("(max-width: 779px)").matches) {
   for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 
-/** Forgets the recording: a reset begins anew. */
+/** Clears the recording after a reset. */
 function forget() {
   record.clear();
   redrawPlots();
@@ -73,7 +74,7 @@ start(forget, remember);
 
 let beats = 0;
 let described = -Infinity;
-let left = 0; // beats still to come, so that the figures are those of the last news
+let left = 0; // remaining intervals, so the figures show the last message
 
 function beat() {
   left -= 1;

@@ -1,6 +1,6 @@
-// The arm's geometry, gravity load and energy from its state, for drawing only: the runtime computes the motion.
-// Angles in rad, each relative to the link before; link i has length l[i], mass m[i], its centre in the middle.
-// Invariant: nothing is allocated; results go into arrays that the caller owns.
+// The arm's geometry, gravity load and energy from its state, only for drawing: the runtime computes the motion. Angles are in
+// rad, each relative to the previous link. Link i has length l[i] and mass m[i], with its centre in the middle.
+// Invariant: nothing is allocated. Results are written to the caller's arrays.
 
 /** Ends of each link into `x`, `y`: entry 0 is the base, entry i the end of link i. */
 export function joints(n, q, l, x, y) {
@@ -29,7 +29,7 @@ export function gravityLoad(n, q, arm, load, at = 0) {
   }
 }
 
-/** Kinetic and potential energy [J]; the latter is 0 in the starting pose, stretched along x. */
+/** Kinetic and potential energy [J]. The latter is 0 in the starting pose, stretched along x. */
 export function energies(n, q, qd, { gravity, masses, lengths }) {
   let [phi, omega, y, kinetic, potential] = [0, 0, 0, 0, 0];
   let [vx, vy] = [0, 0]; // velocity of the joint before the link
@@ -52,17 +52,17 @@ export function reach(lengths) {
   return lengths.reduce((sum, one) => sum + one, 0);
 }
 
-/** Radius of the disc around the base that the end effector can't enter; 0 where there is none. */
+/** Radius of the disc around the base that the end effector cannot enter; 0 if there is none. */
 export function innerReach(lengths) {
   return Math.max(0, 2 * Math.max(...lengths) - reach(lengths));
 }
 
-/** The place nearest to the given one that the end effector can reach [m]; `lengths` are those of the links. */
+/** The reachable position of the end effector nearest to the given one [m]. `lengths` are those of the links. */
 export function nearestInReach({ x, y }, lengths) {
   const distance = Math.hypot(x, y);
   const near = Math.min(reach(lengths), Math.max(innerReach(lengths), distance));
   if (near === distance) return { x, y };
-  // All directions are as near from the base itself.
+  // From the base itself all directions are equally near.
   return distance > 0 ? { x: x * (near / distance), y: y * (near / distance) } : { x: near, y: 0 };
 }
 

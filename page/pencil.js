@@ -1,20 +1,21 @@
-// Draws a line through many points as through a few of them. Points that a straight line would miss by less than can be seen
-// are left out. A line of ten seconds has 600 points, and on a screen a tenth of them does.
-// Invariant: no point is further from what is drawn than `MISS`, upwards or downwards; points come from left to right.
+// Draws a line through many points with only a few of them. Points are omitted if the straight line passes them at an invisible
+// distance. A line of ten seconds has 600 points, and on a screen a tenth of them is enough.
+// Invariant: the vertical distance of every point from the drawn line is at most `MISS`. Points are in order from left to
+// right.
 
 /** [px] */
 export const MISS = 0.25;
 
 export class Pencil {
-  /** @param {{moveTo(x: number, y: number): void, lineTo(x: number, y: number): void}} context whose path is extended */
+  /** @param {{moveTo(x: number, y: number): void, lineTo(x: number, y: number): void}} context the path to extend */
   constructor(context) {
     this.context = context;
     this.isDown = false;
-    this.x = 0; // the point that was drawn last
+    this.x = 0; // the last drawn point
     this.y = 0;
-    this.lastX = 0; // the one that came last
+    this.lastX = 0; // the last given point
     this.lastY = 0;
-    this.least = -Infinity; // slopes of lines from the one drawn that miss none since
+    this.least = -Infinity; // slopes of lines from the drawn point that pass all later points
     this.most = Infinity;
   }
 
@@ -37,7 +38,7 @@ export class Pencil {
     this.lastY = y;
   }
 
-  /** The line ends at the point that came last; the next one begins another. */
+  /** Ends the line at the last given point. The next point begins another line. */
   lift() {
     if (this.isDown && (this.lastX !== this.x || this.lastY !== this.y)) this.context.lineTo(this.lastX, this.lastY);
     this.isDown = false;

@@ -1,6 +1,5 @@
-// The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor; and the recording as
-// a CSV file to keep.
-// Invariant: a file is handed to the browser and released.
+// The plots' panel: four strip charts and the phase plot, with legends and a common cursor; and the recording as a CSV file.
+// Invariant: a file is passed to the browser and released.
 
 import { byId, el, setText } from "./dom.js";
 import { short, significant } from "./format.js";
@@ -11,9 +10,9 @@ import { state, watch } from "./store.js";
 import { ENERGIES, PhasePlot, StripChart } from "./strip_chart.js";
 import { Surface } from "./surface.js";
 
-/** No more than this is shown of an arm that has diverged: the blow-up is the end of it [s]. */
+/** Longest shown time of an arm that has diverged, because the divergence is at its end [s]. */
 const BLOW_UP_SECONDS = 2;
-/** Of each plot its name and its chart; where joints have values in its legend, their column, unit and digits. @type {[string, any, number?, string?, number?][]} */
+/** The name and the chart of each plot. If its legend has joint values: their column, unit and digits. @type {[string, any, number?, string?, number?][]} */
 const CHARTS = [
   ["position", new StripChart([{ column: POSITION }, { column: SETPOINT, dashed: true }], 0.2, 300), POSITION, "rad", 3],
   ["velocity", new StripChart([{ column: VELOCITY }], 0.2, 300), VELOCITY, "rad/s", 3],
@@ -27,7 +26,7 @@ const shown = [true, true, true];
 let plots = [];
 let span = 10; // s
 let drawnVersion = -1;
-let cursor = NaN; // the instant under the pointer [s, simulation time]; NaN without one
+let cursor = NaN; // the time under the pointer [s, simulation time]; NaN without one
 let legends = [];
 
 export function startPlots() {
@@ -49,7 +48,7 @@ export function startPlots() {
   byId("plot-save").addEventListener("click", save);
 }
 
-/** Marks `time` [s] on all plots; NaN once the pointer has left. */
+/** Marks `time` [s] on all plots; NaN removes the mark. */
 function hover(time) {
   if (Object.is(time, cursor)) return;
   cursor = time;
@@ -57,7 +56,7 @@ function hover(time) {
   showValues();
 }
 
-/** What a plot shows now. @param {string} id */
+/** The present content of a plot. @param {string} id */
 function view(id) {
   return { now: newest() || 0, span: shownSpan(), links: state.links, shown, cursor, level: id === "energy" ? reference() : NaN };
 }
@@ -85,13 +84,13 @@ export function redraw() {
   for (const { surface } of plots) surface.redraw();
 }
 
-/** Draws the lines as they are now, if anything has moved since. */
+/** Draws the present lines, if anything has changed. */
 export function movePlots() {
   if (drawnVersion !== state.version) redraw();
   drawnVersion = state.version;
 }
 
-/** A chip per joint switches its lines on and off, and shows its colour; values stand in the legends. */
+/** A chip per joint switches its lines on and off, and shows its colour. Values are in the legends. */
 function makeLegends(links) {
   byId("plot-joints").replaceChildren("joints", ...Array.from({ length: links }, (_, joint) => {
     const box = el("input", { type: "checkbox", "aria-label": `joint ${joint + 1}`, onchange: () => { shown[joint] = box.checked; redraw(); } });
@@ -119,7 +118,7 @@ export function showValues() {
   setText(byId("legend-drift-name"), energyName(state));
 }
 
-/** Energy at the last reset, change of parameters or switching of PID [J]: the drift is measured from it. */
+/** Energy at the last reset, change of parameters or switch of the controller [J]. The drift is measured from it. */
 function reference() {
   const { diagnostics } = state;
   return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;

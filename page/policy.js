@@ -1,5 +1,5 @@
-// A verdict on the present timestep: the limit of the loop in force, where it holds, and both verdict and reason in words.
-// Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
+// A verdict on the present timestep: the limit of the active loop, its scope, and texts for the verdict and the reason.
+// Invariant: a figure is used only for the loop of its request. Until the answer arrives there is none.
 
 import { duration, fixed, methodName, METHODS, significant } from "./format.js";
 
@@ -9,20 +9,20 @@ import { duration, fixed, methodName, METHODS, significant } from "./format.js";
  * @property {Kind} kind
  * @property {string} pill a few words
  * @property {string} sentence all of it
- * @property {number} limit largest stable timestep [s]: 0 none, Infinity any, NaN not known
- * @property {number} advised timestep to offer [s]; NaN where there is none
- * @property {string} where what pose or speed the limit is about
- * @property {boolean} slow whether the verdict is about a control period longer than the timestep
+ * @property {number} limit largest stable timestep [s]: 0 none, Infinity any, NaN unknown
+ * @property {number} advised timestep to offer [s]; NaN if there is none
+ * @property {string} where the pose or speed of the limit
+ * @property {boolean} slow whether the verdict is for a control period longer than the timestep
  */
 
-/** Share of a limit that is advised, as the runtime does. */
+/** Advised share of a limit, as in the runtime. */
 const SHARE = 0.8;
-/** Share of a timestep that is advised where the arm diverged below every limit that is known. */
+/** Advised share of a timestep at which the arm diverged below every known limit. */
 const AFTER_DIVERGENCE = 0.5;
-/** A free swing that takes longer to double its energy loses its sense for other reasons first [s]. */
+/** If the energy of a free swing takes longer to double, other errors matter first [s]. */
 const SLOW_GROWTH = 600;
 
-/** The loop in force, as the study is asked about it for one method at a time: with the controller off it is the arm left to itself. */
+/** The active loop in the form of a request to the study, for one method. With the controller off it is the free arm. */
 export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown, period }) {
   if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
   return {
@@ -33,28 +33,28 @@ export function question(/** @type {any} */ { links, integrator, gains, params, 
   };
 }
 
-/** The study's answer for a method, if it is about the loop in force; null while it is not. */
+/** The study's answer for a method, if it belongs to the active loop; otherwise null. */
 export function answerInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
   const asked = question(state);
   return asked && state.limits.loop === JSON.stringify(asked) ? state.limits.answers[method] ?? null : null;
 }
 
-/** Parts of a limit that are no news. */
+/** Relative changes of a limit that are ignored. */
 const NEWS = 0.05;
 
-/** Whether the motion has another limit than when the study was last asked: that limit changes as the arm moves. */
+/** Whether the limit of the motion has changed since the last request to the study. It changes as the arm moves. */
 export function motionHasChanged(/** @type {any} */ answer, /** @type {any} */ diagnostics) {
   const [then, now] = [answer?.timestep_limit_motion, diagnostics?.timestep_limit_motion];
   if (then === undefined || !(now > 0)) return false;
   return open(then) !== now && !(Math.abs(now / open(then) - 1) < NEWS);
 }
 
-/** A limit as it is served: nothing limits where it is null. @param {number | null | undefined} served */
+/** A limit in an answer. Null means no limit. @param {number | null | undefined} served */
 function open(served) {
   return served ?? Infinity;
 }
 
-/** The limit of the loop in force with a method [s], and what pose or speed it is about. */
+/** The limit of the active loop with a method [s], and its pose or speed. */
 export function limitInForce(/** @type {any} */ state, /** @type {string} */ method = state.integrator?.method) {
   const answer = answerInForce(state, method);
   const free = state.enabled === false || (state.gains != null && isFree(state.gains));
@@ -64,7 +64,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const held = free && doublingTime(method, state.integrator.timestep, answer) > SLOW_GROWTH ? Infinity : heldLimit(state, answer);
   const fast = diverged || state.integrator?.timestep > held;
   const before = state.limits.motions[method];
-  // An arm that has diverged, or shakes, is fast because of that: its motion before that counts.
+  // An arm that has diverged or shakes is fast because of that, so its earlier motion counts.
   const motion = fast ? before?.limit ?? Infinity : open(answer.timestep_limit_motion);
   const speed = fast ? before?.speed : answer.motion_speed;
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
@@ -86,25 +86,26 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   };
 }
 
-/** The timestep's limit at the control period in force. Where the period itself is too long no timestep helps, and the limit of a law at every step stays. */
+/** The timestep's limit at the present control period. If the period itself is too long, no timestep helps, and the limit of a law at every step is used. */
 function heldLimit(/** @type {any} */ state, /** @type {any} */ answer) {
   const own = open(answer.timestep_limit);
   return state.period?.period > 0 && answer.timestep_limit !== undefined && own > 0 ? own : open(answer.timestep_limit_held);
 }
 
-/** Keeps an answer of the study about the loop in force, of which `asked` is the text. */
+/** Stores an answer of the study about the active loop, whose text is `asked`. */
 export function keepAnswer(/** @type {any} */ state, /** @type {string} */ asked, /** @type {string} */ method, /** @type {any} */ answer) {
   if (state.limits.loop !== asked) state.limits = { loop: asked, answers: {}, motions: {} };
   const { answers, motions } = state.limits;
   answers[method] = answer;
-  // A simulation that runs away is fast because of that, from the first answer on: the motion's limit is the one from before.
+  // A diverging simulation is fast because of that, even at the first answer, so the motion's earlier limit is kept.
   const isAway = state.diagnostics?.state === "diverged" || (state.enabled && state.integrator.timestep > open(answer?.timestep_limit_held));
   if (answer && !isAway) motions[method] ??= { limit: open(answer.timestep_limit_motion), speed: answer.motion_speed };
 }
 
 /**
- * By when Euler or midpoint double the energy of the fastest small free swing, at a timestep [s]; 0 for other methods and other loops.
- * A step multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its angular frequency.
+ * The time in which Euler or midpoint double the energy of the fastest small free swing, at a timestep [s]; 0 for other
+ * methods and other loops. A step multiplies the swing by 1 + iz or by 1 - z²/2 + iz, with z = timestep times its
+ * angular frequency.
  */
 export function doublingTime(/** @type {string} */ method, /** @type {number} */ timestep, /** @type {any} */ answer) {
   if (answer?.timestep_limit_held !== 0 || !answer.critical || !["euler", "midpoint"].includes(method)) return 0;
@@ -113,8 +114,8 @@ export function doublingTime(/** @type {string} */ method, /** @type {number} */
 }
 
 /**
- * The largest stable control period [s]: 0 none, Infinity any, NaN not known, as while no controller acts.
- * An answer that names none is about a control law that runs at every step, without a delay: there it is the timestep's limit.
+ * The largest stable control period [s]: 0 none, Infinity any, NaN unknown, as while no controller acts. An answer
+ * without one belongs to a control law that runs at every step without a delay. Then it is the timestep's limit.
  */
 export function controlPeriodLimit(/** @type {any} */ state) {
   const answer = answerInForce(state);
@@ -123,12 +124,12 @@ export function controlPeriodLimit(/** @type {any} */ state) {
   return state.period?.delay ? NaN : open(answer.timestep_limit_held);
 }
 
-/** Timesteps from one control update to the next, as the runtime counts them: at least 1. */
+/** Timesteps per control update, as in the runtime: at least 1. */
 export function stepsPerUpdate(/** @type {any} */ { period, integrator }) {
   return Math.max(1, Math.round((period?.period ?? 0) / integrator.timestep));
 }
 
-/** The control period in force, in few words; empty where the control law runs at every step without a delay. */
+/** A short text for the present control period; empty if the control law runs at every step without a delay. */
 export function periodText(/** @type {any} */ state) {
   const { period, integrator } = state;
   if (!period || !integrator) return "";
@@ -145,7 +146,7 @@ export function verdict(/** @type {any} */ state) {
   const slow = steps > 1;
   const longest = steps * timestep;
   const limit = slow || (state.enabled && state.period?.delay) ? Math.min(timestepLimit, controlPeriodLimit(state)) : timestepLimit;
-  // A smaller timestep makes no control period shorter.
+  // A smaller timestep does not make the control period shorter.
   const offered = !slow && advised > 0 && advised < timestep ? advised : NaN;
   const known = { limit, where, advised: offered, slow };
   const at = slow ? `A control period of ${duration(longest)}` : duration(timestep);
@@ -160,14 +161,14 @@ export function verdict(/** @type {any} */ state) {
     return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: above, ...known };
   }
   if (longest > everyPose) {
-    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: the gains are at fault there";
+    const others = everyPose > 0 ? `other poses are stable only up to ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is stable, because of the gains";
     const sentence = `${at} is stable ${where}, but ${others}.`;
     return { kind: "here", pill: "stable here only", sentence, ...known };
   }
   return { kind: "stable", pill: "stable", sentence: `${at} is within the limit ${limitText(limit)}, ${where}.`, ...known };
 }
 
-/** Why a time is too long; empty if it is not. @param {string} at the time in words @param {number} time @param {number} limit @param {string} where */
+/** Why a time is too long; empty if it is not. @param {string} at the text of the time @param {number} time @param {number} limit @param {string} where */
 function excess(at, time, limit, where) {
   if (!(time > limit)) return "";
   return limit > 0
@@ -181,16 +182,16 @@ export function limitText(limit) {
   return limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : duration(limit);
 }
 
-/** The word for the energy since the last reset: drift only if nothing puts any in or takes any out. */
+/** The word for the energy since the last reset. It is drift only if nothing adds or removes energy. */
 export function energyName(/** @type {{enabled: boolean | null, pushed: boolean}} */ { enabled, pushed }) {
   if (enabled) return "work";
   return pushed ? "pushed in" : "drift";
 }
 
 /**
- * The timestep to begin anew with: the arm is at rest then, and how fast it has become does not count.
+ * The timestep for a restart. The arm is then at rest, so its present speed does not count.
  * @param {Object<string, any>} answer of `/study/stability`
- * @returns {number} timestep [s]; NaN where there is none
+ * @returns {number} timestep [s]; NaN if there is none
  */
 function afterReset(answer) {
   const found = answer.minimum_over_poses_held;
@@ -200,11 +201,11 @@ function afterReset(answer) {
 
 /** @typedef {Record<string, number>} Limits largest stable timestep of each method [s] */
 
-/** Limits within this factor are said to be alike. */
+/** Limits within this factor count as equal. */
 const ALIKE = 1.15;
-/** The study looks at what grows at so many times the limit. */
+/** The study computes growth at this multiple of the limit. */
 const BEYOND = 1.1;
-/** Steps in one swing of a deviation that flips at every step. */
+/** Steps in one period of a deviation that changes its sign at every step. */
 const FLIP = 2;
 const NEARLY = 0.99;
 
@@ -233,7 +234,7 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0
       ? "these gains do not hold the arm here, with any method and any timestep. Raise the derivative gains, or lower the integral gains."
-      : "nothing damps the arm here, and a torque that is held for a step comes a little late. Raise the derivative gains.";
+      : "nothing damps the arm here, and a torque that is held for a step is a little late. Raise the derivative gains.";
   }
   if (!critical || !(least > 0)) return "beyond it a deviation grows.";
   const joint = `joint ${critical.joint + 1}`;
@@ -247,7 +248,7 @@ export function cause({ critical, minimum_over_poses_held: least, equilibrium_ki
 export function others(limits) {
   const finite = Object.values(limits);
   const [least, most] = [Math.min(...finite), Math.max(...finite)];
-  if (most <= ALIKE * least) return "A better method does not help: the controller looks only once a step. It only makes the simulated motion more exact.";
+  if (most <= ALIKE * least) return "A better method does not help: the controller acts only once a step. It only makes the simulated motion more exact.";
   const best = METHODS.filter(([method]) => limits[method] > most / ALIKE).map(([, name]) => name);
   return `${best.join(", ")}: stable up to ${limitText(most)}.`;
 }
@@ -274,7 +275,7 @@ export function scaled(gains, factor) {
 /** Gains are sent with three digits. */
 const ROUNDED = 0.02;
 
-/** By what `gains` are a multiple of `base`; NaN if they are none. @param {Gains | null} gains @param {Gains | null} base */
+/** The factor between `gains` and `base`; NaN if they are not a multiple. @param {Gains | null} gains @param {Gains | null} base */
 export function factorOf(gains, base) {
   if (!gains || !base || gains.kp.length !== base.kp.length) return NaN;
   const pairs = /** @type {const} */ (["kp", "ki", "kd"]).flatMap((key) => gains[key].map((one, i) => [one, base[key][i]]));

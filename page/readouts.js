@@ -1,5 +1,5 @@
-// Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
-// Invariant: written a few times a second; only what changed touches the page.
+// Readouts: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
+// Invariant: they are updated a few times a second, and only changed texts are written.
 
 import { byId, setAttribute, setText } from "./dom.js";
 import { fixed, significant } from "./format.js";
@@ -8,7 +8,7 @@ import { answerInForce, doublingTime, limitInForce, limitText, verdict } from ".
 import { isAlone } from "./kernel.js";
 import { LOOP, state, watch } from "./store.js";
 
-/** Below this real-time factor the runtime lags. */
+/** Below this real-time factor the runtime is too slow. */
 const LAGS = 0.95;
 
 export function startReadouts() {
@@ -37,12 +37,12 @@ function runState() {
   return state.paused ? "paused" : "running";
 }
 
-/** The verdict on the timestep: in a word on the arm, in a sentence under it; and under the clocks what to use. */
+/** The verdict on the timestep: in a word on the arm, in a sentence under it, and as advice under the clocks. */
 function showLimit() {
   const said = verdict(state);
   const { limit, everyPose } = limitInForce(state);
   const pill = byId("verdict-pill");
-  pill.hidden = ["offline", "diverged", "unknown"].includes(said.kind); // the other pill says so, or the answer is on its way
+  pill.hidden = ["offline", "diverged", "unknown"].includes(said.kind); // the other pill shows it, or the answer is pending
   pill.className = `state ${said.kind}`;
   setText(pill, said.pill);
   setText(byId("verdict"), said.kind === "never" ? `${said.sentence} ${growthText()}` : said.sentence);
@@ -57,14 +57,14 @@ function showLimit() {
   byId("out-every").classList.toggle("warn", said.kind === "here");
 }
 
-/** How fast a small free swing gains energy. */
+/** The energy gain of a small free swing. */
 function growthText() {
   const { method, timestep } = state.integrator;
   const seconds = doublingTime(method, timestep, answerInForce(state));
   return seconds > 0 ? `The energy of a small swing doubles every ${significant(seconds, 2)} s.` : "";
 }
 
-/** The arm in a sentence, for those who can't see it; read when the view has the focus. */
+/** The arm in a sentence for screen readers, read when the view has the focus. */
 export function describeArm() {
   if (state.links === 0 || !state.params) return;
   const { x, y } = endEffector();

@@ -1,10 +1,11 @@
-// A rosbridge client over a WebSocket, or what has its interface: calls as promises, subscriptions that outlive a lost connection.
-// Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
+// A rosbridge client over a WebSocket or an object with its interface: calls as promises, and subscriptions that survive a lost
+// connection.
+// Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason if there is no answer.
 
 const FIRST_RETRY_MS = 300;
 const LAST_RETRY_MS = 4000;
 const CALL_TIMEOUT_MS = 15000;
-/** Calls that may wait for an answer; a runtime that answers nothing must not fill the memory. */
+/** Most calls that wait for an answer, so that memory is bounded without answers. */
 const MOST_CALLS = 256;
 
 export class Rosbridge {
@@ -16,7 +17,7 @@ export class Rosbridge {
     this.dial = dial;
     this.onState = onState;
     this.handlers = new Map(); // topic -> function
-    this.throttles = new Map(); // topic -> least time between messages [ms], where there is one
+    this.throttles = new Map(); // topic -> least time between messages [ms], if there is one
     this.calls = new Map(); // id -> { settle, timer }
     this.nextId = 1;
     this.retryMs = FIRST_RETRY_MS;
@@ -35,8 +36,8 @@ export class Rosbridge {
     this.socket = socket;
     socket.onopen = () => {
       this.retryMs = FIRST_RETRY_MS;
-      // Errors about what we publish are worth showing; over WebSocket they come only when asked for.
-      // `values` of a refused call are the values as they now are, not the text that `status` has too.
+      // Errors about published messages are shown, but over WebSocket they must be requested. `values`
+      // of a refused call are the present values, not the text of `status`.
       this.send({ op: "set_level", level: "error", errors: "object" });
       for (const topic of this.handlers.keys()) this.send(this.subscription(topic));
       this.onState("open");
@@ -48,7 +49,7 @@ export class Rosbridge {
   lost() {
     for (const id of [...this.calls.keys()]) this.answer(id, failure("the connection was lost"));
     this.onState("lost");
-    const wait = this.retryMs * (0.75 + 0.5 * Math.random()); // many pages must not all return at once
+    const wait = this.retryMs * (0.75 + 0.5 * Math.random()); // many pages must not reconnect at the same time
     this.retryMs = Math.min(2 * this.retryMs, LAST_RETRY_MS);
     setTimeout(() => this.connect(), wait);
   }
@@ -91,7 +92,7 @@ export class Rosbridge {
     return { op: "subscribe", topic, throttle_rate: this.throttles.get(topic) ?? 0 };
   }
 
-  /** From now on at most one message of the topic every `ms`. */
+  /** Limits the topic to one message per `ms` from now on. */
   throttle(topic, ms) {
     if ((this.throttles.get(topic) ?? 0) === ms) return;
     this.throttles.set(topic, ms);

@@ -1,5 +1,5 @@
-// The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
-// Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
+// The page's connection to the runtime: topics are stored, commands are sent, and settings are requested regularly.
+// Invariant: the values of every answer are stored, so the page shows values that the runtime accepted.
 
 import { announce, warn } from "./dom.js";
 import { METHODS } from "./format.js";
@@ -9,21 +9,21 @@ import { answerInForce, keepAnswer, motionHasChanged, question } from "./policy.
 import { Rosbridge } from "./rosbridge.js";
 import { MOST_LINKS, nothingAsked, set, state, tell, watch } from "./store.js";
 
-/** Other clients change settings too, and no topic tells of it. */
+/** Other clients change settings too, and no topic reports it. */
 const POLL_MS = 1000;
-/** A trajectory that came so lately is newer than what other messages say of the setpoint; the next diagnostics are right again. */
+/** A more recent trajectory is newer than the setpoint in other messages. The next diagnostics are correct again. */
 const TRAJECTORY_MS = 400;
-/** A picture that stands still needs few joint states [ms between two]. */
+/** A paused arm needs few joint states [ms between two]. */
 const STILL_MS = 1000;
-/** One that nobody sees needs more: they are recorded, and a swing must be known by them when somebody looks again. */
+/** A hidden page needs more, because they are recorded and must show a swing later. */
 const HIDDEN_MS = 100;
-/** But what was done to a paused arm here is seen at once: so long all of them come [ms]. */
+/** After a change of a paused arm by this page, all joint states arrive for this time [ms]. */
 const TOUCHED_MS = 300;
 /** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
-/** Setpoints may come many a second; the study is asked about the latest. */
+/** Many setpoints may arrive per second. The study is asked about the latest. */
 const STABILITY_MS = 200;
-/** Radius within which a goal counts as reached, unless it says otherwise [m]; the runtime's own default. */
+/** Default radius within which a goal counts as reached [m], as in the runtime. */
 export const DEFAULT_EPSILON = 0.02;
 
 let bridge;
@@ -51,13 +51,13 @@ export function start(whenReset, whenChanging) {
   watch(["integrator", "gains", "params", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
-    if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
+    if (state.goal?.outcome === "reached") set("goal", null); // there is no arm any more
   });
   watch("paused", pace);
   document.addEventListener("visibilitychange", pace);
 }
 
-/** As many joint states as are drawn or recorded: all of a moving arm in sight, a few of one that is paused or hidden. */
+/** Requests the joint states that are drawn or recorded: all for a visible moving arm, few for a paused or hidden one. */
 function pace() {
   bridge.throttle("/joint_states", rests() ? STILL_MS : document.hidden ? HIDDEN_MS : 0);
 }
@@ -66,7 +66,7 @@ function rests() {
   return state.paused === true && performance.now() - touched >= TOUCHED_MS;
 }
 
-/** A paused arm is in another pose by what was asked of it here. */
+/** A paused arm changes its pose after a request of this page. */
 function touch() {
   touched = performance.now();
   pace();
@@ -77,7 +77,7 @@ function connection(now) {
   const before = state.connection;
   set("connection", now);
   if (now === "open") {
-    // It may be another runtime, or the same one started anew: nothing of the old one holds.
+    // It may be another or a restarted runtime, so all old values are discarded.
     state.setpointKnown = false;
     set("limits", nothingAsked());
     set("goal", null);
@@ -98,9 +98,9 @@ function jointStates(msg) {
     state.setpointKnown = false;
     set("links", n);
   } else if (time === state.time && same(msg, n)) {
-    return; // a paused arm says the same sixty times a second
+    return; // a paused arm sends the same state sixty times a second
   }
-  // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose.
+  // The clock runs backwards only at a reset, which returns the setpoint to the starting pose.
   if (time < state.time) {
     if (noTrajectoryOfLate()) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
@@ -136,7 +136,7 @@ function trajectory(msg) {
   const positions = new Array(last.length);
   for (let i = 0; i < last.length; i += 1) positions[named ? Number(names[i].slice(5)) - 1 : i] = last[i];
   lastTrajectory = performance.now();
-  if (state.goal?.outcome === "reached") set("goal", null); // the arm is sent elsewhere: its mark is of the past
+  if (state.goal?.outcome === "reached") set("goal", null); // the arm has another setpoint, so the goal's mark is outdated
   keepSetpoint(positions);
 }
 
@@ -174,7 +174,7 @@ function diagnostics(msg) {
   keep("diverged", report.state === "diverged");
   if (motionHasChanged(answerInForce(state), report)) askNow();
   if (before === report.state) return;
-  poll(); // another client may have done what led here
+  poll(); // another client may have caused this
   if (report.state === "diverged") warn(`The simulation has ${report.message}`);
 }
 
@@ -196,7 +196,7 @@ function goalResult(msg) {
   if (msg.outcome === "reached" && !state.trial?.running) announce("Target reached.");
 }
 
-// Settings: each call asks or changes, and stores what is now in force.
+// Settings: each call reads or changes them, and stores the present values.
 
 function poll() {
   if (!bridge.open || document.hidden) return;
@@ -216,14 +216,14 @@ async function settings(service, args, keep) {
   return answer;
 }
 
-/** No setting, so nothing to undo. */
+/** This is not a setting, so there is nothing to undo. */
 export async function pause(data) {
   const answer = await bridge.call("/arm_sim/pause", data === undefined ? {} : { data });
   if ("data" in answer.values) keep("paused", answer.values.data);
   return answer;
 }
 
-/** Stores `value` under `key`, and tells of it only where it differs. */
+/** Stores `value` under `key`, and notifies only if it differs. */
 function keep(key, value) {
   if (JSON.stringify(state[key]) !== JSON.stringify(value)) set(key, value);
 }
@@ -260,16 +260,15 @@ export async function reset() {
 }
 
 /**
- * Puts the arm into another pose [rad], at these speeds [rad/s], else at rest; running or paused. It is no setting, so there is
- * nothing to undo.
- * @param {number[]} position @param {number[]} [velocity]
+ * Puts the arm into another pose [rad], with these velocities [rad/s] or at rest, running or paused. This is not a
+ * setting, so there is nothing to undo. @param {number[]} position @param {number[]} [velocity]
  */
 export async function setState(position, velocity = position.map(() => 0)) {
   const answer = await bridge.call("/arm_sim/set_state", { position, velocity });
   if (answer.result) {
     touch();
-    state.pushed = false; // energy is counted anew
-    if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
+    state.pushed = false; // energy is measured from here
+    if (state.goal?.outcome === "reached") set("goal", null); // there is no arm any more
   }
   return answer;
 }
@@ -277,7 +276,7 @@ export async function setState(position, velocity = position.map(() => 0)) {
 export async function sendGoal(args) {
   const answer = await bridge.call("/ik_action/send_goal", args);
   if (answer.result) {
-    // Feedback may have come before; it knows everything but the epsilon.
+    // Feedback may have arrived before. It has everything except the epsilon.
     const known = state.goal?.id === answer.values.goal_id ? state.goal : { distance: NaN, elapsed: 0, outcome: "active" };
     const { x, y, phi } = args;
     set("goal", { ...known, id: answer.values.goal_id, target: known.target ?? { x, y, phi }, epsilon: args.epsilon ?? DEFAULT_EPSILON });
@@ -285,7 +284,7 @@ export async function sendGoal(args) {
   return answer;
 }
 
-/** Sends `positions` [rad] as the setpoint; it comes back over the topic like anybody's. */
+/** Sends `positions` [rad] as the setpoint. It arrives on the topic, like every client's. */
 export function sendSetpoint(positions) {
   beforeChange();
   const names = Array.from({ length: state.links }, (_, i) => `joint${i + 1}`);
@@ -299,7 +298,7 @@ export function sendSetpoint(positions) {
 /** The study's answer about any loop. */
 export const stability = (args) => bridge.call("/study/stability", args, LONG_CALL_MS);
 
-/** Asks about the loop in force with each method, the present one first; computing takes a while, so only the newest loop counts. */
+/** Asks about the active loop with each method, the present one first. Computing takes time, so only the newest loop counts. */
 const askNow = latestOnly(async () => {
   const loop = question(state);
   if (!loop) return;
@@ -313,7 +312,7 @@ const askNow = latestOnly(async () => {
   }
 }, STABILITY_MS);
 
-/** Asks unless the answer is there. */
+/** Asks, unless the answer is known. */
 function askStability() {
   if (question(state) && bridge.open && !answerInForce(state)) askNow();
 }

@@ -1,4 +1,4 @@
-// Scales of the charts: where a value is between the low end and the high one, and which marks to write.
+// Scales of the charts: the position of a value between the ends, and the marks.
 // Invariant: labels are made only when the range changes, not at every frame.
 
 import { duration, significant } from "./format.js";
@@ -6,10 +6,10 @@ import { duration, significant } from "./format.js";
 /** @typedef {[number, string][]} Marks values and their labels */
 /** @typedef {{place: (value: number) => number, marks: Marks}} Scale 0 at the low end, 1 at the high one */
 
-/** Beyond this a linear scale draws at the edge: differences must stay finite. */
+/** Largest value of a linear scale. Larger ones are drawn at the edge, so differences stay finite. */
 const LARGEST = 1e150;
 const MOST_MARKS = 12;
-/** Where a logarithmic scale ends: beyond it nothing is worth telling apart, and growth up to it stays in sight. */
+/** The end of a logarithmic scale. Growth up to it is visible, and larger values need no distinction. */
 export const LOG_END = 1e12;
 /** Decades of a logarithmic scale for one mark. */
 const DECADES_A_MARK = [1, 2, 3, 4, 6, 12];
@@ -20,20 +20,20 @@ export function symmetricLog(value) {
 }
 
 /**
- * A range of round numbers around what is drawn. Where values explode the scale turns logarithmic on both sides of zero, so that
- * steady growth is a straight line and the sane part stays in sight.
+ * A range of round numbers around the drawn values. If values diverge, the scale becomes logarithmic on both sides of
+ * zero. Then exponential growth is a straight line, and the normal part stays visible.
  */
 export class Axis {
   /**
    * @param {number} wanted about how many marks
-   * @param {number} least smallest span, so that rest looks like rest
+   * @param {number} least smallest span, so that small noise at rest stays small
    * @param {number} sane largest magnitude of a linear scale
    */
   constructor(wanted, least, sane) {
     this.wanted = wanted;
     this.least = least;
     this.sane = sane;
-    this.fixed = false; // the range stays as it is
+    this.fixed = false; // the range does not change
     this.log = false;
     this.low = 0;
     this.high = 1;
@@ -52,7 +52,7 @@ export class Axis {
   /** @param {number} min @param {number} max */
   fitLinear(min, max) {
     if (!(min <= max)) min = max = 0;
-    // A span that rounding would swallow is none.
+    // A span below rounding counts as zero.
     const missing = Math.max(0, Math.max(this.least, 1e-9 * Math.max(-min, max)) - (max - min));
     min -= missing / 2;
     max += missing / 2;
@@ -74,7 +74,7 @@ export class Axis {
     Object.assign(this, { log, low, high, step });
     this.marks = Array.from({ length: Math.min(MOST_MARKS, Math.round((high - low) / step) + 1) }, (_, i) => {
       const at = low + i * step;
-      // On a logarithmic scale marks are kept where they are drawn: at powers of ten.
+      // On a logarithmic scale marks are at powers of ten.
       return log ? [Math.sign(at) * (10 ** Math.abs(at) - 1), powerLabel(at)] : [at, significant(Math.abs(at) < step / 2 ? 0 : at, 4)];
     });
   }
@@ -99,7 +99,7 @@ function powerLabel(power) {
   return power === 0 ? "0" : size < 4 ? `${sign}${10 ** size}` : `${sign}1e${size}`;
 }
 
-/** A logarithmic scale of positive values; place and value are each other's inverse. */
+/** A logarithmic scale of positive values. `place` and `value` are inverse functions. */
 export class LogScale {
   /** @param {number} low @param {number} high @param {Marks} [marks] else powers of ten, in seconds */
   constructor(low, high, marks) {
@@ -146,7 +146,7 @@ export function powerOfTen(value) {
   return `1e${Math.round(Math.log10(value))}`.replace("-", "\u2212");
 }
 
-/** Seconds from one instant to another. @param {number} from @param {number} to @returns {Scale} */
+/** Seconds from one time to another. @param {number} from @param {number} to @returns {Scale} */
 export function times(from, to) {
   const span = to - from;
   const every = roundStep(span / 8);

@@ -1,21 +1,16 @@
-// The 39 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its behaviour.
-// The report reads the rows from this file, for its pictures and their links; so they are JSON.
+// The 39 stiff and extreme scenes as settings of the live arm: each with its pose at the start and one sentence about its
+// behaviour. The report reads the rows from this file, for its pictures and links, so they are JSON.
 // Invariant: the rows are those of `src/report/experiments/scenarios/`, in their order.
 
 import { DEFAULTS } from "./settings.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
 /**
- * @typedef {object} Scene
- * @property {string} id
- * @property {string} name
- * @property {number} links 0: no arm of this page
- * @property {string} expected one short sentence
- * @property {number[]} start pose at the start [rad]
- * @property {number[]} [velocity] at the start [rad/s]
- * @property {Partial<Settings>} settings what differs from the defaults
- * @property {{seconds: number, timestep?: number, start?: number[]}} [watch] the report's picture: its length [s], its own timestep [s] and pose [rad]
- * @property {string} [hidden] why the report has no picture
+ * @typedef {object} Scene @property {string} id @property {string} name @property {number} links 0 for no arm of this
+ * page @property {string} expected one short sentence @property {number[]} start pose at the start [rad] @property
+ * {number[]} [velocity] at the start [rad/s] @property {Partial<Settings>} settings what differs from the defaults
+ * @property {{seconds: number, timestep?: number, start?: number[]}} [watch] the report's picture: its length [s], its
+ * own timestep [s] and pose [rad] @property {string} [hidden] why the report has no picture
  */
 
 /** @type {Scene[]} */

@@ -1,29 +1,25 @@
-// All settings of the arm as one object: taken, compared, spelled in a link, read from one. And the way back: the settings in
-// force before the latest changes.
-// Invariant: nothing here speaks to the runtime; the caller that applies settings gets its refusals.
+// All settings of the arm as one object: collected, compared, written to a link and read from one. Also the undo history: the
+// settings before the latest changes.
+// Invariant: nothing here calls the runtime. The caller that applies settings gets its refusals.
 
 import { METHODS, exact } from "./format.js";
 
 /** @typedef {import("./policy.js").Gains} Gains */
 /** @typedef {import("./policy.js").Arm} Arm */
 /**
- * @typedef {object} Settings
- * @property {{method?: string, timestep?: number} | null} integrator
- * @property {Partial<Arm> | null} params
- * @property {Partial<Gains> | null} gains
- * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
- * @property {boolean | null} controller whether it is on
- * @property {boolean} [servo] the same, as the scenes say it
- * @property {number[] | null} setpoint
- * @property {{ position?: number[], velocity?: number[] } | null} [start] where the arm is let go [rad, rad/s]; in links only
+ * @typedef {object} Settings @property {{method?: string, timestep?: number} | null} integrator @property {Partial<Arm>
+ * | null} params @property {Partial<Gains> | null} gains @property {{period?: number, delay?: boolean} | null} period
+ * the control period, 0 for every step [s] @property {boolean | null} controller whether it is on @property {boolean}
+ * [servo] the same, in the form of the scenes @property {number[] | null} setpoint @property {{ position?: number[],
+ * velocity?: number[] } | null} [start] the start of the arm [rad, rad/s]; only in links
  */
 
 /** Changes that can be undone. */
 const MOST_STEPS = 100;
-/** Changes closer together than this are one: a slider is dragged through many values [ms]. */
+/** Changes within this time count as one, because a slider passes through many values [ms]. */
 const ONE_CHANGE_MS = 1000;
 
-/** The runtime's own settings at its start, by links; a test compares them with it. @type {Record<number, Settings>} */
+/** The runtime's default settings, by number of links. A test compares them with the runtime. @type {Record<number, Settings>} */
 export const DEFAULTS = {
   2: {
     integrator: { method: "rk4", timestep: 0.001 },
@@ -43,7 +39,7 @@ export const DEFAULTS = {
   },
 };
 
-/** The settings in force; null until the runtime has said them all. @returns {Settings | null} */
+/** The present settings; null until all are known. @returns {Settings | null} */
 export function presentSettings(/** @type {any} */ { links, integrator, params, gains, period, enabled, setpoint, setpointKnown }) {
   if (!integrator || !params || !gains || !period || enabled == null) return null;
   return {
@@ -69,7 +65,7 @@ export function toFragment({ integrator, params, gains, period, controller, setp
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
 }
 
-/** The settings in a link's fragment; checked no further than its form, since the runtime checks it all. @returns {Settings} */
+/** The settings in a link's fragment. Only the form is checked, because the runtime checks the values. @returns {Settings} */
 export function fromFragment(/** @type {string} */ hash) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
   const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(Number);
@@ -95,7 +91,7 @@ function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ othe
   return JSON.stringify(one) === JSON.stringify(other);
 }
 
-/** Settings as they were before each change, newest last. */
+/** The settings before each change, the newest last. */
 export class Undo {
   constructor() {
     /** @type {Settings[]} */
@@ -103,7 +99,7 @@ export class Undo {
     this.lastTime = -Infinity;
   }
 
-  /** Before a change at `now` [ms]: keeps what is in force, unless the change goes on with the one before. */
+  /** Stores the present settings before a change at `now` [ms], unless the change continues the previous one. */
   remember(/** @type {Settings | null} */ present, /** @type {number} */ now) {
     const goesOn = now - this.lastTime < ONE_CHANGE_MS;
     this.lastTime = now;
@@ -112,12 +108,12 @@ export class Undo {
     if (this.past.length > MOST_STEPS) this.past.shift();
   }
 
-  /** Whether there are settings to go back to: others than those in force. A refused setting has changed nothing. */
+  /** Whether there are earlier settings that differ from the present ones. A refused setting has changed nothing. */
   leadsBackFrom(/** @type {Settings | null} */ present) {
     return this.past.some((settings) => !isSame(settings, present));
   }
 
-  /** The settings to go back to; undefined if there are none. */
+  /** The settings to restore; undefined if there are none. */
   take(/** @type {Settings | null} */ present) {
     this.lastTime = -Infinity;
     let settings = this.past.pop();

@@ -1,5 +1,5 @@
-// A student's own arm: a form, and one sheet to print with its limits, the reason, what a better method buys, and a link.
-// Invariant: the sheet asks the study about the form's arm; the live arm stays as it is.
+// A student's own arm: a form, and a printable sheet with its limits, the reason, the benefit of a better method, and a link.
+// Invariant: the sheet asks the study about the form's arm. The live arm does not change.
 
 import { byId, el } from "./dom.js";
 import { option, panel } from "./field.js";
@@ -10,7 +10,7 @@ import { rollout, stability } from "./runtime.js";
 import { DEFAULTS, toFragment } from "./settings.js";
 import { state } from "./store.js";
 
-/** The move whose error the sheet names: how long it takes [s], and its timestep and control period [s]. */
+/** The move with the error on the sheet: its duration [s], and its timestep and control period [s]. */
 const MOVE = 2;
 const AT = 0.001;
 
@@ -22,7 +22,7 @@ let fields = {};
 let gravity;
 let said;
 
-/** Puts the form into `place`, filled in with the arm as it is; `whenMade` is called once a sheet stands. @param {HTMLElement} place @param {() => void} whenMade */
+/** Puts the form into `place`, with the present arm's values. `whenMade` is called after a sheet has been made. @param {HTMLElement} place @param {() => void} whenMade */
 export function showForm(place, whenMade) {
   const known = /** @type {any} */ ({ ...DEFAULTS[state.links].params, ...DEFAULTS[state.links].gains, ...state.params, ...state.gains });
   gravity = option({ label: "gravity", unit: "m/s²", value: known.gravity });
@@ -87,7 +87,7 @@ function least(answer) {
   return Math.min(answer.timestep_limit_held ?? Infinity, answer.timestep_limit_motion ?? Infinity);
 }
 
-/** A refusal in the words of the form: "kd of joint 1 must be a number". @param {string} status */
+/** A refusal with the form's names: "kd of joint 1 must be a number". @param {string} status */
 function plain(status) {
   return status.replace(/\b(?:gains|params)\.(\w+)(?:\[(\d)\])?/g, (_, name, i) => i === undefined ? name : `${name.replace(/s$/, "")} ${Number(i) + 1}`).replace(/, got null$/, "");
 }

@@ -1,8 +1,8 @@
-// What limits the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of the
-// loop in force, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot. A click
-// or an arrow key moves the dot, and with it the settings.
-// Invariant: all limits are the study's answers to the question about the loop in force; a stale one is never shown. The boundary is
-// drawn as far as it is known; a click sends what it shows. The bars are a run of the runtime's own at the present timestep.
+// What limits the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of
+// the active loop, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot.
+// A click or an arrow key moves the dot, and with it the settings.
+// Invariant: all limits are the study's answers for the active loop, and an outdated one is never shown. The boundary is drawn
+// as far as it is known. A click sets the shown values. The bars are a run of the runtime at the present timestep.
 
 import { beginAnew } from "./actions.js";
 import { Chart, drawBars, drawMap } from "./chart.js";
@@ -18,8 +18,8 @@ import { climbRows, deviation, LOOKS } from "./study.js";
 import { Surface } from "./surface.js";
 import { openTab } from "./views.js";
 
-const ROWS = 17; // gains whose limits are found, the present ones in the middle
-/** Present gains times this much, and this little. */
+const ROWS = 17; // rows of gains with limits, the present ones in the middle
+/** Largest and smallest multiple of the present gains. */
 const WIDEST = 16;
 const FINE = 1.1; // one arrow key
 
@@ -28,10 +28,10 @@ const timesteps = new LogScale(1e-4, 0.1);
 
 let map;
 let chart;
-let mapAsked = ""; // the settings that `rows` are about
+let mapAsked = ""; // the settings of `rows`
 /** Limits with a hold and with control in every stage [s], as far as they are known. @type {import("./chart.js").Row[]} */
 let rows = [];
-/** Gains that the map's scale begins from: they stay while the arm's own are a multiple of them, so that the dot moves and the border stays. */
+/** The base gains of the map's scale. They do not change while the arm's gains are a multiple of them, so the dot moves and the border stays. */
 let anchor = null;
 
 export function startStability() {
@@ -54,7 +54,7 @@ function mapSettings() {
   return { method: integrator.method, gains: anchor, params, pose };
 }
 
-/** Asks the study for the border; a new question ends the old one. */
+/** Asks the study for the border. A new request ends the old one. */
 async function askBorder() {
   const present = mapSettings();
   if (!present) return;
@@ -68,7 +68,7 @@ async function askBorder() {
     rows.push({ factor, limit: values.timestep_limit_held ?? Infinity, continuous: values.timestep_limit_continuous ?? Infinity });
     map.redraw();
   });
-  if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next news
+  if (mapAsked === key && rows.length < ROWS) mapAsked = ""; // asked again at the next message
 }
 
 function drawStability() {
@@ -86,7 +86,7 @@ function describeMap() {
   if (!row || !state.integrator) return;
   setText(byId("map-value"), `at ${duration(state.integrator.timestep)}`);
   setText(byId("map-text"), `Solid line: limit of ${methodName(state.integrator.method)}, ${limitText(row.limit)} with these gains. Dashed line: limit of a controller without a hold, ${limitText(row.continuous)}. `
-    + `Higher gains need a smaller timestep; gains that are too low never hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to go elsewhere.`);
+    + `Higher gains need a smaller timestep; gains that are too low cannot hold the arm. The dot is the arm${state.enabled ? "" : " once the controller is on"}. Click to change both.`);
 }
 
 function goTo(left, top) {
@@ -97,7 +97,7 @@ function goTo(left, top) {
   moveTo(timesteps.value(place), factors.value(rise));
 }
 
-/** An arm that has diverged begins anew there: it could not be seen otherwise whether the place is a better one. */
+/** A diverged arm restarts there, because otherwise the new settings would show no effect. */
 async function moveTo(timestep, factor) {
   const short = (value) => Number(value.toPrecision(3));
   const gains = scaled(anchor, factor);
@@ -152,7 +152,7 @@ function startLimits() {
   });
 }
 
-/** Where the limit of `method` is shown. @param {string} method */
+/** The element with the limit of `method`. @param {string} method */
 export function limitLabel(method) {
   const label = el("small", { class: "limit" }, "…");
   labels.set(method, label);
@@ -163,6 +163,6 @@ function showLimits() {
   for (const [method, label] of labels) setText(label, limitText(limitInForce(state, method).limit));
   const why = whyText(state);
   setText(byId("why-text"), why);
-  // It stays while limits are computed anew, so that a click on its way meets it.
+  // It stays visible while limits are computed again, so that a click still works.
   if (METHODS.every(([method]) => answerInForce(state, method)) || !question(state)) byId("why").hidden = why === "";
 }

@@ -1,5 +1,5 @@
-// All that the page knows about the runtime, in one place; a view watches the part that it shows.
-// Invariant: only what the runtime has said is stored here, never what was merely asked for.
+// The page's state of the runtime, in one place. A view watches the part that it shows.
+// Invariant: only values from the runtime are stored here, never requested ones.
 
 export const MOST_LINKS = 3;
 
@@ -10,39 +10,39 @@ export function nothingAsked() {
 
 export const state = {
   connection: "connecting", // or "open", "lost"
-  links: 0, // 0 until the runtime has said
+  links: 0, // 0 until the runtime has sent it
   // The latest joint state. Written in place 60 times a second; `version` counts them.
   version: 0,
   time: 0, // s, simulation time
   position: new Float64Array(MOST_LINKS), // rad
   velocity: new Float64Array(MOST_LINKS), // rad/s
   effort: new Float64Array(MOST_LINKS), // N m
-  // The setpoint is known from the trajectories that pass, from resets, and from the diagnostics.
+  // The setpoint comes from trajectories, resets and diagnostics.
   setpoint: new Float64Array(MOST_LINKS), // rad
   setpointKnown: false,
   params: null, // { gravity, masses, lengths }
   integrator: null, // { method, timestep }
   gains: null, // { kp, ki, kd }
-  period: null, // { period, effective_period, delay }: how often the control law runs [s]
+  period: null, // { period, effective_period, delay }: the control period [s]
   paused: null,
-  enabled: null, // is PID on
+  enabled: null, // whether the controller is on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
-  // What /study/stability says of the loop in force: the loop as asked (see `policy.js`), and for each method the values, and the
-  // motion's limit and speed as first served since the last reset [s, rad/s].
+  // The answers of /study/stability for the active loop: the requested loop (see `policy.js`), the values for each
+  // method, and the first limit and speed of the motion since the last reset [s, rad/s].
   limits: nothingAsked(),
-  pushed: false, // whether an effort has acted with the controller off since energy is counted
+  pushed: false, // whether an effort has acted with the controller off since the energy's reference
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
   view: "course", // or "workbench"
-  tab: "plots", // the panel that is shown
-  joint: 0, // the joint that keys and the phase plot are about
+  tab: "plots", // the shown panel
+  joint: 0, // the joint for keys and the phase plot
 };
 
 const watchers = new Map(); // key -> functions
 const everything = []; // functions
 
-/** What the verdict on the loop in force depends on. */
+/** The keys on which the verdict on the active loop depends. */
 export const LOOP = ["connection", "links", "integrator", "gains", "params", "period", "enabled", "setpoint", "diagnostics", "limits"];
 
 /** @param {string | string[]} keys @param {(value: any) => void} react */
@@ -55,14 +55,14 @@ export function set(key, value) {
   tell(key);
 }
 
-/** Tells those who watch `key`; for what is written in place. */
+/** Notifies the watchers of `key`, for values that are written in place. */
 export function tell(key) {
   const reacts = watchers.get(key);
   if (reacts) for (const react of reacts) react(state[key]);
   for (const react of everything) react();
 }
 
-/** For whoever looks at all of it, and has to know only that something is new. */
+/** For watchers of the whole state, which only need to know that something has changed. */
 export function watchAll(react) {
   everything.push(react);
 }

@@ -1,13 +1,13 @@
-// Charts of the recording: quantities over the last seconds of simulation time, and velocity over position, where the present state
-// is a dot; one colour per joint.
-// Invariant: rows are read where they stand in the history. They draw on whatever context they are given.
+// Charts of the recording: quantities over the last seconds of simulation time, and velocity over position with a dot for the
+// present state. Each joint has a colour.
+// Invariant: rows are read in place from the history. The charts draw on any context.
 
 import { Chart, circle, DASHED } from "./chart.js";
 import { ENERGY, firstAfter, KINETIC, POSITION, POTENTIAL, record, TIME, VELOCITY } from "./history.js";
 import { Axis, LOG_END, times } from "./scale.js";
 import { colors } from "./theme.js";
 
-/** @typedef {{column: number, dashed?: boolean, color?: string, name?: string}} Series of each joint, or one in a colour of its own with its name */
+/** @typedef {{column: number, dashed?: boolean, color?: string, name?: string}} Series of each joint, or one with its own colour and name */
 
 /** @type {Series[]} */
 export const ENERGIES = [
@@ -28,7 +28,7 @@ function extent(columns, first, last) {
   return [min, max];
 }
 
-/** Room for the name of a line [px]. */
+/** Space for the name of a line [px]. */
 const NAME = 64;
 
 export class StripChart {
@@ -36,14 +36,15 @@ export class StripChart {
   constructor(series, least, sane) {
     this.series = series;
     this.axis = new Axis(3, least, sane);
-    this.chart = /** @type {Chart | null} */ (null); // the one that was drawn last
-    this.from = NaN; // the instant at its left edge
+    this.chart = /** @type {Chart | null} */ (null); // the last drawn one
+    this.from = NaN; // the time at its left edge
     this.span = NaN;
   }
 
   /**
-   * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor` and a level worth comparing with.
-   * @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links: number, shown: boolean[], cursor?: number, level?: number}} what
+   * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor` and a reference level.
+   * @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links:
+   * number, shown: boolean[], cursor?: number, level?: number}} what
    */
   draw(context, width, height, { now, span, links, shown, cursor = NaN, level = NaN }) {
     this.from = now - span;
@@ -74,7 +75,7 @@ export class StripChart {
     chart.words(`logarithmic${end}`, chart.left + 4, chart.top + 6, "left", colors.bad, chart.font);
   }
 
-  /** When a value first left the logarithmic scale [s]; NaN if none did. */
+  /** The first time at which a value left the logarithmic scale [s]; NaN if none did. */
   leftAt(lines, first, last) {
     if (!this.axis.log) return NaN;
     for (let i = first; i < last; i += 1) {
@@ -84,7 +85,7 @@ export class StripChart {
     return NaN;
   }
 
-  /** The instant at `x` CSS pixels from the left; NaN beside the plot. @param {number} x */
+  /** The time at `x` CSS pixels from the left; NaN outside the plot. @param {number} x */
   timeAt(x) {
     const { chart } = this;
     if (!chart || x < chart.left || x > chart.right) return NaN;
@@ -92,7 +93,7 @@ export class StripChart {
   }
 }
 
-/** The path fades towards the past in this many pieces. */
+/** The number of pieces of the path, which fades towards the past. */
 const PIECES = 5;
 /** Beyond it the scales are logarithmic [rad, rad/s]. */
 const SANE = 300;

@@ -1,5 +1,5 @@
-// Questions to the study that take several calls: the ladder of errors, a column of limits, a push.
-// Invariant: the live arm stays as it is; nothing is told that is no longer wanted.
+// Requests to the study that take several calls: a series of errors, a column of limits, a push.
+// Invariant: the live arm does not change, and outdated results are not reported.
 
 import { MOVE_TO, read, rungs } from "./ladder.js";
 import { rollout, stability } from "./runtime.js";
@@ -11,8 +11,8 @@ const PUSH_SPEED = 1e-6; // rad/s
 export const LOOKS = 14;
 
 /**
- * Runs the ladder on the loop in force, a rung at a time; gives the refusal, if there is one.
- * @param {number} length [s] @param {() => boolean} isWanted whether to go on @param {(rung: import("./ladder.js").Rung) => void} tell
+ * Runs the series on the active loop, one run at a time. Returns the refusal, if there is one. @param {number} length
+ * [s] @param {() => boolean} isWanted whether to go on @param {(rung: import("./ladder.js").Rung) => void} tell
  */
 export async function climb(length, isWanted, tell) {
   const n = state.links;
@@ -25,7 +25,7 @@ export async function climb(length, isWanted, tell) {
     const answer = await rollout(args);
     if (!isWanted()) return "";
     if (!answer.result) return answer.status;
-    // The shorter of two times: other work of the machine in between has no part in it.
+    // The shorter of two times, which reduces the effect of other work on the machine.
     const again = await rollout({ ...args, reference: false });
     const wall = Math.min(answer.values.wall_time, again.values.wall_time ?? Infinity);
     if (!isWanted()) return "";
@@ -35,9 +35,10 @@ export async function climb(length, isWanted, tell) {
 }
 
 /**
- * Asks the study about `count` multiples of the gains, the lowest first, and tells each answer as it comes.
- * @param {import("./scale.js").LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the loop at a multiple
- * @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void} tell
+ * Asks the study about `count` multiples of the gains, the lowest first, and reports each answer on arrival. @param
+ * {import("./scale.js").LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the
+ * loop at a multiple @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void}
+ * tell
  */
 export async function climbRows(scale, count, ask, isWanted, tell) {
   for (let row = 0; row < count && isWanted(); row += 1) {
@@ -48,9 +49,9 @@ export async function climbRows(scale, count, ask, isWanted, tell) {
 }
 
 /**
- * A tiny push of the last joint at rest: its speed [rad/s] at each of the next looks, `every` [s] apart. It is the difference of two
- * runs, with the push and without; null where they are refused.
- * @param {any} loop with method and timestep @param {number[]} rest pose [rad] @param {number} every
+ * A tiny push of the last joint at rest: its speed [rad/s] at each of the next samples, `every` [s] apart. It is the
+ * difference of two runs, with and without the push; null if they are refused. @param {any} loop with method and
+ * timestep @param {number[]} rest pose [rad] @param {number} every
  */
 export async function deviation(loop, rest, every) {
   const common = { ...loop, q0: rest, duration: LOOKS * every, samples: LOOKS + 1 };

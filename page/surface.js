@@ -1,16 +1,17 @@
-// When to draw: a frame is asked for only if something has changed, and painters say whether they need one more. And a canvas as
-// sharp as the screen: sized in device pixels, drawn in CSS pixels, painted in the next frame after something of it has changed.
-// Invariant: with nothing to show, no frame is asked for; a page that is paused or hidden draws nothing. A canvas's size is read when
-// it changes, not at every frame. A canvas is opaque and has a pixel for each pixel of the screen that it covers: the browser copies it,
-// and neither blends nor resamples.
+// Scheduling of drawing: a frame is requested only after a change, and painters return whether they need another one. Also
+// canvases with the screen's resolution: sized in device pixels, drawn in CSS pixels, and painted in the next frame after a
+// change.
+// Invariant: without a change no frame is requested, and a paused or hidden page draws nothing. A canvas's size is read when it
+// changes, not at every frame. A canvas is opaque and has one pixel for each covered pixel of the screen, so the browser copies
+// it without blending or resampling.
 
 import { colors, onTheme } from "./theme.js";
 
 export class Surface {
   /**
-   * @param {HTMLCanvasElement} canvas
-   * @param {() => void} paint all of it, on an empty canvas; not called while the canvas is hidden
-   * @param {() => void} [resized] what a new size or theme is to do, else it is painted anew
+   * @param {HTMLCanvasElement} canvas @param {() => void} paint paints everything on an empty
+   * canvas; not called while the canvas is hidden @param {() => void} [resized] called at a new
+   * size or theme; by default the canvas is painted again
    */
   constructor(canvas, paint, resized) {
     this.canvas = canvas;
@@ -30,12 +31,12 @@ export class Surface {
     onTheme(() => this.onResize());
     const observer = new ResizeObserver(() => this.fit());
     observer.observe(canvas);
-    observer.observe(document.body); // what grows above a canvas moves it, by a part of a pixel too
+    observer.observe(document.body); // a growing element above a canvas moves it, even by part of a pixel
     this.watchDensity();
     this.fit();
   }
 
-  /** Paints it in the next frame, or once it is in sight. */
+  /** Paints it in the next frame, or once it is visible. */
   redraw() {
     this.stale = true;
     if (this.width > 0) wake();
@@ -50,7 +51,7 @@ export class Surface {
   fit() {
     const density = devicePixelRatio || 1;
     const { left, top, right, bottom } = this.canvas.getBoundingClientRect();
-    // A browser rounds where the edges are, so that a box's place has a say in how many pixels it covers.
+    // A browser rounds the edges of a box, so its number of pixels depends on its position.
     const width = Math.round(right * density) - Math.round(left * density);
     const height = Math.round(bottom * density) - Math.round(top * density);
     if (width === this.width * this.density && height === this.height * this.density && density === this.density) return;
@@ -63,7 +64,7 @@ export class Surface {
     this.onResize();
   }
 
-  /** Paints all of it in the colour of what it stands on. */
+  /** Fills it with the background's colour. */
   clear() {
     this.context.globalAlpha = 1;
     this.context.fillStyle = colors.panel;
@@ -77,7 +78,7 @@ export class Surface {
 const painters = [];
 let asked = false;
 
-/** How many frames have been drawn; for tests and the curious. */
+/** The number of drawn frames, for tests. */
 export const count = { frames: 0 };
 
 /** @param {Painter} painter */
@@ -85,7 +86,7 @@ export function onFrame(painter) {
   painters.push(painter);
 }
 
-/** Something has changed: the next frame is drawn. */
+/** Requests the next frame after a change. */
 export function wake() {
   if (asked) return;
   asked = true;

@@ -1,6 +1,6 @@
-// The panel of goals, the timed trial and pushes. Dragging in the view uses the goal's options.
-// Invariant: a goal is shown as active only while the runtime says so; the clock and the count of a trial are the runtime's, whoever
-// started it.
+// The panel of goals, timed trials and pushes. Dragging in the view uses the goal's options.
+// Invariant: a goal is shown as active only while the runtime reports it so. The clock and the count of a trial come from the
+// runtime, whichever client started it.
 
 import { announce, byId, el, setText } from "./dom.js";
 import { option, panel } from "./field.js";
@@ -23,12 +23,12 @@ const fields = {
 };
 let goalSaid;
 let text;
-let shownId = ""; // of the goal that is shown
+let shownId = ""; // of the shown goal
 
 function startGoal() {
   text = el("p", { class: "note", id: "goal-text" });
   goalSaid = panel(byId("goal-body"), Object.values(fields), [
-    // The runtime names the fields that are missing.
+    // The runtime names the missing fields.
     ["Send target", () => goalSaid.report(sendGoal({ x: fields.x.number(), y: fields.y.number(), ...goalOptions() })), { type: "submit", class: "primary" }],
     ["Cancel target", () => goalSaid.report(cancelGoal())],
   ], text);
@@ -37,7 +37,7 @@ function startGoal() {
   showGoal(null);
 }
 
-/** Orientation and tolerance for the next goal; an empty field is left to the runtime. */
+/** Orientation and tolerance for the next goal. An empty field has the runtime's default. */
 export function goalOptions() {
   return {
     phi: state.links > 2 ? fields.phi.number() : undefined,
@@ -58,12 +58,12 @@ export function showGoalPlace({ x, y }) {
 function showGoal(goal) {
   if (goal && goal.id !== shownId) {
     shownId = goal.id;
-    goalSaid.show(""); // what was refused before is of the past
+    goalSaid.show(""); // an earlier refusal is outdated
   }
   if (!goal) setText(text, "Drag in the view, or type a place for the end effector.");
   else if (goal.outcome === "active") setText(text, `On the way: ${fixed(goal.distance, 3)} m left, ${fixed(goal.elapsed, 1)} s.`);
   else if (goal.outcome === "reached") setText(text, `Reached, ${fixed(goal.distance * 1000, 1)} mm from the target.`);
-  else setText(text, "Given up: another target, a cancellation or a reset took its place.");
+  else setText(text, "Ended by another target, a cancellation or a reset.");
 }
 
 // The timed trial
@@ -108,7 +108,7 @@ function showTrial(trial) {
   byId("trial-progress").value = trial.duration > 0 ? Math.min(1, trial.elapsed / trial.duration) : 0;
   setText(byId("trial-error"), trial.error == null ? "" : `${fixed(trial.error, 3)} m to go`);
   const waits = trial.running && trial.action_status === "preempted";
-  setText(byId("trial-note"), waits ? "Another target took over: skip to go on." : trial.running && state.enabled === false ? "The controller is off: nothing will be reached." : "");
+  setText(byId("trial-note"), waits ? "Another target replaced this one. Press Skip to continue." : trial.running && state.enabled === false ? "The controller is off, so no target can be reached." : "");
   if (wasRunning && !trial.running) announce(`Trial over: ${count}.`);
   wasRunning = trial.running;
 }

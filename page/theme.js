@@ -1,5 +1,5 @@
-// Light and dark, and the colours that the canvases take from the style sheet.
-// Invariant: colours are spelled in `style.css` only.
+// Light and dark themes, and the colours of the canvases from the style sheet.
+// Invariant: colours are defined only in `style.css`.
 
 import { byId, keepChoice, remembered } from "./dom.js";
 
@@ -8,7 +8,7 @@ const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good"
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = [];
 
-/** Colours by name, always of the present theme; `joints` and `methods` in their order. */
+/** Colours by name, from the present theme; `joints` and `methods` in their order. */
 export const colors = { joints: [], methods: [] };
 
 export function onTheme(react) {
@@ -16,7 +16,7 @@ export function onTheme(react) {
 }
 
 function read() {
-  // A variable's own text has both themes in it; as somebody's colour it is one.
+  // A variable's text has both themes. As an element's computed colour it is one.
   const probe = byId("probe");
   for (const name of NAMES) {
     probe.style.color = `var(--${name})`;

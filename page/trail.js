@@ -1,5 +1,5 @@
-// The way of the end effector through the last seconds, fading towards the past.
-// Invariant: between two states it is a curve while the arm can be followed, else a straight line; it never leaves the reach.
+// The path of the end effector over the last seconds, fading towards the past.
+// Invariant: between two states it is a curve if the motion is known, otherwise a straight line. It never leaves the reach.
 
 import { POSITION, between, firstAfter, record } from "./history.js";
 import { joints } from "./mechanics.js";
@@ -7,25 +7,25 @@ import { MOST_LINKS } from "./store.js";
 import { colors } from "./theme.js";
 
 export const SECONDS = 5;
-/** It fades in this many pieces. */
+/** The number of its fading pieces. */
 const PIECES = 6;
 const BRIGHTEST = 0.7;
-/** How far joints turn, all together, from one point to the next [rad]. */
+/** The sum of the joints' rotations from one point to the next [rad]. */
 const TURN = 0.15;
-/** Where they turn further between two records the way is not known: it goes straight [rad]. */
+/** With a larger rotation between two records the path is unknown, and a straight line is drawn [rad]. */
 const FAR = Math.PI;
 
 const q = new Float64Array(MOST_LINKS);
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
 
-/** The trail from `since` to `time`, both times of the recording; `px` and `py` turn metres into pixels. */
+/** The trail from `since` to `time`, both times of the recording. `px` and `py` convert metres to pixels. */
 export function drawTrail(context, n, lengths, px, py, since, time, pieces = PIECES) {
   const first = firstAfter(since);
   const rows = Math.min(firstAfter(time), record.length - 1) - first;
   context.strokeStyle = colors.accent;
   context.lineWidth = 2;
-  context.lineCap = "butt"; // round ends would show where two pieces meet
+  context.lineCap = "butt"; // round ends would be visible where two pieces meet
   context.lineJoin = "round";
   for (let piece = 0; piece < pieces && rows > 0; piece += 1) {
     context.globalAlpha = (BRIGHTEST * (piece + 1)) / pieces;

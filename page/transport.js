@@ -1,5 +1,5 @@
-// Under the arm: pause, single step and reset; and what is said there: the verdict on the timestep, warnings, divergence.
-// Invariant: a notice offers what can be done about it, and goes when its cause is gone.
+// Under the arm: pause, single step and reset; and the notices: the verdict on the timestep, warnings, divergence.
+// Invariant: a notice offers a remedy, and disappears with its cause.
 
 import { beginAnew, recover, resetArm } from "./actions.js";
 import { switchController, takeSuggestion } from "./controls.js";
@@ -10,7 +10,7 @@ import { limitInForce, verdict } from "./policy.js";
 import { pause, setPeriod, step } from "./runtime.js";
 import { LOOP, state, watch } from "./store.js";
 
-/** Below this real-time factor a warning of the runtime is about its pace. */
+/** Below this real-time factor a warning of the runtime is about its speed. */
 const SLOW = 0.95;
 
 let said;
@@ -38,18 +38,18 @@ export function setPaused(paused) {
   return said.report(pause(paused));
 }
 
-/** One step, or as many as the box says; the arm is paused first, since only then can it be stepped. */
+/** Takes the number of steps in the box. The arm is paused first, because only a paused arm can be stepped. */
 export async function singleStep() {
   const steps = Number(byId("step-count").value);
   if (!state.paused && !(await said.report(pause(true))).result) return;
   said.report(step(steps));
 }
 
-// Notices, the gravest first
+// Notices, the most serious first
 
 function showNotice() {
   const notice = choose();
-  // A button is another one when its figure is.
+  // A button with another figure is another button.
   const key = notice ? `${notice.key} ${notice.buttons.map(([text]) => text)}` : "";
   const box = byId("notice");
   if (key === shownNotice) {
@@ -60,7 +60,7 @@ function showNotice() {
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
-  if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are said already
+  if (notice?.kind === "bad" && notice.key !== "diverged" && notice.key !== "lost") warn(notice.text); // those two are announced already
   if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
@@ -69,12 +69,12 @@ function choose() {
   const { kind, sentence, advised, slow } = verdict(state);
   if (kind === "offline") {
     return state.links === 0
-      ? { key: "connecting", kind: "calm", text: "Looking for the arm…", buttons: [] }
+      ? { key: "connecting", kind: "calm", text: "Connecting to the arm…", buttons: [] }
       : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
   }
   const smaller = slow ? [["Control at every step", () => said.report(setPeriod({ period: 0 }))]]
     : advised > 0 ? [[`Restart at ${duration(advised)}`, () => said.report(recover(advised))]] : [];
-  // No timestep helps where the gains are at fault.
+  // No timestep helps if the gains are the cause.
   const other = state.enabled && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
     return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Restart", () => said.report(beginAnew())]] };
@@ -84,10 +84,10 @@ function choose() {
     return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
-    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
+    return { key: "controller", kind: "calm", text: "The controller is off, so the arm swings freely and does not follow.", buttons: [["Turn the controller on", () => switchController(true)]] };
   }
   if (state.paused && goal?.outcome === "active") {
-    return { key: "paused", kind: "calm", text: "Paused: the arm doesn't move.", buttons: [["Run", togglePause]] };
+    return { key: "paused", kind: "calm", text: "Paused: the arm does not move.", buttons: [["Run", togglePause]] };
   }
   return kind === "here" ? { key: "here", kind: "warn", text: sentence, buttons: [...smaller, ...other] } : null;
 }

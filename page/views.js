@@ -1,7 +1,7 @@
-// The two views of the page, Course and Workbench; the panels beside the arm as tabs; the full screen; the number of links. And links
-// to share: the settings are in the page's address, behind the #.
-// Invariant: a view only shows and hides; the arm and all settings are the same in both. Opening an address changes nothing; its
-// settings wait for a click. Any page can link here, and a link must not be able to drive the arm.
+// The two views of the page, Course and Workbench; the panels beside the arm as tabs; the full screen; the number of links.
+// Also links to share: the settings are in the page's address, after the #.
+// Invariant: a view only shows and hides; the arm and all settings are the same in both. Opening an address changes nothing;
+// its settings wait for a click. Any page can link here, and a link must not be able to drive the arm.
 
 import { apply, remember } from "./actions.js";
 import { stepIn } from "./course.js";
@@ -11,7 +11,7 @@ import { isAlone } from "./kernel.js";
 import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
-/** A link that brings settings but no step is about the workbench. */
+/** A link with settings but without a step opens the workbench. */
 const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|controller|servo|setpoint|workbench)\b/;
 
 export function startViews() {
@@ -30,7 +30,7 @@ export function startViews() {
   set("view", stepIn(location.hash) < 0 && SETTINGS.test(location.hash) ? "workbench" : "course");
 }
 
-/** Where the arm is in this page its number of links can be chosen: another number is another arm, in the page loaded anew. */
+/** In the page in one file the number of links can be chosen. Another number needs another arm, so the page is reloaded. */
 function startLinks() {
   if (!isAlone) return;
   byId("links-choice").hidden = false;
@@ -76,7 +76,7 @@ export function startShare() {
   if (location.hash.length > 1) watch("params", offer);
 }
 
-/** The page's address with the present settings behind the #. */
+/** The page's address with the present settings after the #. */
 export function address() {
   const link = new URL(location.href);
   link.search = ""; // it may hold a token
@@ -112,7 +112,7 @@ function offer() {
   const done = () => { banner.hidden = true; };
   const refused = el("p", { class: "refusal" });
   banner.replaceChildren(
-    el("p", {}, "This link brings settings: ", el("span", { class: "offer-text" }, text)),
+    el("p", {}, "This link has settings: ", el("span", { class: "offer-text" }, text)),
     el("button", { type: "button", class: "primary", onclick: async () => {
       remember();
       const refusals = await apply(settings);
@@ -122,5 +122,5 @@ function offer() {
     el("button", { type: "button", onclick: done }, "Ignore"), refused,
   );
   banner.hidden = false;
-  announce("This link brings settings. Apply or ignore them.");
+  announce("This link has settings. Apply or ignore them.");
 }

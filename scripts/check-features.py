@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Shows for every feature of every direct dependency that it is needed: without it something fails.
+"""Checks that every feature of every direct dependency is needed: without it something fails.
 
-Takes each feature out of a copy of Cargo.toml and tries. Either the compiler misses it, or a named test does, or another
-package has it switched on anyway, so that naming it costs nothing. Anything else is too much, and fails. No dependency
-may bring its default features. It takes half an hour: run it after a change of Cargo.toml, not with every change.
-Arguments name the dependencies to look at; none means all.
+It removes each feature from a copy of Cargo.toml and builds. A feature is needed if the compiler or a named test then
+fails, or if another package enables it anyway. Any other feature is an error. No dependency may use its default
+features. It takes half an hour, so run it only after a change of Cargo.toml. Arguments select dependencies; the
+default is all.
 """
 
 import os
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PLACE = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve() / "check-features"
 TABLES = ["dependencies", "dev-dependencies"]
 
-# Features that the compiler does not miss and a user would, each with the test that does.
+# Features that users need although the build succeeds without them, each with the test that fails.
 MISSED_BY_A_TEST = {
     ("clap", "error-context"): "wire",
     ("clap", "help"): "wire",
@@ -29,7 +29,7 @@ MISSED_BY_A_TEST = {
 
 
 def cargo(*arguments):
-    """Runs cargo on the copy; gives whether it went well, and what it said."""
+    """Runs cargo on the copy. Returns whether it succeeded, and its output."""
     environment = dict(os.environ, CARGO_TARGET_DIR=str(PLACE / "target"))
     run = subprocess.run(
         ["cargo", *arguments], cwd=PLACE, env=environment, text=True,
@@ -38,7 +38,7 @@ def cargo(*arguments):
 
 
 def copy():
-    """Everything that Cargo looks at: what is changed in the meantime changes nothing."""
+    """Copies everything that Cargo reads, so later changes have no effect."""
     PLACE.mkdir(parents=True, exist_ok=True)
     for entry in ROOT.iterdir():
         if entry.name.startswith(".") or entry.name in ("target", "vendor", "report", "benches", "fuzz"):
@@ -51,7 +51,7 @@ def copy():
 
 
 def without(manifest, table, crate, feature):
-    """The manifest's text with one feature of one dependency taken out."""
+    """The manifest's text without one feature of one dependency."""
     head, mark, rest = manifest.partition(f"[{table}]\n")
     line = re.search(rf"^{re.escape(crate)} = .*$", rest, re.MULTILINE)
     before, listing, after = re.match(r"(.*features = \[)([^]]*)(\].*)", line.group()).groups()

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Compares the instructions of one physics step with those written down in scripts/work-counts.csv: more or less by over 1 % fails.
-# Counts are exact for one compiler, so with another one, or without valgrind, nothing is compared, and a line says so.
-# usage: scripts/check-work.sh [--record]
+# Compares the instructions of one physics step with the recorded ones in scripts/work-counts.csv. A difference of more
+# than 1 % fails. Counts are exact for one compiler. With another one, or without valgrind, nothing is compared, and a
+# line reports this. usage: scripts/check-work.sh [--record]
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -16,7 +16,7 @@ fi
 target=${CARGO_TARGET_DIR:-$root/target}
 (cd "$root/benches" && cargo build --release --locked --quiet --bin work)
 
-# The difference between two runs: the start of the program is not the step's.
+# The difference between two runs, which excludes the start of the program.
 short=5000 long=15000
 instructions() { # variant, steps
     valgrind --tool=callgrind --callgrind-out-file=/dev/null "$target/release/work" "$1" "$2" 2>&1 >/dev/null | awk '/Collected/ { print $NF }'
@@ -28,7 +28,8 @@ per_step() { # variant
     awk "BEGIN { print ($many - $few) / ($long - $short) }"
 }
 
-# Steps of the arm and a constant force only: sine and cosine there are our own, not the system's, which vary.
+# Only steps of the arm and a constant force, because they do not use the system's sine and cosine, which
+# vary.
 variants=(step-{2,3}-{euler,midpoint,verlet,rk4}-free step-{2,3}-rk4-{pid,weightless} particle-rk4-constant)
 if [ "${1:-}" = --record ]; then
     { echo "# $toolchain"; echo "step,instructions"; for variant in "${variants[@]}"; do echo "$variant,$(per_step "$variant")"; done; } >"$recorded.part"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Puts what people can fetch into dist/: the program and the wheel for this system. On Linux also the page as one file,
-# the sources with their dependencies, and a bill of materials. Checksums. `make dist` has built pendularm.html and
-# submission.tar.gz before.
+# Writes the files of a release to dist/: the program and the wheel for this system, and checksums. On Linux also the
+# page in one file, the sources with their dependencies, and a bill of materials. `make dist` builds pendularm.html and
+# submission.tar.gz first.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Builds the program with and without its features and prints the table of docs/development.md: size, crates, processor time of a build.
 
-Each build starts from nothing in a folder that is deleted after it. `library` or `program` picks those. `--crates` leaves the builds out. `--keep` writes the table into
-that paper, between its two marks.
+Each build starts from scratch in a folder that is deleted afterwards. `library` or `program` selects rows. `--crates`
+omits the builds. `--keep` writes the table into that document, between its two marks.
 """
 
 import os
@@ -29,12 +29,12 @@ BUILDS = (
 
 
 def selection(features):
-    """Flags that choose these features, and no others; the default ones for `None`."""
+    """Flags for exactly these features; the default ones for `None`."""
     return [] if features is None else ["--no-default-features", "--features", features]
 
 
 def crates(features):
-    """How many crates are compiled for the build, this one left out."""
+    """The number of crates compiled for the build, without this one."""
     tree = subprocess.run([CARGO, "tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--format", "{p}",
                            *selection(features)],
                           cwd=ROOT, check=True, capture_output=True, text=True).stdout

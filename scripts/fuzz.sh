@@ -1,17 +1,15 @@
 #!/usr/bin/env bash
-# `make fuzz`: builds the fuzz targets and runs each; arguments pick targets. Stops at the first failure.
+# `make fuzz`: builds and runs the fuzz targets. Arguments select targets. It stops at the first failure.
 #
-# A search, for TIME seconds each (60): coverage leads it, no two are alike. Inputs that the fuzzer finds interesting
-# are kept in the target folder, and the next search goes on from there. It needs cargo-fuzz.
+# By default it searches for TIME seconds per target (60), guided by coverage, and differs in every run. Interesting
+# inputs are kept in the target folder, and the next search continues from them. It needs cargo-fuzz.
 #
-# With RUNS=n a repetition: mutations of the kept seeds, RUNS times as many as the target's share, drawn from fixed
-# numbers and led by nothing. Hash tables have other keys in every process, and processors have other instructions. So a
-# search that coverage leads differs from run to run. This does the same executions on every machine, slow or fast. CI
-# does it. It needs a C++ compiler, no cargo-fuzz.
+# With RUNS=n it repeats fixed mutations of the kept seeds: RUNS times the target's share, without guidance by coverage.
+# A guided search differs from run to run, because hash tables and processors differ. This repetition executes the same
+# inputs on every machine. CI uses it. It needs a C++ compiler, but no cargo-fuzz.
 #
-# No sanitizer: our own code has no unsafe in it, which is all that one would look into, and it would cost half of the
-# speed and a nightly compiler. Debug assertions and overflow checks are on instead (fuzz/Cargo.toml): they fail where our
-# own reasoning does.
+# There is no sanitizer, because this code has no unsafe. A sanitizer would also halve the speed and need a nightly
+# compiler. Debug assertions and overflow checks are on instead (fuzz/Cargo.toml).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -31,7 +29,7 @@ done
 
 say "building"
 if [ -n "$runs" ]; then
-    # A build without the counters of coverage, in the tests' profile and folder, where dependencies are built already.
+    # A build without coverage counters, in the tests' profile and folder, where dependencies are already built.
     "${CARGO:-cargo}" build --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
     programs=${CARGO_TARGET_DIR:-target}/debug
 else
@@ -43,7 +41,7 @@ mkdir -p "$folder"
 table=$folder/table.txt
 : >"$table"
 
-# The words of a target's inputs.
+# The dictionary of a target's inputs.
 dictionary() {
     case $1 in
         http) echo "-dict=fuzz/dictionaries/$1.dict" ;;
@@ -51,12 +49,12 @@ dictionary() {
     esac
 }
 
-# Runs a target with what follows its name; the log grows.
+# Runs a target with these arguments, and appends to the log.
 run() {
     local target=$1 words
     shift
     words=$(dictionary "$target")
-    # None of these needs 2 GB.
+    # No target needs 2 GB.
     "$programs/$target" "$@" "$words" -rss_limit_mb=2048 -print_final_stats=1 \
         -artifact_prefix="$folder/failures/$target/" >>"$log" 2>&1
 }
@@ -67,9 +65,8 @@ search() {
     run "$1" "$folder/corpus/$1" "fuzz/seeds/$1" -max_total_time="$seconds" -timeout=20 -len_control=10
 }
 
-# Mutates each kept seed by itself, in the order of their names: where nothing tells which input is worth how much, the
-# fuzzer would take the first one alone. How long an input takes is asked in processor time by the targets themselves:
-# the wall's says nothing here.
+# Mutates each kept seed separately, in the order of names, because without coverage the fuzzer would use only the
+# first one. The targets themselves check the processor time of an input, so wall time is not limited here.
 repeat() {
     local seeds seed number=0 each
     mapfile -t seeds < <(LC_ALL=C ls "fuzz/seeds/$1")
@@ -81,7 +78,7 @@ repeat() {
     done
 }
 
-# Executions of a target for each of RUNS: about what it does in five milliseconds.
+# Executions of a target per unit of RUNS: about five milliseconds each.
 share() {
     case $1 in
         session) echo 20 ;;

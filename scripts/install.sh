@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Installs the program and its completions: install.sh PROGRAM PREFIX. Without the feature cli the program alone.
+# Installs the program and its completions: install.sh PROGRAM PREFIX. Without the feature cli only the program.
 set -euo pipefail
 program=$1
 prefix=$2
 
 mkdir -p "$prefix/bin"
-# On Windows a program has an ending.
+# On Windows a program has an extension.
 case $program in *.exe) file=pendularm.exe ;; *) file=pendularm ;; esac
 cp "$program" "$prefix/bin/$file"
 chmod 755 "$prefix/bin/$file"

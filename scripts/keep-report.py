@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Keeps a report in docs/report/ and puts its sentences and tables into the papers: `make report KEEP=1`.
+"""Copies a report to docs/report/ and writes its sentences and tables into the documents: `make report KEEP=1`.
 
-A paper says where they go. Between `<!-- report: error 1, budget 2 -->` and `<!-- end -->` stand the first finding of the section
-`error` and the second of `budget`; a name alone stands for all findings of the section, `table left-out` for a table. `--check` changes nothing
-and fails where a paper says other than the report that is kept.
+A document has marks for them. Between `<!-- report: error 1, budget 2 -->` and `<!-- end -->` are the first finding
+of the section `error` and the second of `budget`. A name without a number means all findings of the section, and
+`table left-out` a table. `--check` changes nothing, and fails if a document differs from the kept report.
 """
 
 import json
@@ -35,9 +35,9 @@ def main():
     print(f"keep-report: {KEPT.relative_to(ROOT)}")
 
 
-# Pictures that the papers show.
+# Pictures in the documents.
 PICTURES = ["work-precision-time.svg", "stability-map.svg", "scenarios.svg"]
-# Git keeps no more than this [bytes].
+# Most bytes in the repository.
 MOST = 1_000_000
 
 
@@ -76,7 +76,7 @@ def lists_on_lines(summary):
 
 
 def filled(text, summary):
-    """The paper with what the report says in its places."""
+    """The document with the report's sentences at its marks."""
     sections = {section["name"]: section for section in summary["sections"]}
     tables = {table["name"]: table for section in summary["sections"] for table in section["tables"]}
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Counts instructions and allocations of the work that a scene does or leaves out. Counted too are the server's own with
-# nobody and somebody listening, its gateway's wake-ups, and the parts that a build without the web feature lacks.
-# Writes DIRECTORY/work.csv for `pendularm report --only work`. Needs valgrind; a minute beside building. usage:
+# Counts instructions and allocations of the work that a scene does or omits. It also counts those of the server with
+# and without subscribers, the gateway's wake-ups, and the parts that a build without the web feature lacks. It writes
+# DIRECTORY/work.csv for `pendularm report --only work`. It needs valgrind, and a minute besides building. usage:
 # scripts/measure-work.sh DIRECTORY
 set -euo pipefail
 
@@ -9,7 +9,7 @@ out=${1:?usage: scripts/measure-work.sh DIRECTORY}
 root=$(cd "$(dirname "$0")/.." && pwd)
 command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installed; instruction counts stay unmeasured" >&2; exit 0; }
 mkdir -p "$out"
-# Functions and symbols are counted by their names, which a release build does without otherwise.
+# Functions and symbols are counted by name, which a normal release build does not have.
 export CARGO_PROFILE_RELEASE_STRIP=none
 target=${CARGO_TARGET_DIR:-$root/target}
 scratch=$(mktemp -d)
@@ -22,7 +22,7 @@ if grep -q '^web = ' "$root/Cargo.toml"; then
     (cd "$root" && cargo build --release --locked --quiet --no-default-features --features runtime)
     cp "$program" "$scratch/bare"
 fi
-# Last, so that the program left behind is the whole one.
+# Last, so that the remaining program is the complete one.
 (cd "$root" && cargo build --release --locked --quiet)
 
 instructions() { # command...: instructions executed
@@ -32,7 +32,7 @@ instructions() { # command...: instructions executed
 echo "name,value,unit" >"$scratch/work.csv"
 put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
-count_step() { # name, count, program that takes a count last...: instructions of a step, the start left out
+count_step() { # name, count, program that takes a count last...: instructions of a step, without the start
     local name=$1 count=$2 once twice
     shift 2
     once=$(instructions "$@" "$count")
@@ -49,7 +49,7 @@ for links in 2 3; do
     count_step "estimate-$links-rk4" 1000 "$target/release/estimate" $links
 done
 
-# The owner of the instructions: the arm, in a step of the arm and in one of the 1-DOF service.
+# Instructions of the arm, in a step of the arm and in one of the 1-DOF service.
 of_functions() { # pattern, file of callgrind: instructions in functions whose name matches, without what they call
     awk -v pattern="$1" '
         /^c?fn=/ { id = $1; sub(/^c?fn=/, "", id); name = $0; if (sub(/^[^ ]* /, "", name)) names[id] = name; if (/^fn=/) current = names[id]; next }
@@ -69,13 +69,13 @@ for variant in step-2-rk4-free particle-rk4-constant; do
 done
 grep -q '^arm-in-step-2-rk4-free,0,' "$scratch/work.csv" && { echo "measure-work: the arm's functions have other names now" >&2; exit 1; }
 
-# The counting allocator's own words: "2 links, rk4 PID true 1000000 steps 0 allocations".
+# The output of the counting allocator: "2 links, rk4 PID true 1000000 steps 0 allocations".
 "$target/release/allocations" >"$scratch/allocations"
 put allocations-in-steps "$(awk '/steps/ { sum += $(NF - 1) } END { print sum }' "$scratch/allocations")" allocations
 put steps-counted "$(awk '/steps/ { sum += $(NF - 3) } END { printf "%d", sum }' "$scratch/allocations")" steps
 put allocations-per-subscriber "$(awk '/^200 bytes/ { print $3 }' "$scratch/allocations")" "allocations per message"
 
-# The server under callgrind for some seconds of real time: simulated steps keep pace with the clock, so counts are per second.
+# The server under callgrind for some seconds of real time. Steps follow the clock, so counts are per second.
 seconds=4
 serve() { # name, frames to send first, subscribers of /joint_states
     local name=$1 first=$2 clients=$3 topic=/joint_states counts="$scratch/counts" client pids=()
@@ -105,7 +105,8 @@ serve() { # name, frames to send first, subscribers of /joint_states
     exec 3>&-
     for client in "${pids[@]}"; do kill "$client" 2>/dev/null || true; wait "$client" 2>/dev/null || true; done
     if [ -z "$survived" ]; then
-        # Valgrind 3.19 cannot run what asks a thread's clock, as a server at heavy work does: that count stays unmeasured.
+        # Valgrind 3.19 cannot run programs that read a thread's clock, as a busy server does. Then this count is not
+        # measured.
         echo "measure-work: $name: the program does not survive Valgrind here" >&2
         rm -f "$counts"*
         return
@@ -123,7 +124,7 @@ if command -v callgrind_control >/dev/null; then
     serve server-11-subscribers "" 11
 fi
 
-# Timers: how often the gateway's thread, where goals and trials live, goes to sleep and is woken. Nothing else happens there.
+# Timers: the number of wake-ups of the gateway's thread, which runs goals and trials. Nothing else happens there.
 wakes() { # name, frames to send first
     rm -f "$scratch/address"
     "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Changes the code of a layer one small thing at a time (cargo-mutants), and counts how many changes a test notices.
-# usage: scripts/mutants.sh [math|protocol|actors] [--check] [options of cargo mutants, such as --shard 0/20 or --file src/math/pid.rs]
+# Makes single small changes to the code of a layer (cargo-mutants), and counts the changes that a test notices. usage:
+# scripts/mutants.sh [math|protocol|actors] [--check] [options of cargo mutants, such as --shard 0/20 or --file
+# src/math/pid.rs]
 #
-# `actors` is src/actors with src/live, src/services and src/web; its tests take minutes for each mutant, so draw a part: `--shard k/n` is
-# always the same one. `--iterate` leaves out what an earlier run has caught. Outcomes are in target/mutants/<layer>/mutants.out. `--check`
-# only builds the layer's tests. Fails below 90 %: (caught + timed out) / (all - those that do not compile).
+# `actors` is src/actors with src/live, src/services and src/web. Its tests take minutes for each mutant, so select a
+# part: `--shard k/n` is always the same one. `--iterate` skips mutants that an earlier run has caught. Outcomes are in
+# target/mutants/<layer>/mutants.out. `--check` only builds the layer's tests. It fails below 90 %: (caught + timed out)
+# / (all - those that do not compile).
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -22,7 +24,7 @@ low=0
 for layer in "${layers[@]}"; do
     folders=("$layer") tests=(--lib --test "$layer") skipped=()
     case $layer in
-        # Tests of many long runs.
+        # Tests with many long runs.
         math) skipped=(--skip default_gains) ;;
         actors) folders+=(live services web) tests+=(--test wire) ;;
     esac
@@ -32,7 +34,7 @@ for layer in "${layers[@]}"; do
     out=target/mutants/$layer
     mkdir -p "$out"
     status=0
-    # A property test has 64 random cases, and is not shrunk.
+    # A property test has 64 random cases, without shrinking.
     PROPTEST_CASES=64 PROPTEST_MAX_SHRINK_ITERS=0 cargo mutants --output "$out" --colors never "${files[@]}" "$@" \
         --test-package pendularm,pendularm-actor-tests -- --locked "${tests[@]}" -- "${skipped[@]}" || status=$?
     # 2 and 3: some were missed, or timed out.

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Says what others' work is in the program and in the wheel: notices with the licences' texts, or a bill of materials.
+"""Lists the third-party packages in the program and in the wheel: notices with the licences' texts, or a bill of
+materials.
 
-notices.py --notices FILE, or --sbom FILE (CycloneDX 1.5). Asked is Cargo alone, for this platform, without what only
-builds or tests.
+notices.py --notices FILE, or --sbom FILE (CycloneDX 1.5). The source is Cargo, for this platform, without packages
+that are only for builds or tests.
 """
 
 import argparse
@@ -21,7 +22,7 @@ static the C library musl (MIT, https://musl.libc.org)."""
 
 
 def shipped(manifest: Path) -> tuple[dict, list[dict]]:
-    """The package of a manifest, and the packages whose code is in what is built from it."""
+    """The package of a manifest, and the packages whose code is in its build."""
     host = next(line.split()[1] for line in output("rustc", "-vV").splitlines() if line.startswith("host:"))
     asked = ["cargo", "metadata", "--locked", "--format-version", "1", "--manifest-path", str(manifest)]
     metadata = json.loads(output(*asked, "--filter-platform", host))
@@ -44,7 +45,7 @@ def output(*command: str) -> str:
 
 
 def notices(product: dict, packages: list[dict]) -> str:
-    """A line for each package, then each text once, under those whose it is."""
+    """A line for each package, then each text once, under the names of its packages."""
     lines, owners = [], {}
     for package in packages:
         name = f"{package['name']} {package['version']}"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Cargo as releases of cargo-deny before 0.16 know it: `cargo metadata` names packages as it did before Cargo 1.77.
+"""Cargo for releases of cargo-deny before 0.16: `cargo metadata` names packages as before Cargo 1.77.
 
-Those releases take an id apart, which Cargo never promised: `name version (source)`. Everything else is passed on.
+Those releases parse an id, whose format Cargo never guaranteed: `name version (source)`. Everything else is passed on.
 """
 
 import json
@@ -26,7 +26,7 @@ for package in metadata["packages"]:
 
 
 def renamed(value):
-    """The value with every id in it as it was; nothing else looks like one."""
+    """The value with every id in the old form. Nothing else looks like an id."""
     if isinstance(value, str):
         return old.get(value, value)
     if isinstance(value, list):

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# Packs this project and the sources of its dependencies into one archive that builds with no network.
-# Works in a clone and in an extracted archive; everything is put together in a folder of its own, the tree is left alone.
+# Packs this project and the sources of its dependencies into one archive that builds with no network. It works in a
+# clone and in an extracted archive. It builds the archive in a separate folder, and does not change the tree.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 archive=${1:-submission.tar.gz}
-# The most that an upload may weigh.
+# The largest allowed size of an upload.
 limit_bytes=25000000
-# Where the archive builds. Packages that none of these needs are replaced by empty ones.
+# The platforms of the archive. Packages that none of these needs are replaced by empty ones.
 platforms="x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl
     x86_64-apple-darwin aarch64-apple-darwin"
-# Folders of a dependency that no build reads.
+# Folders of a dependency that builds do not read.
 unread="tests benches test-macros"
 
 say() { echo "submission: $*"; }
@@ -24,7 +24,8 @@ stage=$work/stage
 mkdir "$stage"
 
 commit=
-# 1. Our own files: the tracked ones; without git, everything but the entries of .gitignore.
+# 1. This project's files: the tracked ones; without git, everything except the entries of
+#    .gitignore.
 if [ "$(git rev-parse --show-toplevel 2>/dev/null)" = "$root" ]; then
     git ls-files -z >"$work/own"
     commit=$(git rev-parse --short=12 HEAD)
@@ -40,14 +41,14 @@ tar -c --null --verbatim-files-from -T "$work/own" | tar -x -C "$stage"
 [ -z "$commit" ] || echo "$commit" >"$stage/COMMIT"
 say "$(tr -cd '\0' <"$work/own" | wc -c) files of our own"
 
-# 2. The dependencies: from vendor/ if it is up to date, so that an extracted archive can be packed again offline.
+# 2. The dependencies: from vendor/ if it is up to date, so an extracted archive can be packed again offline.
 if cmp -s Cargo.lock vendor/.Cargo.lock; then
     cp -R vendor "$stage/vendor"
 fi
 bash scripts/vendor.sh "$stage" | sed 's/^vendor:/submission:/'
 
-# 3. Less weight. A package that no platform needs keeps its manifest, for Cargo reads those of all locked packages,
-#    and fails loudly if it is compiled after all.
+# 3. A smaller archive. A package that no platform needs keeps its manifest, because Cargo reads the manifests of
+#    all locked packages. It fails with a message if it is compiled.
 (
     cd "$stage"
     for platform in $platforms; do
@@ -78,7 +79,8 @@ for package in "$stage"/vendor/*/; do
 done
 say "$(wc -l <"$work/needed") packages needed (this one too), $emptied for other platforms left empty"
 
-# 4. The archive: every file by its name, none for the folder itself, the same bytes for the same content.
+# 4. The archive: every file by name, without an entry for the folder, and the same bytes for the same
+#    content.
 (cd "$stage" && find . -type f -printf '%P\n' | LC_ALL=C sort) >"$work/entries"
 time=$(git log -1 --format=%ct 2>/dev/null || stat -c %Y Cargo.lock)
 tar -c -C "$stage" --no-recursion --verbatim-files-from -T "$work/entries" --format=ustar --mtime="@$time" --owner=0 \

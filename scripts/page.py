@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Makes the page one file that needs no server: `scripts/page.py MODULE.wasm OUTPUT.html`.
 
-The files of `page/` become one script: each module is a function, in the order of imports, and `pendularm` holds what they
-export. The script and the WebAssembly module are carried as gzip in base64.
+The files of `page/` become one script: each module is a function, in the order of imports, and `pendularm` has their
+exports. The script and the WebAssembly module are stored as gzip in base64.
 
-Invariant: the file asks the network for nothing; its own policy forbids it.
+Invariant: the file makes no network request, and its own policy forbids them.
 """
 
 import base64
@@ -35,7 +35,7 @@ def packed(data):
 
 
 def modules(name, done, above=()):
-    """The module and all that it imports, those before it, each as a function that gives its exports."""
+    """The module after its imports, each as a function that returns its exports."""
     if name in above:
         raise SystemExit(f"page.py: a circle of imports, {' '.join(above)} {name}")
     if name in done:

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Makes `pendularm.html`, the page in one file: the kernel as a WebAssembly module, then the page around it. $1 names the file.
 #
-# The module needs the standard library for wasm32-unknown-unknown: `rustup target add wasm32-unknown-unknown`. Without it
-# Debian's rustc-web, rust-web-src and lld do: that compiler is older than this project asks for, so what it has not
-# yet made stable is switched on.
+# The module needs the standard library for wasm32-unknown-unknown: `rustup target add wasm32-unknown-unknown`. Without
+# rustup, Debian's rustc-web, rust-web-src and lld can be used. That compiler is older than required, so unstable
+# features are enabled.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Takes the picture of the page that the README shows: docs/page.png, or the file OUT. Needs chromium and the built program (PENDULARM).
 
-The controller holds the arm at its setpoint, and the map of stability is there. The picture is written with a
-palette of 256 colours, which a screenshot of flat colours and grey text loses next to nothing by.
+The controller holds the arm at its setpoint, and the map of stability is shown. The picture has a palette of 256
+colours, which is enough for a screenshot of flat colours and grey text.
 """
 
 import collections
@@ -20,7 +20,7 @@ from chromium import Browser  # noqa: E402
 from runtime import Runtime  # noqa: E402
 
 PICTURE = ROOT / (os.environ.get("OUT") or "docs/page.png")
-LIMIT = 150_000  # bytes: every reader of the README loads it
+LIMIT = 150_000  # bytes, because every reader of the README loads it
 
 
 def take():
@@ -36,7 +36,7 @@ def take():
         page.until("/^stable$/m.test(document.body.innerText)", why="the limit is known")
         page.until("/The dot is the arm\\./.test(document.querySelector('#stability').innerText)", why="the controller is on")
         page.until("document.querySelector('#push-text').textContent.includes('dies away')", why="the push")
-        # The map is refined while one looks; it is whole once it has not changed for two seconds.
+        # The map is refined over time. It is complete once it has not changed for two seconds.
         page.run("""(() => { let last = '', since = 0; window.rests = () => {
             const now = [...document.querySelectorAll('#stability canvas')].map((one) => one.toDataURL()).join();
             if (now !== last) { last = now; since = performance.now(); }
@@ -46,8 +46,8 @@ def take():
 
 
 def palette(image):
-    """The colours of a picture, at most 256, and the number of each of its colours among them: the commonest as they are, others as
-    the nearest of those."""
+    """The palette of a picture, at most 256 colours, and the index of each of its colours: the most frequent colours
+    unchanged, others as the nearest of those."""
     counts = collections.Counter(image.pixels())
     colors = [color for color, _ in counts.most_common(256)]
     known = {color: number for number, color in enumerate(colors)}

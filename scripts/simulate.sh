@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# `make simulate`: the whole runtime in one thread and in virtual time, driven by seeds. Exit status: 0 if every seed holds, 1 if something
-# that came is wrong, 2 if something panicked, 3 if something does not end. The first line is the command that plays the same seeds again,
-# the last line of a failure the one that repeats it.
+# `make simulate`: the whole runtime in one thread and in virtual time, driven by seeds. Exit status: 0 if every seed
+# passes, 1 for a wrong result, 2 for a panic, 3 for no progress. The first line is the command for the same seeds. The
+# last line of a failure is the command that repeats it.
 #
-# Without FROM the seeds begin where the commit's hash says: new ones with every commit, and the same for everybody who has it.
+# Without FROM the commit's hash selects the first seed, so every commit has new seeds, and everyone has the same ones.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo=${CARGO:-cargo}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # `make soak`: attacks picked at random against the release program on a free port, for MINUTES (1, fractions too).
-# SEED=n makes the same choices again; ONLY="pings,calls" plays only attacks with these words in their names.
+# SEED=n repeats the same choices. ONLY="pings,calls" plays only attacks with these words in their names.
 # The program is a child of the soak and ends with it. Exit status 1 if a bar is missed.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the release program for every Linux of this processor, with any C library: linked against musl, by Zig, which
-# comes from PyPI into python/.venv. The last line of standard output is the program's path.
+# Builds the release program for every Linux on this processor, with any C library. Zig, from PyPI in python/.venv,
+# links it against musl. The last line of standard output is the program's path.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
@@ -20,9 +20,9 @@ if [ "$("$tools/bin/cargo-zigbuild" --version 2>/dev/null)" != "cargo-zigbuild $
 fi
 libraries=$(rustc --print sysroot)/lib/rustlib/$target
 [ -d "$libraries" ] || rustup target add "$target" >&2 || fail "needs Rust's libraries for $target: rustup target add $target"
-# Where Zig is looked for.
+# The folder that is searched for Zig.
 export PATH=$tools/bin:$PATH
-# The system's allocator library, where one is handed in, is of another C library.
+# A given allocator library of the system belongs to another C library.
 unset JEMALLOC_OVERRIDE
 cargo-zigbuild zigbuild --release --locked --target "$target" --target-dir python/target/static >&2
 echo "$root/python/target/static/$target/release/pendularm"

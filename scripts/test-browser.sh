@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# The page, tried in headless Chromium (Debian's `chromium`), which is installed if it is missing and this may be done.
-# PENDULARM names a program that is there; without it one is built. FORM=file tries the page in one file, without a program. Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
+# Tests the page in headless Chromium (Debian's `chromium`), which is installed if it is missing and if that is
+# possible. PENDULARM names a built program; without it one is built. FORM=file tests the page in one file, without a
+# program. Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's
+# `browser/`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -12,7 +14,7 @@ if ! command -v chromium >/dev/null; then
     }
 fi
 
-# The page is judged by axe, of the same version everywhere.
+# axe checks the page, with the same version everywhere.
 [ -f node_modules/axe-core/axe.min.js ] || npm ci --silent --no-audit --no-fund
 target=${CARGO_TARGET_DIR:-target}
 if [ "${FORM:-}" = file ]; then

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs each thing in dist/ where nothing else is, and uses it. The program runs in an empty folder as its root, the
+# Installs and uses each file of dist/ in an empty environment. The program runs in an empty folder as its root, the
 # wheel in a fresh virtual environment, and the page in Chromium from disk. `make test-submission` builds the sources
 # without a network.
 set -euo pipefail

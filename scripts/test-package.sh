@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows that the archive builds and starts where there is no network and no cache of Cargo's: as at an offline grader's.
+# Checks that the archive builds and starts without a network and without a Cargo cache.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -17,14 +17,14 @@ finish() {
 }
 trap finish EXIT
 
-# The project's root is the archive's root, and nothing lands outside.
+# The project's root is the archive's root, and no file is extracted outside.
 tar -tzf "$archive" >"$work/entries"
 grep -qx 'Makefile' "$work/entries" || fail "Makefile is not a direct member of $archive"
 ! grep -nE '^\.?/?$|^/|(^|/)\.\.(/|$)|^\./' "$work/entries" || fail "the entries above are not plain relative names"
 mkdir "$work/project" "$work/cargo-home"
 tar -xzf "$archive" -C "$work/project"
 
-# A namespace without any network, where the system lets us have one. Cargo is told to stay offline in any case.
+# A namespace without a network, if the system allows one. Cargo is offline in any case.
 cut=()
 if unshare -n true 2>/dev/null; then
     cut=(unshare -n)

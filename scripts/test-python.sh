@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the wheel that `make wheel` left into a fresh virtual environment, and tests it there. Arguments are pytest's.
+# Installs the wheel of `make wheel` into a fresh virtual environment, and tests it there. Arguments are passed to
+# pytest.
 set -euo pipefail
 cd "$(dirname "$0")/../python"
 wheel=$(realpath target/wheels/*.whl)

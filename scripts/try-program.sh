@@ -1,12 +1,13 @@
 # shellcheck shell=bash
-# To be sourced by what tries a program: it has `work`, a folder of its own, `fail`, and ends with `stop_program`.
+# Source this in scripts that test a program. They define `work`, a separate folder, and `fail`, and end with `stop_program`.
 server=
 
 stop_program() {
     [ -z "$server" ] || kill -KILL "$server" 2>/dev/null || true
 }
 
-# Starts a program that listens on a free port, asks it once, and ends it: REQUEST, a pattern for the answer, then the command.
+# Starts a program that listens on a free port, sends one request, and ends it. Arguments: REQUEST, a pattern for the
+# answer, the command.
 try_program() {
     local request=$1 pattern=$2 port reply status=0
     shift 2

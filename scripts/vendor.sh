@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fetches the sources of the locked dependencies into vendor/ and points Cargo at them through .cargo/config.toml.
 # Both are ignored by git. To go back to the registry, delete .cargo/config.toml.
-# Given another folder that holds Cargo.toml and Cargo.lock, does the same there.
+# With another folder that has Cargo.toml and Cargo.lock, it does the same there.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -11,12 +11,12 @@ signature='# Written by scripts/vendor.sh.'
 
 fail() { echo "vendor: $*" >&2; exit 1; }
 
-# Somebody's own settings are not ours to overwrite.
+# A user's own settings are not overwritten.
 if [ -e "$config" ] && ! grep -qxF "$signature" "$config"; then
     fail "$config exists and was not written by this script: move it away first"
 fi
 
-# The copy of Cargo.lock beside the sources says what they were fetched for.
+# The copy of Cargo.lock beside the sources shows the lock file that they were fetched for.
 if cmp -s Cargo.lock vendor/.Cargo.lock; then
     echo "vendor: vendor/ holds what Cargo.lock asks for"
 else

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes
-# from PyPI into python/.venv. The wheel is left in python/target/wheels/, alone.
+# Builds the Python wheel: wheel.sh PROGRAM. It contains the release program and the library. maturin comes from
+# PyPI into python/.venv. The wheel is the only file in python/target/wheels/.
 #
-# On Linux with PORTABLE=1 the wheel is for every system whose C library is of 2012 or later (glibc 2.17). The program
-# is the static one. Zig links the library, since it knows the symbols of each release. It takes a release build more.
+# On Linux with PORTABLE=1 the wheel is for every system with a C library of 2012 or later (glibc 2.17). The program
+# is the static one. Zig links the library, because it has the symbols of each release. This needs another release
+# build.
 set -euo pipefail
 portable=${PORTABLE:-}
 [ -n "$portable" ] || program=$(realpath "$1")
@@ -18,7 +19,7 @@ fail() { echo "wheel: $*" >&2; exit 1; }
 python=$(command -v python3 || command -v python)
 [ -d .venv ] || "$python" -m venv .venv
 tools=$root/.venv/bin
-# On Windows they have another folder.
+# On Windows the tools are in another folder.
 [ -d "$tools" ] || tools=$root/.venv/Scripts
 if [ "$("$tools/maturin" --version 2>/dev/null)" != "maturin $maturin" ]; then
     say "installing maturin $maturin into python/.venv"
@@ -28,7 +29,7 @@ linker=()
 if [ -n "$portable" ]; then
     [ "$(uname -s)" = Linux ] || fail "PORTABLE=1 is for Linux: elsewhere the wheel is as portable without it"
     program=$(bash ../scripts/static.sh)
-    # Where Zig is looked for.
+    # The folder that is searched for Zig.
     export PATH=$tools:$PATH
     target=$(uname -m)-unknown-linux-gnu
     linker=(--zig --target "$target")
@@ -37,15 +38,15 @@ fi
 rm -rf target/wheel-data target/wheels
 bash ../scripts/install.sh "$program" target/wheel-data/data
 mv target/wheel-data/data/bin target/wheel-data/scripts
-# maturin takes licences from beside pyproject.toml.
+# maturin takes licences from the folder of pyproject.toml.
 cp ../LICENSE-MIT ../LICENSE-APACHE .
 "$python" ../scripts/notices.py --notices NOTICE-THIRD-PARTY.txt
 
-# On Linux the wheel says which C library it needs at least, and maturin looks at what it builds itself only.
+# On Linux the wheel's name has the required C library, but maturin checks only its own build.
 compatibility=()
 if [ "$(uname -s)" = Linux ]; then
     command -v objdump >/dev/null || fail "objdump (binutils) is needed"
-    # A static program has no table of symbols.
+    # A static program has no symbol table.
     glibc=$({ echo "GLIBC_$oldest"; objdump -T "$program" 2>/dev/null | grep -o 'GLIBC_[0-9][0-9.]*' || true; } | sort -Vu | tail -n 1)
     glibc=${glibc#GLIBC_}
     [ -z "$portable" ] || [ "$glibc" = "$oldest" ] || fail "the program needs glibc $glibc"

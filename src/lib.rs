@@ -1,11 +1,11 @@
 //! pendularm: a real-time planar robot arm that any rosbridge client can drive.
 //!
-//! Layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure: bytes and
-//! JSON), `services` and `live` (pure: join the two), and `actors` (one actor per node). `math` and `protocol` do not
-//! know each other.
+//! The layers import in one direction: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure:
+//! bytes and JSON), `services` and `live` (pure: both together), and `actors` (one actor per node). `math` and
+//! `protocol` do not import each other.
 //!
-//! Beside them [`study`] (pure: `math` measured against theory), `report` (clock, files and drawings around the study)
-//! and `web`, the way in for browsers.
+//! In addition there are [`study`] (pure: `math` compared with theory), `report` (clock, files and drawings of the
+//! study) and `web` (HTTP and WebSocket for browsers).
 //!
 //! | feature | default | adds |
 //! | --- | --- | --- |
@@ -14,12 +14,12 @@
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
-//! | `record` | yes | `record`: runs on record, read back and replayed |
-//! | `cli` | yes | `command`: commands that ask a running one, completions |
+//! | `record` | yes | `record`: records of runs, written, read and replayed |
+//! | `cli` | yes | `command`: commands for a running pendularm, completions |
 //!
-//! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs no more, and
-//! compiles `glam`, `libm` and `thiserror` beside it. With `batch`, and `fearless_simd`, a step of Runge-Kutta on
-//! x86-64 takes a tenth (2 links) to a fifth (3) fewer instructions.
+//! Without default features the library is [`math`] and [`study`], which is enough to step arms. Its dependencies
+//! are then `glam`, `libm` and `thiserror`. With `batch`, and `fearless_simd`, a step of Runge-Kutta on x86-64 takes
+//! a tenth (2 links) to a fifth (3) fewer instructions.
 //!
 //! ```
 //! use pendularm::math::{arm::Arm, integrator::Method, pid::{Gains, Setpoint}, simulation::Simulation};

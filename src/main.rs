@@ -1,6 +1,7 @@
-//! The thin binary: options in, exit status out.
+//! The binary: reads options and returns an exit status.
 //!
-//! **Invariant:** nothing here panics, also with standard output or standard error closed, full or broken.
+//! **Invariant:** nothing here panics, even if standard output or standard error is closed, full or
+//! broken.
 
 #[cfg(feature = "record")]
 use std::fs::File;
@@ -31,7 +32,7 @@ const BAD_USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     #[cfg(unix)]
-    // Without the handler a file that is too long kills the process, which nothing else depends on.
+    // Without the handler a file beyond the size limit would kill the process. Nothing else depends on the handler.
     let _ = pendularm::actors::signals::survive_file_size_limit();
     match Options::parse(std::env::args_os()) {
         Ok(Parsed::Serve(options)) => serve(&options),
@@ -75,7 +76,7 @@ fn show(text: &str) -> ExitCode {
     }
 }
 
-/// How a command that asks a running one ends.
+/// Runs a command for a running pendularm, and returns its exit status.
 #[cfg(feature = "cli")]
 fn end(outcome: Result<(), CommandError>) -> ExitCode {
     let Err(error) = outcome else {
@@ -87,7 +88,7 @@ fn end(outcome: Result<(), CommandError>) -> ExitCode {
     ExitCode::from(error.status())
 }
 
-/// Says whether the recorded steps can be taken again.
+/// Replays a record and prints the result.
 #[cfg(feature = "record")]
 fn replay(path: &Path) -> ExitCode {
     let file = output::line(&path.display());
@@ -125,7 +126,7 @@ fn serve(options: &Options) -> ExitCode {
     });
     let lines = log.clone();
     let last_resort = Box::new(move || {
-        lines.say("pendularm: a thread is busy and does not end in time: ending without it");
+        lines.say("pendularm: a thread did not stop in time; the program ends without it");
         lines.finish();
         std::process::exit(0);
     });

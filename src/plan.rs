@@ -1,6 +1,6 @@
-//! `pendularm plan`: the cheapest method and timestep for an allowed error, with what every method would cost.
+//! `pendularm plan`: the cheapest method and timestep for an allowed error, with the cost of every method.
 //!
-//! **Invariant:** every line has been run.
+//! **Invariant:** every printed line was simulated.
 
 use std::fmt::Write;
 
@@ -14,25 +14,25 @@ use crate::study::paused::at_once;
 use crate::study::planner::{self, MAX_DURATION, PlanError, Planned, Task};
 use crate::value::{Links, ValueReader, needed, read_links};
 
-/// How long a move under control is watched \[s\]: with the default gains it has settled.
+/// Duration of a move under control \[s\]. With the default gains it settles in this time.
 const MOVE: f64 = 4.0;
 
-/// Find the cheapest method and timestep for an allowed error, and run them against the truth
+/// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct PlanOptions {
-    /// Largest error of the end effector
+    /// Largest allowed error of the end effector, in m
     #[arg(long, value_name = "METRES")]
     #[arg(value_parser = ValueReader(read_positive))]
     pub error: f64,
-    /// How long the arm swings from its starting pose, or `servo` for a move under control
+    /// Duration of a free swing from the starting pose, in s, or `servo` for a move under control
     #[arg(long, value_name = "SECONDS", default_value = "10")]
     #[arg(value_parser = ValueReader(read_motion))]
     pub duration: PlannedMotion,
-    /// Number of links of the arm, 2 or 3, whatever `ARM_SIM_LINKS` says
+    /// Number of links of the arm, 2 or 3; `ARM_SIM_LINKS` has no effect here
     #[arg(long, value_name = "N", default_value = "2")]
     #[arg(value_parser = ValueReader(read_links))]
     pub links: Links,
-    /// Where a servo moves the joints, with commas between; 0.8,-0.6,0 unless given
+    /// Setpoint of the joints under control, in rad, separated by commas; 0.8,-0.6,0 by default
     #[arg(long, value_name = "RADIANS", value_delimiter = ',')]
     #[arg(allow_hyphen_values = true, value_parser = ValueReader(read_angle))]
     pub setpoint: Vec<f64>,
@@ -41,7 +41,7 @@ pub struct PlanOptions {
 /// The motion for which method and timestep are planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlannedMotion {
-    /// Time for which the arm swings freely \[s\].
+    /// Duration of the free swing \[s\].
     Swing(f64),
     /// The arm is under control, with the default gains.
     Servo,
@@ -54,8 +54,8 @@ impl PlanOptions {
         if joints == 0 {
             self.setpoint = vec![0.8, -0.6, 0.0];
         } else if self.duration != PlannedMotion::Servo {
-            // A free arm has none: it would be left out of account.
-            return Err("--setpoint must be left out without --duration servo".to_owned());
+            // A free arm has no setpoint, so the option would have no effect.
+            return Err("--setpoint needs --duration servo".to_owned());
         } else if joints != self.links.count() {
             return Err(format!(
                 "--setpoint must be a number for each joint, got {joints}"
@@ -65,10 +65,10 @@ impl PlanOptions {
     }
 }
 
-/// Makes the plan, and answers it as text for a terminal.
+/// Makes the plan, and returns it as text for a terminal.
 ///
 /// # Errors
-/// Why there is none.
+/// The reason if there is no plan.
 pub fn run(options: &PlanOptions) -> Result<String, PlanError> {
     match options.links {
         Links::Two => plan(options, Gains::<2>::default()),
@@ -113,7 +113,7 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             out,
-            "  {:<9} timestep {:.4e} s  {:>9.0} evaluations/s  off by {:.2e} m",
+            "  {:<9} timestep {:.4e} s  {:>9.0} evaluations/s  error {:.2e} m",
             one.method.name(),
             one.timestep,
             f64::from(one.method.evaluations()) / one.timestep,
@@ -155,6 +155,6 @@ fn read_motion(text: &str) -> Result<PlannedMotion, String> {
 
 fn read_angle(text: &str) -> Result<f64, String> {
     let angle: Option<f64> = text.trim().parse().ok();
-    let needs = "a number for each joint, with commas between";
+    let needs = "a number for each joint, separated by commas";
     needed(angle.filter(|angle| angle.is_finite()), needs, text)
 }

@@ -1,6 +1,6 @@
-//! Values on the command line and in the environment, as `clap` has them read.
+//! Readers for values on the command line and in the environment, for `clap`.
 //!
-//! **Invariant:** a refusal begins with the name of the option or of the variable that the value came from.
+//! **Invariant:** a refusal begins with the name of the option or variable of the value.
 
 use std::ffi::OsStr;
 use std::fmt::Display;
@@ -12,9 +12,9 @@ use clap::error::{Error, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{Arg, Command};
 
-/// Reads a value from its text; a byte that is no UTF-8 becomes a character that no valid value has.
+/// Reads a value from its text. A byte that is not UTF-8 becomes a character that is in no valid value.
 ///
-/// clap's own readers name the option where the variable is wrong (its issue 5202).
+/// clap's own readers name the option if the variable is wrong (clap issue 5202).
 #[derive(Clone)]
 pub(crate) struct ValueReader<T>(pub(crate) fn(&str) -> Result<T, String>);
 
@@ -47,7 +47,7 @@ impl<T: Clone + Send + Sync + 'static> TypedValueParser for ValueReader<T> {
     }
 }
 
-/// A number from one bound to the other.
+/// A number within the bounds.
 pub(crate) fn within<T: FromStr + PartialOrd + Display>(
     range: &RangeInclusive<T>,
     kind: &str,
@@ -58,12 +58,12 @@ pub(crate) fn within<T: FromStr + PartialOrd + Display>(
     needed(number, &needs, text)
 }
 
-/// The value, or the refusal of `text` by the kind of value that is needed.
+/// The value, or a refusal of `text` with the needed kind of value.
 pub(crate) fn needed<T>(value: Option<T>, needs: &str, text: &str) -> Result<T, String> {
     value.ok_or_else(|| format!("must be {needs}, got {text:?}"))
 }
 
-/// How many links the arm has.
+/// The number of links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Links {
     /// A 2-link arm.

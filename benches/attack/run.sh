@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# `make attack`: the service of a healthy client of the release program during hostile ones, one attack after the other.
+# `make attack`: measures the service of a healthy client of the release program during attacks, one after the other.
 #
-# Everything runs on free ports of loopback, bounded in time and connections; what is started is stopped by its id. Some seven minutes.
-# ARGS="--only=pings,step" picks attacks, ARGS=--list lists them. ARGS=--quick takes two minutes, is lenient about times
-# and plays what is late up to twice more. KEEP=1 keeps the table in benches/results/<date>-<processor>/attack/. Exit status 1 if a bar is missed.
+# Everything runs on free ports of loopback, bounded in time and connections. Started programs are stopped by id. It
+# takes about seven minutes. ARGS="--only=pings,step" selects attacks, ARGS=--list lists them. ARGS=--quick takes two
+# minutes, has longer limits, and repeats late attacks up to twice. KEEP=1 keeps the table in
+# benches/results/<date>-<processor>/attack/. Exit status 1 if a bar is missed.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"

@@ -1,14 +1,16 @@
-"""What an error costs: one swing of the 2- and the 3-link arm by our integrators and by other people's, to 1e-3, 1e-6 and 1e-9 rad.
+"""The cost of an error: one swing of the 2- and the 3-link arm by pendularm's and other integrators, to 1e-3, 1e-6
+and 1e-9 rad.
 
 equal_error.py FOLDER RUST MUJOCO PINOCCHIO
 
-The programs are those of this folder, compiled (`run.sh` does it); scipy and heyoka run here. All swing the same arm for 4 s, free,
-from 0.3 rad and 0.2 rad/s at every joint, and are judged by the largest angle at the end, against a motion of twice a double's digits.
-Every setting (timestep or tolerance) is run for a fiftieth of a second and three times at least, the shortest run counts, and everything in turn PASSES times. A
-time to an error is that of the cheapest setting from which on all finer ones keep it, so that no lucky crossing counts.
+The programs are those of this folder, compiled (`run.sh` does it); scipy and heyoka run here. All simulate the same
+free arm for 4 s, from 0.3 rad and 0.2 rad/s at every joint. The error is the largest angle error at the end, compared
+with a motion of twice a double's digits. Every setting (timestep or tolerance) runs for a fiftieth of a second and at
+least three times, and the shortest run counts. Everything is repeated in turn PASSES times. The time for an error is
+that of the cheapest setting for which all finer ones also keep the error.
 
-scipy is handed accelerations compiled by numba; heyoka compiles its own, before the clock starts. Ends with status 1 if anybody who
-ought to come to an error does not: then something was not the same arm.
+scipy gets accelerations compiled by numba. heyoka compiles its own before the clock starts. The exit status is 1 if a
+system does not reach an expected error, because then it simulated another arm.
 """
 
 import csv
@@ -31,7 +33,7 @@ REPEATED, REPEATS, LONGEST = 0.02, 3, 1.0
 TOLERANCES = [10.0 ** (-half / 2) for half in range(4, 29)]
 # Methods of first and of second order: a sweep that ends at a second a run cannot reach the finer errors, and that is no fault.
 LOW_ORDER = ("euler", "midpoint", "verlet", "implicitfast")
-# A reference whose own uncertainty is larger would judge nobody.
+# With a larger uncertainty the reference is not usable.
 UNCERTAINTY = 1e-20
 
 
@@ -105,7 +107,7 @@ def joints(links, y):
 
 
 def measured(links, system, setting, run, truth):
-    """A line as the compiled programs print it; None once a run takes too long."""
+    """A line in the format of the compiled programs; None once a run takes too long."""
     shortest, runs, begun = math.inf, 0, time.perf_counter()
     while runs < REPEATS or time.perf_counter() - begun < REPEATED:
         runs += 1
@@ -155,7 +157,7 @@ def taylor(links):
 
 
 def to_error(runs, target):
-    """Time of the cheapest run from which on all finer ones are within `target`; None if there is none."""
+    """Time of the cheapest run for which all finer ones are also within `target`; None if there is none."""
     runs = sorted(runs, key=lambda run: -run[0])
     kept = []
     for _, error, seconds in reversed(runs):

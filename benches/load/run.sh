@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
 #
-# All three run on free ports of loopback; each is stopped by its process id, pendularm by the client that starts it. redis-server and mosquitto come from Debian's packages: as root they
-# are installed if missing. Takes some minutes. ARGS=--quick plays each scene for a moment and judges nothing; KEEP=1 keeps the figures in
+# All three run on free ports of loopback; each is stopped by its process id, pendularm by the client that starts it.
+# redis-server and mosquitto come from Debian's packages: as root they are installed if missing. Takes some minutes.
+# ARGS=--quick plays each scene for a moment, without bars; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
 
-# Three servers with 1,000 clients each, and both ends of a connection are ours.
+# Three servers with 1,000 clients each, and both ends of a connection are in this process group.
 needed_files=4096
 [ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
 

@@ -1,6 +1,6 @@
-//! A client on a TCP socket of its own, by line or by WebSocket, that blocks.
+//! A blocking client on its own TCP socket, by line or by WebSocket.
 //!
-//! [`Client::next_event`] and [`Client::write`] say what went wrong; the others are for tests, and panic with it.
+//! [`Client::next_event`] and [`Client::write`] return errors. The other methods are for tests, and panic.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -12,7 +12,7 @@ use crate::codec::{Codec, Event, Framing};
 use crate::websocket::{LAST, append, append_close, handshake, opcode};
 use crate::{Error, call, is_response_to, reason, values};
 
-/// How long anything may take before a client gives up; generous, because machines are noisy.
+/// Default limit of every wait. It is long, because machines may be busy.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The mask of control frames.
@@ -27,7 +27,7 @@ pub struct Client {
     chunk: Vec<u8>,
     calls: u64,
     has_closed: bool,
-    /// Frames that came while another was awaited, oldest first.
+    /// Frames that arrived while another was awaited, the oldest first.
     pub kept: Vec<Value>,
 }
 
@@ -35,7 +35,7 @@ impl Client {
     /// Connects by line.
     ///
     /// # Panics
-    /// As all that follows: if what is asked for does not happen in time.
+    /// As all methods below: if the expected event does not happen in time.
     #[must_use]
     #[track_caller]
     pub fn to(address: SocketAddr) -> Self {
@@ -52,7 +52,7 @@ impl Client {
         Self::web_with(address, "/", "")
     }
 
-    /// Connects by WebSocket at `target`; `headers` are further lines of the request, each with its line end.
+    /// Connects by WebSocket at `target`. `headers` are further lines of the request, each with its line end.
     #[must_use]
     #[track_caller]
     pub fn web_with(address: SocketAddr, target: &str, headers: &str) -> Self {
@@ -63,10 +63,10 @@ impl Client {
         expect("a WebSocket", opened)
     }
 
-    /// Connects; everything may take `patience` from then on.
+    /// Connects, with `patience` as the limit of every wait.
     ///
     /// # Errors
-    /// The socket's error, or a handshake that is refused.
+    /// The socket's error, or a refused handshake.
     pub fn connect(
         framing: Framing,
         address: SocketAddr,
@@ -102,7 +102,7 @@ impl Client {
         self.write(request.as_bytes())?;
         let deadline = Instant::now() + self.patience;
         loop {
-            // Nothing comes before the client has asked for it.
+            // The runtime sends nothing before a request of the client.
             self.codec.next_event()?;
             if self.codec.is_open() {
                 return Ok(());
@@ -111,13 +111,13 @@ impl Client {
         }
     }
 
-    /// The socket, for what is done against the rules.
+    /// The socket, for violations of the protocol.
     #[must_use]
     pub fn stream(&self) -> &TcpStream {
         &self.stream
     }
 
-    /// Changes how long anything may take.
+    /// Changes the limit of every wait.
     #[track_caller]
     pub fn set_patience(&mut self, patience: Duration) {
         self.patience = patience;
@@ -125,7 +125,7 @@ impl Client {
         expect("a timeout", set.map_err(Error::Socket));
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     ///
     /// # Errors
     /// The socket's error.
@@ -147,7 +147,7 @@ impl Client {
         self.send_bytes(&bytes);
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     #[track_caller]
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         expect("room for what is sent", self.write(bytes));
@@ -161,7 +161,7 @@ impl Client {
         self.send_bytes(&bytes);
     }
 
-    /// Says that the WebSocket is to end.
+    /// Sends a close frame.
     #[track_caller]
     pub fn close(&mut self, code: u16, reason: &str) {
         let mut bytes = Vec::new();
@@ -170,7 +170,7 @@ impl Client {
         self.send_bytes(&bytes);
     }
 
-    /// Stops sending; waiting answers still come.
+    /// Stops sending. Waiting answers still arrive.
     #[track_caller]
     pub fn finish(&mut self) {
         let finished = self.stream.shutdown(Shutdown::Write);
@@ -202,7 +202,7 @@ impl Client {
     /// The next message, pong or close before `deadline`. Pings and a close are answered.
     ///
     /// # Errors
-    /// If none comes.
+    /// If none arrives.
     pub fn next_event(&mut self, deadline: Instant) -> Result<Event, Error> {
         loop {
             let mut answer = Vec::new();
@@ -222,7 +222,7 @@ impl Client {
                 && !std::mem::replace(&mut self.has_closed, true)
             {
                 append_close(&mut answer, MASK, code.unwrap_or(1000), "");
-                // The runtime may be gone already.
+                // The runtime may have ended already.
                 let _ = self.write(&answer);
             }
             return Ok(event);
@@ -232,7 +232,7 @@ impl Client {
     /// The next frame before `deadline`.
     ///
     /// # Errors
-    /// If none comes, or something that is no JSON.
+    /// If none arrives, or if it is not JSON.
     pub fn next_frame(&mut self, deadline: Instant) -> Result<Value, Error> {
         loop {
             match self.next_event(deadline)? {
@@ -268,7 +268,7 @@ impl Client {
         }
     }
 
-    /// The next frame for which `wanted` holds; the others are kept.
+    /// The next frame for which `wanted` is true. The others are kept.
     #[track_caller]
     pub fn receive_where(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         let deadline = Instant::now() + self.patience;
@@ -281,7 +281,7 @@ impl Client {
         }
     }
 
-    /// The frames that come within `time`, without waiting longer.
+    /// The frames that arrive within `time`.
     #[track_caller]
     pub fn receive_for(&mut self, time: Duration) -> Vec<Value> {
         let deadline = Instant::now() + time;
@@ -327,13 +327,13 @@ impl Client {
         values(self.call(service, args))
     }
 
-    /// Calls a service that must refuse and returns the reason.
+    /// Calls a service that must refuse the call, and returns the reason.
     #[track_caller]
     pub fn refusal(&mut self, service: &str, args: Value) -> String {
         reason(&self.call(service, args))
     }
 
-    /// Subscribes and waits for the confirmation, which comes over TCP only unless the client has set a level.
+    /// Subscribes and waits for the confirmation. Over WebSocket there is one only if the client has set a level.
     #[track_caller]
     pub fn subscribe(&mut self, topic: &str) {
         self.send(&json!({"op": "subscribe", "topic": topic}));
@@ -341,13 +341,13 @@ impl Client {
         assert_eq!(status["level"], "info", "{status}");
     }
 
-    /// Waits until the runtime has handled all that was sent: a call is answered in order.
+    /// Waits until the runtime has handled all sent frames, because a call is answered in order.
     #[track_caller]
     pub fn settle(&mut self) {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
-    /// The code with which the other side closes; messages that come before are ignored.
+    /// The close code of the other side. Earlier messages are ignored.
     #[track_caller]
     pub fn close_code(&mut self) -> Option<u16> {
         let deadline = Instant::now() + self.patience;
@@ -358,7 +358,7 @@ impl Client {
         }
     }
 
-    /// True if the stream ends (or breaks) in time, whatever comes before.
+    /// Whether the stream ends or breaks in time. Earlier bytes are ignored.
     #[track_caller]
     pub fn is_closed(&mut self) -> bool {
         self.set_patience(self.patience);

@@ -1,11 +1,11 @@
 //! Bytes to messages and back, without I/O: one JSON object per line, or one per WebSocket message.
 //!
-//! **Invariant:** a strict reader: a frame that no server may send is an error.
+//! **Invariant:** the reader is strict: a frame that no server may send is an error.
 
 use crate::Error;
 use crate::websocket::{ACCEPT, LAST, append, opcode};
 
-/// How frames are told from one another.
+/// How frames are separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Framing {
     /// One JSON object per line.
@@ -14,14 +14,14 @@ pub enum Framing {
     WebSocket,
 }
 
-/// A message or control frame that has come.
+/// A received message or control frame.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event {
     /// A line without its end, or a text message.
     Text(String),
     /// A binary message.
     Binary(Vec<u8>),
-    /// A ping, which has to be answered with its payload.
+    /// A ping, which must be answered with its payload.
     Ping(Vec<u8>),
     /// A pong.
     Pong(Vec<u8>),
@@ -29,22 +29,22 @@ pub enum Event {
     Close(Option<u16>, String),
 }
 
-/// One end of a connection: the bytes that have come, and how frames are written on it.
+/// One end of a connection: the received bytes, and the encoder of frames.
 #[derive(Debug)]
 pub struct Codec {
     framing: Framing,
     bytes: Vec<u8>,
-    /// How many of `bytes` are read, and how many are known to have no line end.
+    /// The number of read `bytes`, and the number known to have no line end.
     start: usize,
     scanned: usize,
     is_open: bool,
     is_closed: bool,
-    /// The kind of the message that has begun, and the part of it that came.
+    /// The kind of the incomplete message, and its received part.
     unfinished: Option<(u8, Vec<u8>)>,
 }
 
 impl Codec {
-    /// An end at which nothing has come. A WebSocket is open once its handshake is answered.
+    /// An end without received bytes. A WebSocket is open once its handshake is answered.
     #[must_use]
     pub fn new(framing: Framing) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Codec {
         }
     }
 
-    /// An end at which the handshake is over.
+    /// An end after the handshake.
     #[must_use]
     pub fn opened(framing: Framing) -> Self {
         Self {
@@ -67,31 +67,31 @@ impl Codec {
         }
     }
 
-    /// How frames are told from one another here.
+    /// How frames are separated here.
     #[must_use]
     pub fn framing(&self) -> Framing {
         self.framing
     }
 
-    /// Whether the runtime has agreed to speak.
+    /// Whether the handshake is complete.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.is_open
     }
 
-    /// Whether all that came was whole.
+    /// Whether no received message is incomplete.
     #[must_use]
     pub fn is_between_messages(&self) -> bool {
         self.pending().is_empty() && self.unfinished.is_none()
     }
 
-    /// The bytes that have come and are not read.
+    /// The received bytes that have not been read.
     #[must_use]
     pub fn pending(&self) -> &[u8] {
         &self.bytes[self.start..]
     }
 
-    /// Throws away what has come and is not read, and returns how many bytes that were.
+    /// Discards received bytes that have not been read, and returns their number.
     pub fn discard(&mut self) -> usize {
         let discarded = self.pending().len();
         self.bytes = Vec::new();
@@ -99,9 +99,9 @@ impl Codec {
         discarded
     }
 
-    /// Adds bytes that have come.
+    /// Adds received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
-        // Moving the rest to the front costs no more than reading what was before it did.
+        // Moving the rest to the front costs at most as much as reading the bytes before it.
         if self.start > self.bytes.len() / 2 {
             self.bytes.drain(..self.start);
             self.scanned -= self.start;
@@ -110,7 +110,7 @@ impl Codec {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Appends a frame as it goes out.
+    /// Appends an encoded frame.
     pub fn write(&self, frame: &str, out: &mut Vec<u8>) {
         match self.framing {
             Framing::Lines => {
@@ -118,7 +118,7 @@ impl Codec {
                 out.push(b'\n');
             }
             Framing::WebSocket => {
-                // Any mask will do, as long as it is not always the same.
+                // Any mask is valid. It changes, so that it is not always the same.
                 let mask = 0x5bd1_e995_u64.wrapping_mul((out.len() + frame.len()) as u64 | 1);
                 let [.., a, b, c, d] = mask.to_be_bytes();
                 append(out, LAST | opcode::TEXT, [a, b, c, d], frame.as_bytes());
@@ -126,10 +126,10 @@ impl Codec {
         }
     }
 
-    /// The next whole message or control frame of what has come.
+    /// The next complete message or control frame of the received bytes.
     ///
     /// # Errors
-    /// [`Error::Malformed`] for what no server may send.
+    /// [`Error::Malformed`] for bytes that no server may send.
     pub fn next_event(&mut self) -> Result<Option<Event>, Error> {
         if !self.is_open && !self.read_handshake()? {
             return Ok(None);
@@ -230,7 +230,7 @@ impl Codec {
         }
     }
 
-    /// The first byte and the payload of the next whole frame.
+    /// The first byte and the payload of the next complete frame.
     fn frame(&mut self) -> Result<Option<(u8, Vec<u8>)>, Error> {
         let &[first, second, ref rest @ ..] = self.pending() else {
             return Ok(None);
@@ -276,7 +276,7 @@ fn check(holds: bool, what: impl FnOnce() -> String) -> Result<(), Error> {
 mod tests {
     use super::*;
 
-    /// All events of these bytes, which come in pieces of every length in turn.
+    /// All events of these bytes, given in pieces of every length in turn.
     fn events(framing: Framing, bytes: &[u8]) -> Vec<Event> {
         let mut last = Vec::new();
         for piece in 1..=bytes.len() {

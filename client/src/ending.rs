@@ -1,23 +1,22 @@
-//! The end of a program that was started.
+//! The end of a started program.
 //!
-//! **Invariant:** whoever waits for one that goes on is told so.
+//! **Invariant:** waiting for a program that does not end returns `None`.
 
 use std::io;
 use std::process::{Child, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Between two looks.
+/// Time between two checks.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Waits until a program has ended by itself: its exit status, and how long that took. `None` if it goes on after
-/// `limit`.
+/// Waits until a program has ended by itself. Returns its exit status and the elapsed time; `None` if it still
+/// runs after `limit`.
 ///
-/// A machine that stands still wakes nobody: a look that comes late counts for ten times what it should have taken at
-/// most.
+/// On a stalled machine a check may be late. It then counts for at most ten times its interval.
 ///
 /// # Errors
-/// The system's word if it cannot say how the program does.
+/// The system's error, if the program's state cannot be read.
 pub fn wait(child: &mut Child, limit: Duration) -> io::Result<Option<(ExitStatus, Duration)>> {
     let began = Instant::now();
     let (mut last, mut took) = (began, Duration::ZERO);

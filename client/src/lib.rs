@@ -1,7 +1,6 @@
-//! A rosbridge client for programs that try the runtime: tests, fuzz targets, soak and measurements.
+//! A rosbridge client for programs that test the runtime: tests, fuzz targets, soak and measurements.
 //!
-//! It shares no code with the runtime and no library that reads its frames, so that a fault of the one is not a fault of
-//! the other.
+//! It shares no code and no frame library with the runtime, so a fault in one is not in the other.
 //!
 //! | module | what |
 //! | --- | --- |
@@ -11,7 +10,7 @@
 //! | [`ending`] | the end of a program that was started |
 //! | [`pipe`] | a client on an asynchronous stream (feature `tokio`) |
 //!
-//! **Invariant:** every wait has a limit, and says what it waited for.
+//! **Invariant:** every wait has a limit, and its error names the awaited event.
 
 pub mod blocking;
 pub mod codec;
@@ -25,14 +24,14 @@ use std::io;
 
 use serde_json::{Value, json};
 
-/// Why a client has nothing to give.
+/// Why a client has no result.
 #[derive(Debug)]
 pub enum Error {
-    /// Nothing came before the deadline.
+    /// Nothing arrived before the deadline.
     Late,
     /// The stream has ended.
     Ended,
-    /// The runtime sent something that no server may send.
+    /// The runtime sent bytes that no server may send.
     Malformed(String),
     /// The socket has failed.
     Socket(io::Error),
@@ -63,7 +62,7 @@ pub fn is_response_to(frame: &Value, id: &Value) -> bool {
     frame["op"] == "service_response" && frame["id"] == *id
 }
 
-/// The values of a response that must be a success.
+/// The values of a response that must be successful.
 ///
 /// # Panics
 /// If the service has refused.

@@ -21,13 +21,13 @@ pub struct Client<S> {
     patience: Duration,
     chunk: Vec<u8>,
     calls: u64,
-    /// Every frame that came, oldest first, if the client was told to remember.
+    /// Every received frame, the oldest first, if the client stores them.
     pub heard: Vec<Value>,
     remembers: bool,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
-    /// A client by line at this end of a pipe; everything may take `patience`.
+    /// A client by line at this end of a pipe, with `patience` as the limit of every wait.
     #[must_use]
     pub fn on(stream: S, patience: Duration) -> Self {
         Self::with(Framing::Lines, stream, patience)
@@ -36,13 +36,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     /// The same by WebSocket, at `target` of `host`.
     ///
     /// # Panics
-    /// As all that follows: if what is asked for does not happen in time.
+    /// As all methods below: if the expected event does not happen in time.
     pub async fn web_on(stream: S, patience: Duration, host: &str, target: &str) -> Self {
         let mut client = Self::with(Framing::WebSocket, stream, patience);
         let request = handshake(host, target, "");
         client.send_bytes(request.as_bytes()).await;
         while !client.codec.is_open() {
-            // Nothing comes before the client has asked for it.
+            // The runtime sends nothing before a request of the client.
             let next = client.codec.next_event();
             assert!(matches!(next, Ok(None)), "{next:?}");
             if !client.codec.is_open() {
@@ -64,7 +64,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The same, remembering every frame in [`Client::heard`].
+    /// The same, storing every frame in [`Client::heard`].
     #[must_use]
     pub fn remembering(self) -> Self {
         Self {
@@ -73,13 +73,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The stream, for what is done against the rules. Bytes that were read of it and not asked for are not in it
-    /// any more.
+    /// The stream, for violations of the protocol. It no longer has bytes that the client has read but not returned.
     pub fn stream(&mut self) -> &mut S {
         &mut self.stream
     }
 
-    /// The stream alone.
+    /// Returns only the stream.
     #[must_use]
     pub fn into_stream(self) -> S {
         self.stream
@@ -97,19 +96,19 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         self.send_bytes(&bytes).await;
     }
 
-    /// Says that the WebSocket is to end.
+    /// Sends a close frame.
     pub async fn close(&mut self, code: u16, reason: &str) {
         let mut bytes = Vec::new();
         append_close(&mut bytes, MASK, code, reason);
         self.send_bytes(&bytes).await;
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     pub async fn send_bytes(&mut self, bytes: &[u8]) {
         self.stream.write_all(bytes).await.expect("an open pipe");
     }
 
-    /// Stops sending; waiting answers still come.
+    /// Stops sending. Waiting answers still arrive.
     pub async fn finish(&mut self) {
         self.stream.shutdown().await.expect("an open pipe");
     }
@@ -126,10 +125,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The next message or control frame; pings are answered. The end of the stream is an error.
+    /// The next message or control frame. Pings are answered. The end of the stream is an error.
     ///
     /// # Errors
-    /// If none comes, or something that no server may send.
+    /// If none arrives, or if no server may send it.
     pub async fn next_event(&mut self) -> Result<Event, Error> {
         loop {
             if let Some(event) = self.codec.next_event()? {
@@ -144,10 +143,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The next frame; pings and pongs are none.
+    /// The next frame, without pings and pongs.
     ///
     /// # Errors
-    /// If none comes, or something that is no frame.
+    /// If none arrives, or if it is not a frame.
     pub async fn next_frame(&mut self) -> Result<Value, Error> {
         loop {
             let text = match self.next_event().await? {
@@ -173,7 +172,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// The next frame for which `wanted` holds.
+    /// The next frame for which `wanted` is true.
     pub async fn receive_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         loop {
             let frame = self.receive().await;
@@ -195,7 +194,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         }
     }
 
-    /// True if nothing comes, not even the end, for so long.
+    /// Whether nothing arrives in this time, not even the end.
     pub async fn hears_nothing_for(&mut self, time: Duration) -> bool {
         if !self.codec.pending().is_empty() {
             return false;
@@ -225,7 +224,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         values(self.call(service, args).await)
     }
 
-    /// Calls a service that must refuse and returns the reason.
+    /// Calls a service that must refuse the call, and returns the reason.
     pub async fn refusal(&mut self, service: &str, args: Value) -> String {
         reason(&self.call(service, args).await)
     }
@@ -237,7 +236,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         assert_eq!(status["level"], "info", "{status}");
     }
 
-    /// Waits until the runtime has handled all that was sent: a call is answered in order.
+    /// Waits until the runtime has handled all sent frames, because a call is answered in order.
     pub async fn settle(&mut self) {
         self.ask("/arm_sim/set_params", json!({})).await;
     }

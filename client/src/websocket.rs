@@ -1,6 +1,6 @@
-//! WebSocket frames (RFC 6455) as a client writes them.
+//! WebSocket frames (RFC 6455) of a client.
 //!
-//! **Invariant:** knows bytes only, and writes frames against the rules too.
+//! **Invariant:** this module handles only bytes, and can also write invalid frames.
 
 /// The key of every handshake, and the answer to it (RFC 6455, section 1.3).
 const KEY: &str = "dGhlIHNhbXBsZSBub25jZQ==";
@@ -11,11 +11,11 @@ pub const LAST: u8 = 0x80;
 
 /// Kinds of frames.
 pub mod opcode {
-    /// Goes on with a message.
+    /// Continues a message.
     pub const CONTINUATION: u8 = 0;
-    /// Begins a text.
+    /// Begins a text message.
     pub const TEXT: u8 = 1;
-    /// Begins bytes.
+    /// Begins a binary message.
     pub const BINARY: u8 = 2;
     /// Ends the connection.
     pub const CLOSE: u8 = 8;
@@ -25,7 +25,7 @@ pub mod opcode {
     pub const PONG: u8 = 10;
 }
 
-/// The request that opens a WebSocket at `target` of `host`; `headers` are further lines, each with its line end.
+/// The request that opens a WebSocket at `target` of `host`. `headers` are further lines, each with its line end.
 #[must_use]
 pub fn handshake(host: &str, target: &str, headers: &str) -> String {
     format!(
@@ -34,7 +34,7 @@ pub fn handshake(host: &str, target: &str, headers: &str) -> String {
     )
 }
 
-/// Appends a frame as a client sends it: masked. `first_byte` is an [`opcode`], with [`LAST`] if no more follow.
+/// Appends a masked frame of a client. `first_byte` is an [`opcode`], with [`LAST`] for the last frame.
 pub fn append(out: &mut Vec<u8>, first_byte: u8, mask: [u8; 4], payload: &[u8]) {
     out.push(first_byte);
     let length = payload.len();
@@ -54,7 +54,7 @@ pub fn append(out: &mut Vec<u8>, first_byte: u8, mask: [u8; 4], payload: &[u8]) 
     out.extend(masked.map(|(byte, mask)| byte ^ mask));
 }
 
-/// Appends a message in fragments of about `piece` bytes, with a ping between them; 0: in one frame.
+/// Appends a message in fragments of about `piece` bytes with a ping between them; 0 means one frame.
 pub fn append_message(out: &mut Vec<u8>, kind: u8, mask: [u8; 4], piece: usize, message: &[u8]) {
     let piece = if piece == 0 {
         message.len().max(1)

@@ -1,4 +1,4 @@
-//! A record of everything sent, kept beside the session, so that everything that comes can be compared with it.
+//! A record of everything sent in a session, to compare received frames with it.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use pendularm::protocol::wire::json::accept_literals;
 
 use crate::json::Json;
 
-/// Everything that clients have said.
+/// Everything that clients have sent.
 #[derive(Debug, Default)]
 pub struct Book {
     /// Messages by number.
@@ -15,7 +15,7 @@ pub struct Book {
     arguments: HashMap<String, Json>,
     /// Answers that providers gave, by call.
     answers: HashMap<String, (bool, Json)>,
-    /// Somebody may have said what is not in here.
+    /// Whether a client may have sent something that is not recorded here.
     pub is_forged: bool,
 }
 
@@ -27,7 +27,7 @@ struct Message {
 }
 
 impl Book {
-    /// A client publishes that.
+    /// Records a published message.
     pub fn publish(&mut self, number: u64, from: u64, topic: &str, payload: &str) {
         let message = Message {
             from,
@@ -37,17 +37,17 @@ impl Book {
         self.messages.insert(number, message);
     }
 
-    /// A client calls another's service with that.
+    /// Records a call of another client's service.
     pub fn call(&mut self, id: &str, payload: &str) {
         self.arguments.insert(id.to_owned(), value(payload));
     }
 
-    /// A provider answers that.
+    /// Records a provider's answer.
     pub fn answer(&mut self, id: &str, result: bool, payload: &str) {
         self.answers.insert(id.to_owned(), (result, value(payload)));
     }
 
-    /// Asserts that a message is what was published, where it was.
+    /// Asserts that a message is the published one, on its topic.
     pub fn check_message(&self, number: u64, from: u64, topic: &str, payload: Option<&Json>) {
         if self.is_forged {
             return;
@@ -59,14 +59,14 @@ impl Book {
         check(&sent.payload, payload, "message", &number);
     }
 
-    /// Asserts that a provider is asked what was asked.
+    /// Asserts that a provider gets the arguments of the call.
     pub fn check_call(&self, id: &str, payload: Option<&Json>) {
         if let Some(sent) = self.arguments.get(id).filter(|_| !self.is_forged) {
             check(sent, payload, "call", &id);
         }
     }
 
-    /// Asserts that the caller `id` hears what the provider of its call said.
+    /// Asserts that the caller `id` gets the answer of its call's provider.
     pub fn check_answer(&self, id: &str, said_of: &str, result: bool, payload: Option<&Json>) {
         if self.is_forged {
             return;
@@ -94,7 +94,7 @@ fn slashed(topic: &str) -> String {
     }
 }
 
-/// A value as Python writes it; the frame target compares how names of numbers are taken.
+/// A value in Python's JSON. The frame target compares how `NaN` and `Infinity` are read.
 fn value(text: &str) -> Json {
     let strict = accept_literals(text.to_owned());
     Json::read(&strict).unwrap_or_else(|| panic!("a session sends JSON: {strict}"))

@@ -1,4 +1,4 @@
-//! A client on an in-memory pipe: plain, or behind a WebSocket. Reading and writing go on by themselves.
+//! A client on an in-memory pipe: plain, or behind a WebSocket. Reading and writing run by themselves.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -20,7 +20,7 @@ pub enum Door {
     Socket,
 }
 
-/// Something that came from the runtime.
+/// A message from the runtime.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Received {
     /// A frame, without its newline.
@@ -82,13 +82,13 @@ impl Client {
         self.door
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     pub fn send_bytes(&self, bytes: Vec<u8>) {
-        // Its end may be gone already.
+        // Its end may have closed already.
         let _ = self.out.send(Outgoing::Bytes(bytes));
     }
 
-    /// Sends a frame; `style` says how: with which line end, or in which pieces.
+    /// Sends a frame. `style` selects the line end or the pieces.
     pub fn send(&self, frame: &str, style: u8) {
         self.send_bytes(self.encode(frame, style));
     }
@@ -117,7 +117,7 @@ impl Client {
         bytes
     }
 
-    /// Says that nothing more will come: by the stream's end, or by a close frame.
+    /// Ends sending: by the stream's end, or by a close frame.
     pub fn finish(&self) {
         if self.door == Door::Socket {
             let mut bytes = Vec::new();
@@ -127,13 +127,13 @@ impl Client {
         let _ = self.out.send(Outgoing::End);
     }
 
-    /// Stops and goes on reading.
+    /// Stops or continues reading.
     pub fn pause(&self, paused: bool) {
         self.line.paused.set(paused);
         self.line.resumed.notify_one();
     }
 
-    /// Whether it reads nothing now.
+    /// Whether it has stopped reading.
     #[must_use]
     pub fn is_paused(&self) -> bool {
         self.line.paused.get()
@@ -145,32 +145,32 @@ impl Client {
         self.line.ended.get()
     }
 
-    /// Whether the runtime has agreed to speak.
+    /// Whether the handshake is complete.
     #[must_use]
     pub fn is_greeted(&self) -> bool {
         self.codec.is_open()
     }
 
-    /// Whether all that came was whole, for a stream that has ended.
+    /// Whether no message is incomplete, for a stream that has ended.
     #[must_use]
     pub fn ended_in_order(&self) -> bool {
         self.line.bytes.borrow().is_empty() && self.codec.is_between_messages()
     }
 
-    /// The bytes that were left over, to be shown.
+    /// The remaining bytes, for a message.
     #[must_use]
     pub fn rest(&self) -> String {
         let bytes = String::from_utf8_lossy(&self.line.bytes.borrow()).into_owned();
         format!("{bytes:?}, {:?}", self.codec)
     }
 
-    /// Throws away what has come since, whatever it is.
+    /// Discards everything received since.
     pub fn take_anything(&mut self) {
         self.line.bytes.borrow_mut().clear();
         self.codec.discard();
     }
 
-    /// Takes everything that has come since.
+    /// Takes everything received since.
     pub fn take(&mut self) -> Vec<Received> {
         self.codec
             .push(&std::mem::take(&mut *self.line.bytes.borrow_mut()));

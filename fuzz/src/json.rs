@@ -1,5 +1,5 @@
-//! JSON as `serde_json` reads it, with all that its own values leave out: numbers keep their text, and an object keeps
-//! every member in its place. A string that holds half a surrogate pair is a string without a text.
+//! JSON read by `serde_json`, with more detail than its own values: numbers keep their text, and an object keeps every
+//! member in order. A string with half of a surrogate pair is a string without a text.
 
 use std::fmt;
 
@@ -87,8 +87,8 @@ impl Json {
         }
     }
 
-    /// Whether this is what is heard of it where it is passed on: a number that overflows is `null`, and another has the
-    /// same value for `same_number`.
+    /// Whether this is the forwarded form of `sent`: a number that overflows is `null`, and any other number satisfies
+    /// `same_number`.
     #[must_use]
     pub fn becomes(&self, heard: &Self, same_number: fn(&Self, &Self) -> bool) -> bool {
         match (self, heard) {

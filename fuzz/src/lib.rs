@@ -10,7 +10,7 @@
 //! | [`client`] | a client on an in-memory pipe, which speaks as `pendularm-client` does |
 //! | [`stage`] | the runtime's side of it, in virtual time |
 //!
-//! A target panics where something does not hold; the fuzzer then keeps its input.
+//! A target panics if a check fails. The fuzzer then keeps its input.
 
 pub mod book;
 pub mod cbor;

@@ -1,8 +1,8 @@
-//! The cost that one execution may have: processor time and memory, by the bytes of its input.
+//! The allowed cost of one execution: processor time and memory, by the bytes of its input.
 //!
-//! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time
-//! counts. That is longer, too, where others empty the caches and share the core. The least of a few counts is taken,
-//! so that a busy machine makes nothing fail and an input that is too dear by itself always does.
+//! Wall time is checked first. If it is too long, the execution is repeated, and its thread's own time counts. This
+//! time also increases if other programs use the caches and the core. So the least of a few measurements counts: a
+//! busy machine causes no failure, and an expensive input always fails.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -38,10 +38,10 @@ pub const DOING: Allowance = Allowance {
     memory_per_byte: 0,
 };
 
-/// How often an execution that took too long is done again at most.
+/// Most repetitions of an execution that took too long.
 const REPETITIONS: usize = 5;
 
-/// Runs an execution on an input of so many bytes, within what it may cost.
+/// Runs an execution on an input of this length, within its allowed cost.
 pub fn hold(bytes: usize, allowance: Allowance, execution: impl Fn()) {
     let factor = u32::try_from(bytes).unwrap_or(u32::MAX);
     let time = allowance.time + allowance.time_per_byte * factor;
@@ -70,14 +70,14 @@ pub fn hold(bytes: usize, allowance: Allowance, execution: impl Fn()) {
     panic!("{least:?} for {bytes} bytes of input");
 }
 
-/// How long this thread has run.
+/// The processor time of this thread.
 fn processor_time() -> Duration {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = text.split(' ').next().and_then(|first| first.parse().ok());
     Duration::from_nanos(nanoseconds.unwrap_or_default())
 }
 
-/// Bytes that are allocated, and the most there were since that was last asked.
+/// The allocated bytes, and their maximum since the last query.
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
@@ -91,7 +91,7 @@ fn count(more: usize) {
     PEAK.fetch_max(now, Ordering::Relaxed);
 }
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting does not allocate.
+// SAFETY: every call is forwarded to the system's allocator unchanged; counting does not allocate.
 #[allow(unsafe_code, reason = "an allocator can't be written without")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {

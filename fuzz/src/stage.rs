@@ -1,7 +1,8 @@
-//! A gateway in virtual time: registry, connections on in-memory pipes, and one node that serves everything as it is told to.
+//! A gateway in virtual time: registry, connections on in-memory pipes, and one node that serves everything in the
+//! selected way.
 //!
-//! One runtime serves all executions of a thread; each has a registry and connections of its own, which have ended before
-//! the next begins.
+//! One runtime serves all executions of a thread. Each has its own registry and connections, which end before the next
+//! begins.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -32,7 +33,7 @@ use pendularm::protocol::op::fields::Fields;
 use serde_json::json;
 use tokio::io::{DuplexStream, duplex};
 
-/// Address that clients connect to: `Host` has to name it.
+/// Address for clients, which `Host` must contain.
 pub const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 
 thread_local! {
@@ -54,21 +55,21 @@ pub fn run<T>(execution: impl Future<Output = T>) -> T {
     SYSTEM.with(|system| system.block_on(execution))
 }
 
-/// The same in a runtime of its own, which ends all that still goes on in it: an arm ticks for ever.
+/// The same in a separate runtime, which ends all running tasks, because an arm never ends by itself.
 pub fn run_apart<T>(execution: impl Future<Output = T>) -> T {
     system().block_on(execution)
 }
 
-/// The ways in which the node treats a call.
+/// The node's treatments of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Manner {
     /// Answers at once.
     Prompt,
-    /// Keeps it until told otherwise.
+    /// Holds it until another action.
     Holding,
     /// Answers a little later.
     Late,
-    /// Drops it: the reply says so itself.
+    /// Drops it; the reply then sends an error.
     Forgetful,
 }
 
@@ -148,18 +149,18 @@ impl Stage {
         ours
     }
 
-    /// Whether nobody is connected, and nothing is held for anybody.
+    /// Whether no client is connected and no memory is held.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.gauges.connections() == 0 && self.gauges.memory().taken() == 0
     }
 
-    /// How the node treats calls from now on.
+    /// Sets the node's treatment of calls.
     pub fn behave(&self, manner: Manner) {
         self.node_state.manner.set(Some(manner));
     }
 
-    /// The node answers the call that it has held for longest.
+    /// The node answers the oldest held call.
     pub fn release(&self) {
         let caller = self.node_state.held.borrow_mut().pop_front();
         if let Some(mut caller) = caller {
@@ -167,7 +168,7 @@ impl Stage {
         }
     }
 
-    /// From now on every call is answered, and so are all that were held.
+    /// From now on every call is answered, including the held ones.
     pub fn release_all(&self) {
         self.behave(Manner::Prompt);
         while !self.node_state.held.borrow().is_empty() {
@@ -175,7 +176,7 @@ impl Stage {
         }
     }
 
-    /// The node says something on a topic of the runtime's.
+    /// The node publishes on a topic of the runtime.
     pub fn publish(&self, topic: Topic, number: u64) {
         let msg = json!({"data": number, "header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "world"}});
         let frame = messages::publish(topic.name(), &msg);
@@ -186,7 +187,7 @@ impl Stage {
     }
 }
 
-/// All that `actors/runtime.rs` starts, on one thread.
+/// All nodes of `actors/runtime.rs`, on one thread.
 fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Nodes) {
     let arm = ArmSim::<2>::new(
         Arm::default(),
@@ -222,7 +223,7 @@ impl Actor for Node {
     type Context = Context<Self>;
 }
 
-/// A call, unread.
+/// A call, not parsed yet.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct Called(ServiceCall);

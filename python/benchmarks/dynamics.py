@@ -1,6 +1,6 @@
-"""Time of a state's accelerations from array to array, by the number of states: dynamics.py.
+"""Time per state of the accelerations, from array to array, by the number of states: dynamics.py.
 
-The states are drawn once; the best of many calls counts, in clock time on one core.
+The states are drawn once. The best of many calls counts, in clock time on one core.
 """
 
 import timeit

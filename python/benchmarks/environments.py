@@ -1,9 +1,9 @@
-"""Steps a second beside Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row].
+"""Steps per second, compared with Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row].
 
-Needs gymnasium and mujoco beside the wheel (`requirements.txt` in this folder). Every row is measured in turn, three
-rounds, in processor time of this process, which other programs on the machine disturb less than the clock; the best
-round counts. A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python, one of pendularm and of MuJoCo two over
-0.025 s.
+It needs gymnasium and mujoco besides the wheel (`requirements.txt` in this folder). Every row is measured in turn, in
+three rounds, and the best round counts. The unit is processor time of this process, which other programs disturb less
+than clock time. A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python. A step of pendularm and of MuJoCo is
+two over 0.025 s.
 """
 
 import sys
@@ -29,7 +29,7 @@ ARM = f"""<mujoco><option timestep=".025" integrator="RK4" gravity="0 -9.81 0"><
 
 
 def single(env: gymnasium.Env) -> Callable[[], int]:
-    """So many steps of one environment, which begins anew wherever it ends."""
+    """Steps of one environment, which is reset when it ends."""
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = [env.action_space.sample() for _ in range(64)]
@@ -62,7 +62,7 @@ def many(name: str) -> gymnasium.vector.VectorEnv:
 
 
 def batch() -> Callable[[], int]:
-    """The library alone: no observation, no reward."""
+    """Only the library, without observations and rewards."""
     arms = pendularm.Batch(ARMS, threads=1)
     arms.set_integrator(timestep=0.025)
     effort = np.random.default_rng(0).uniform(-1, 1, (ARMS, 2))
@@ -87,7 +87,7 @@ def mujoco_step() -> Callable[[], int]:
 
 
 def mujoco_rollout() -> Callable[[], int]:
-    """MuJoCo's own way with many arms: no Python between two steps."""
+    """MuJoCo's own function for many arms, without Python between two steps."""
     model = mujoco.MjModel.from_xml_string(ARM)
     data = mujoco.MjData(model)
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
@@ -103,7 +103,7 @@ def mujoco_rollout() -> Callable[[], int]:
 
 
 def check() -> None:
-    """The arm in MuJoCo is the same one: a second of free fall agrees as well as its inertia is written."""
+    """The arm in MuJoCo is the same: a second of free fall agrees within the digits of its inertia."""
     model = mujoco.MjModel.from_xml_string(ARM)
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 40)

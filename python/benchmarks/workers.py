@@ -1,7 +1,8 @@
-"""Settings a second of one sweep by the number of workers: workers.py [settings].
+"""Settings per second of one sweep, by the number of workers: workers.py [settings].
 
-On threads, as `sweep` does by itself, and on a Dask cluster on loopback whose workers are processes of one thread
-(needs `distributed` beside the wheel). Clock time, the best of three rounds; other programs on the machine count.
+It uses threads, the default of `sweep`, and a Dask cluster on loopback whose workers are processes with one thread
+(needs `distributed` besides the wheel). The figure is clock time, the best of three rounds, so other programs have an
+effect.
 """
 
 import os

@@ -1,6 +1,6 @@
 """Closes a control loop over the wire at 100 Hz of simulation time: closed_loop.py [pd|lqr HOST PORT].
 
-The arm is paused. It moves only by `/arm_sim/step`, one control period per call, under the effort that the call brings.
+The arm is paused. It moves only by `/arm_sim/step`, one control period per call, with the effort of the call.
 No clock takes part, so every run gives the same bits. For `lqr`, one period is linearised at the goal by central
 differences of `pendularm.Simulation`, and the discrete Riccati equation is iterated. Prints time, position and velocity
 after 4 s.
@@ -29,7 +29,7 @@ arm = pendularm.Arm(len(params["lengths"]), **params)
 goal, steps = np.array([0.8, -0.6, 0.4])[: arm.links], round(0.01 / settings["timestep"])
 load = pendularm.dynamics.gravity_load(arm, goal)
 
-# State error to effort, (links, 2 links): of a PD controller.
+# Maps the state error to the effort, (links, 2 links): a PD controller.
 gains = np.hstack([np.diag([200, 100, 40][: arm.links]), np.diag([30, 12, 4][: arm.links])])
 if law == "lqr":
     model = pendularm.Simulation(arm, **settings)

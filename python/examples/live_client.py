@@ -1,7 +1,7 @@
 """Moves the arm of a live runtime with roslibpy: live_client.py [HOST[:PORT]]. `pendularm` starts one; look at its page
 meanwhile.
 
-The library says where the joints have to be, the runtime takes them there, and its own topic says how it went.
+The library computes the joint positions, the runtime moves the arm there, and a topic of the runtime has the result.
 """
 
 import sys
@@ -16,7 +16,7 @@ PATIENCE = 60
 
 
 def address(given: str = "127.0.0.1") -> tuple[str, int]:
-    """Host and port, which is the runtime's own unless given."""
+    """Host and port. The default port is the runtime's."""
     host, _, port = given.partition(":")
     return host, int(port or 9095)
 

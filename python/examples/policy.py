@@ -1,9 +1,9 @@
 """A policy that swings the arm up, found in about a minute: policy.py [generations].
 
-CMA-ES (the package `cma`) draws some dozens of small networks, 300 times unless told otherwise; a vector environment
-tries each of them on several arms at once, and the best half shapes the next draw. Needs
-`pip install "$(ls python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, more
-than 0.5, on starts that were not trained on, and keeps the network in `policy.npz`.
+CMA-ES (the package `cma`) draws some dozens of small networks, 300 times by default. A vector environment tries each
+of them on several arms at once, and the best half shapes the next draw. Needs `pip install "$(ls
+python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, more than 0.5, on
+starts that were not trained on, and keeps the network in `policy.npz`.
 """
 
 import sys
@@ -20,13 +20,13 @@ HIDDEN = 8
 SEEN, ACTIONS = 3 * LINKS, LINKS
 STARTS = 4
 STEPS = 200
-# As large as rates get on the way up [rad/s], so that what the network sees is of one size.
+# A typical largest rate [rad/s], which scales the network's inputs to about one.
 SCALE = np.array([1.0] * (2 * LINKS) + [8.0] * LINKS)
 SIZE = (SEEN + 1) * HIDDEN + (HIDDEN + 1) * ACTIONS
 
 
 def act(weights: np.ndarray, observations: np.ndarray) -> np.ndarray:
-    """Actions of many networks, (networks, SIZE), each on its own row of observations, (networks, arms, SEEN)."""
+    """Actions of many networks, (networks, SIZE), each for its own row of observations, (networks, arms, SEEN)."""
     first, last = np.split(weights, [(SEEN + 1) * HIDDEN], axis=1)
     first, last = first.reshape(-1, SEEN + 1, HIDDEN), last.reshape(-1, HIDDEN + 1, ACTIONS)
     hidden = np.tanh(observations / SCALE @ first[:, :-1] + first[:, -1:])
@@ -34,7 +34,7 @@ def act(weights: np.ndarray, observations: np.ndarray) -> np.ndarray:
 
 
 def rewards(weights: np.ndarray, seed: int, starts: int = STARTS) -> np.ndarray:
-    """Mean reward a step of each network over an episode, on `starts` arms each: 0 hanging, 1 upright."""
+    """Mean reward per step of each network over an episode, on `starts` arms each: 0 hanging, 1 upright."""
     networks = len(weights)
     env = gymnasium.make_vec("Pendularm-v0", networks * starts, links=LINKS, max_episode_steps=STEPS)
     observations, _ = env.reset(seed=seed)
@@ -48,12 +48,12 @@ def rewards(weights: np.ndarray, seed: int, starts: int = STARTS) -> np.ndarray:
 
 
 def train(generations: int) -> np.ndarray:
-    """Searches for so many draws, and answers the weights of the best network."""
+    """Searches for this number of draws, and returns the weights of the best network."""
     search = cma.CMAEvolutionStrategy(np.zeros(SIZE), 0.5, {"popsize": 48, "seed": 1, "verbose": -9})
     began, steps = time.monotonic(), 0
     for generation in range(generations):
         drawn = search.ask()
-        # Starts that change with the draws: nothing is learned by heart.
+        # The starts change with the draws, so the network cannot memorise them.
         search.tell(drawn, list(-rewards(np.array(drawn), seed=1000 * generation)))
         steps += len(drawn) * STARTS * STEPS
         if generation % 20 == 19:

@@ -1,6 +1,6 @@
 //! The parameters of an arm.
 //!
-//! **Invariant:** an arm that exists is valid, and never changes.
+//! **Invariant:** every arm is valid and never changes.
 
 use numpy::PyArray1;
 use pendularm::math::arm::Arm as Rods;
@@ -17,7 +17,7 @@ pub(crate) enum Chain {
     Three(Rods<3>),
 }
 
-/// Does the same for both numbers of links, with an arm, a simulation or another type.
+/// Runs the same code for both numbers of links, with an arm, a simulation or another type.
 macro_rules! for_either {
     ($kind:ident, $value:expr, $one:ident => $body:expr) => {
         match $value {
@@ -30,9 +30,9 @@ pub(crate) use for_either;
 
 /// An arm: a chain of 2 or 3 uniform rods on revolute joints, and gravity along -y. It never changes.
 ///
-/// Joint angles are relative to the link before (the first to +x), counter-clockwise. `lengths` [m] and `masses` [kg]
-/// have one number per link, 1 unless given; `gravity` [m/s²] is 9.81 unless given. Raises `ValueError` for a number
-/// that no arm can have.
+/// Joint angles are relative to the previous link (the first to +x), counter-clockwise. `lengths` [m] and `masses`
+/// [kg] have one number per link, 1 by default. `gravity` [m/s²] is 9.81 by default. Raises `ValueError` for an
+/// invalid number.
 #[pyclass(frozen, eq, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Arm {
@@ -123,7 +123,7 @@ fn read<const N: usize>(
     Rods::new(lengths, masses, gravity).map_err(refused)
 }
 
-/// An arm that is handed in.
+/// An arm as an argument.
 pub(crate) type Given<'py> = Handed<Held<'py, Arm>>;
 
 impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
@@ -138,7 +138,7 @@ impl Given<'_> {
     }
 }
 
-/// The rods of the arm that is handed in, or the default ones.
+/// The rods of the given arm, or the default ones.
 pub(crate) fn or_default(arm: Option<Given<'_>>) -> PyResult<Chain> {
     arm.map_or_else(|| Ok(Chain::Two(Rods::default())), Given::chain)
 }

@@ -1,6 +1,6 @@
-//! Arrays of numbers that Python hands in, and their rows; and arrays that Python gets.
+//! Arrays of numbers from Python, with their rows, and arrays for Python.
 //!
-//! **Invariant:** numbers are read in the order that their indices have, however they lie in memory.
+//! **Invariant:** numbers are read in the order of their indices, for every memory layout.
 
 use std::borrow::Cow;
 
@@ -18,7 +18,7 @@ use crate::fields::{
     Bound, Held, MOST_LISTED, Object, Real, beyond, held, is_masked, is_too_long, refused, shown,
 };
 
-/// An empty vector with room for `count` entries.
+/// An empty vector with capacity for `count` entries.
 ///
 /// # Errors
 /// `MemoryError`. Every allocation whose size depends on the caller is made here or by NumPy.
@@ -33,14 +33,14 @@ pub(crate) fn room<T>(count: usize) -> PyResult<Vec<T>> {
     }
 }
 
-/// The items in a vector. `count` is how many there are.
+/// The items in a vector. `count` is their number.
 pub(crate) fn collected<T>(count: usize, items: impl Iterator<Item = T>) -> PyResult<Vec<T>> {
     let mut all = room(count)?;
     all.extend(items.take(count));
     Ok(all)
 }
 
-/// Makes an array read-only. Every array that a property returns is: writing into it would not change the object.
+/// Makes an array read-only, as every array that a property returns, because writing to it would not change the object.
 pub(crate) fn read_only<'py, T: Element, D: Dimension>(
     array: Held<'py, PyArray<T, D>>,
 ) -> PyResult<Held<'py, PyArray<T, D>>> {
@@ -90,7 +90,7 @@ impl<'py> Numbers<'py> {
         };
         let array = laid_out(&array)?.try_readonly().map_err(|_| {
             refused(format_args!(
-                "{field} is being written by a batch: hand in a copy of it"
+                "{field} is being written by a batch: pass a copy of it"
             ))
         })?;
         Ok(Self {
@@ -108,7 +108,7 @@ impl<'py> Numbers<'py> {
         Ok(self.array.as_slice()?)
     }
 
-    /// The numbers as one row of `width` for each of `arms`, or one row for all of them.
+    /// The numbers as one row of `width` per arm, or one row for all arms.
     pub(crate) fn rows(&self, arms: usize, width: usize, bound: Bound) -> PyResult<Rows<'_>> {
         let field = &self.field;
         let shape = self.shape();
@@ -130,7 +130,7 @@ impl<'py> Numbers<'py> {
         })
     }
 
-    /// The numbers as one for each of `arms`, or one for all of them.
+    /// The numbers as one per arm, or one for all arms.
     pub(crate) fn column(&self, arms: usize, bound: Bound) -> PyResult<Rows<'_>> {
         let field = &self.field;
         let shape = self.shape();
@@ -155,11 +155,11 @@ impl<'py> Numbers<'py> {
     }
 }
 
-/// The array itself where it may be read as one slice, its rows one after the other, and a copy of it elsewhere.
+/// The array itself if it can be read as one slice, row after row; otherwise a copy.
 ///
-/// A slice of an array whose columns lie side by side would have its numbers in another order. A field of a packed
-/// record has a stride that is no whole number of doubles. An array that cannot be written may be one that shows a
-/// batch's arms, which other threads step meanwhile: they are not to be kept from it.
+/// A slice of a column-major array would have the numbers in another order. A field of a packed record has a
+/// stride that is not a whole number of doubles. A read-only array may be one of a batch, and a borrow would block
+/// the threads that step the batch.
 pub(crate) fn laid_out<'py, T: Element, D: Dimension>(
     array: &Held<'py, PyArray<T, D>>,
 ) -> PyResult<Held<'py, PyArray<T, D>>> {
@@ -175,14 +175,14 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
     flags.getattr(intern!(py, "writeable"))?.is_truthy()
 }
 
-/// Converts all that NumPy can make doubles of; complex numbers, text and `None` are none.
+/// Converts everything that NumPy can convert to doubles, except complex numbers, text and `None`.
 fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let array = if kind == "O" {
-        // NumPy would read texts, and make a NaN of None. It refuses by itself what no double holds.
+        // NumPy would read texts, and convert None to NaN. It refuses numbers beyond doubles itself.
         for one in array.getattr("flat")?.try_iter()? {
             let Ok(one) = one?.extract::<Real>();
             if let Real::Other(one) = one
@@ -218,7 +218,7 @@ pub(crate) fn joints<const N: usize>(
     <[f64; N]>::try_from(values).map_err(refused)
 }
 
-/// As [`joints`], or `missing` where nothing is handed in.
+/// As [`joints`], or `missing` without an argument.
 pub(crate) fn joints_or<const N: usize>(
     field: &str,
     value: Option<&Object<'_>>,
@@ -228,7 +228,7 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
-/// One row for each arm, or one for all of them.
+/// One row per arm, or one for all arms.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
     values: Cow<'a, [f64]>,
@@ -237,7 +237,7 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The same, where a single row goes with every row of others.
+    /// The same, where a single row is combined with every row of the others.
     pub(crate) fn of_one_for_all(self) -> Self {
         Self {
             is_one: self.values.len() == self.width,
@@ -245,7 +245,7 @@ impl Rows<'_> {
         }
     }
 
-    /// The row of an arm. `N` is the width that was asked for.
+    /// The row of an arm. `N` is the requested width.
     pub(crate) fn row<const N: usize>(&self, arm: usize) -> [f64; N] {
         let start = if self.is_one { 0 } else { arm * N };
         let row = self
@@ -256,7 +256,7 @@ impl Rows<'_> {
         row.unwrap_or([f64::NAN; N])
     }
 
-    /// The number of an arm, of a column.
+    /// The number of an arm, from a column.
     pub(crate) fn number(&self, arm: usize) -> f64 {
         let [number] = self.row(arm);
         number

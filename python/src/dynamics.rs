@@ -1,6 +1,6 @@
 //! The equation of motion and the kinematics, for one state or for many.
 //!
-//! **Invariant:** the numbers are those of the functions that step the live arm; nothing is computed a second time.
+//! **Invariant:** the functions are those that step the live arm. There is no second implementation.
 
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::{self, dynamics, kinematics};
@@ -11,7 +11,7 @@ use crate::arm::{Chain, Given, for_either};
 use crate::arrays::{Numbers, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
 
-/// The form of a function's answer for one state.
+/// The shape of a function's result for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shape {
     /// A number.
@@ -24,11 +24,11 @@ enum Shape {
     Square,
 }
 
-/// States that go into the machine's registers in one go: their columns stay in the fastest of its caches.
+/// States per block. Their columns stay in the fastest cache.
 const BLOCK: usize = 64;
 
-/// Applies `function` to every row of the fields; a field of one row goes with every row of the others. The number `N`
-/// of links is that of the arm which `function` asks.
+/// Applies `function` to every row of the fields. A field with one row is combined with every row of the others. `N`
+/// is the number of links of the arm.
 fn each_row<'py, const N: usize, const K: usize>(
     py: Python<'py>,
     fields: [(&str, &Object<'py>); K],
@@ -42,7 +42,7 @@ fn each_row<'py, const N: usize, const K: usize>(
     })
 }
 
-/// As [`each_row`], for an arm of `links` links, with a `function` that takes all rows at once, and how many they are.
+/// As [`each_row`], for an arm of `links` links, with a `function` that takes all rows and their number.
 fn all_rows<'py, const K: usize>(
     py: Python<'py>,
     links: usize,
@@ -62,7 +62,7 @@ fn all_rows<'py, const K: usize>(
                 _ => None,
             })
     };
-    // A table of one row goes with those of more.
+    // A table with one row is combined with those with more.
     let count = counts().find(|&count| count != 1).or(counts().next());
     let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
     for (_, numbers) in &given {
@@ -84,7 +84,7 @@ fn all_rows<'py, const K: usize>(
     }
     let mut flat = room(shape.iter().product())?;
     match count {
-        // Less work than to hand the interpreter's lock to another thread.
+        // This is less work than releasing the interpreter's lock.
         None => function(&rows, 1, &mut flat),
         Some(count) => py.detach(|| function(&rows, count, &mut flat)),
     }
@@ -260,8 +260,8 @@ pub(crate) fn end_effector<'py>(
 
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
 ///
-/// `phi` [rad] is the heading of the last link of 3, and is not looked at for 2. `present` [rad] decides between the
-/// solutions, as `/ik/solve` does by the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
+/// `phi` [rad] is the heading of the last of 3 links, and is ignored for 2. `present` [rad] selects among the
+/// solutions, as the arm's present pose in `/ik/solve`. Raises `ValueError` with the exceeded limit.
 #[pyfunction]
 #[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
 pub(crate) fn inverse_kinematics<'py>(

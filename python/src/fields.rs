@@ -1,6 +1,6 @@
-//! Reading what Python hands in, under the names that the runtime's services have for it.
+//! Readers of arguments from Python, with the field names of the runtime's services.
 //!
-//! **Invariant:** a value that is refused is a `ValueError` that names its field, what it must be, and what it was.
+//! **Invariant:** a refused value raises a `ValueError` with its field, the valid values and the given value.
 
 use std::convert::Infallible;
 use std::fmt::{self, Display, Formatter};
@@ -15,13 +15,13 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyStringMethods, PyTup
 
 use crate::arrays::room;
 
-/// Dimensions that an array has at most, and so the depth of lists that may stand for one.
+/// Most dimensions of an array, and so the largest depth of nested lists.
 const MOST_DIMENSIONS: usize = 2;
 
-/// Most entries of a sequence that is no NumPy array. NumPy would allocate all of a range.
+/// Most entries of a sequence that is not a NumPy array. NumPy would allocate all of a range.
 pub(crate) const MOST_LISTED: usize = 10_000_000;
 
-/// The numbers that a field may be.
+/// The valid numbers of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bound {
     Finite,
@@ -53,15 +53,15 @@ pub(crate) fn refused(why: impl Display) -> PyErr {
     PyValueError::new_err(why.to_string())
 }
 
-/// Something of Python's, with the proof that its lock is held.
+/// A Python object, with the proof that the interpreter's lock is held.
 pub(crate) type Held<'py, T> = pyo3::Bound<'py, T>;
 
 /// Any object.
 pub(crate) type Object<'py> = pyo3::Bound<'py, PyAny>;
 
-/// An object as an error shows it: not all of a long array.
+/// An object as shown in an error. A long array is shortened.
 pub(crate) fn shown(value: &Object<'_>) -> String {
-    // Python writes out no whole number of thousands of digits.
+    // Python does not print integers with thousands of digits.
     let Ok(text) = value.repr() else {
         return format!("an object of {}", value.get_type());
     };
@@ -72,14 +72,14 @@ pub(crate) fn shown(value: &Object<'_>) -> String {
     }
 }
 
-/// The refusal of a number that is too large, as a whole number of Python's may be.
+/// The refusal of a number that is too large, such as a Python integer.
 pub(crate) fn beyond(field: &str) -> PyErr {
     refused(format_args!(
         "{field} must be finite, got a number that no double holds"
     ))
 }
 
-/// Whether some of these numbers are not to be looked at; NumPy reads them where they stand in a list.
+/// Whether some of these numbers are masked. NumPy also reads masked numbers inside a list.
 pub(crate) fn is_masked(value: &Object<'_>) -> PyResult<bool> {
     is_masked_within(value, MOST_DIMENSIONS)
 }
@@ -144,7 +144,7 @@ fn is_too_long_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
     Ok(false)
 }
 
-/// The entries of a sequence of `count`; `None` where it is none, or has another number of them.
+/// The entries of a sequence of `count` entries; `None` if it is not a sequence, or has another length.
 pub(crate) fn entries<'py>(
     value: &Object<'py>,
     count: usize,
@@ -161,7 +161,7 @@ pub(crate) fn entries<'py>(
     Ok((all.len() == count).then_some(all))
 }
 
-/// Holds numbers to a bound; `place` says which of them it is.
+/// Checks numbers against a bound. `place` gives the index of a wrong one.
 pub(crate) fn held(
     field: &str,
     values: &[f64],
@@ -179,18 +179,18 @@ pub(crate) fn held(
     }
 }
 
-/// A value handed in for one of this type; it is judged where its field's name is known.
+/// An argument for this type. It is checked where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Handed<T> {
     Is(T),
     Other(Other),
 }
 
-/// A value that is none of the type that is meant, as an error shows it.
+/// A value of another type, as shown in an error.
 #[derive(Debug)]
 pub(crate) struct Other {
     shown: String,
-    /// Whether it is one but for its size.
+    /// Whether it has the right type but is too large.
     pub(crate) is_beyond: bool,
 }
 
@@ -206,7 +206,7 @@ pub(crate) type Real = Handed<f64>;
 pub(crate) type Whole = Handed<u64>;
 /// True or false, Python's or NumPy's.
 pub(crate) type Flag = Handed<bool>;
-/// The name of something.
+/// A name.
 pub(crate) type Name = Handed<String>;
 
 impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
@@ -225,9 +225,9 @@ impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     }
 }
 
-/// A type that values are handed in for.
+/// A type of arguments.
 pub(crate) trait Meant<'a, 'py>: FromPyObject<'a, 'py> {
-    /// Whether nothing of a value is lost that Python can make one of this type from.
+    /// Whether Python's conversion of a value to this type loses nothing.
     fn is_meant(_value: Borrowed<'a, 'py, PyAny>) -> bool {
         true
     }
@@ -237,7 +237,7 @@ impl Meant<'_, '_> for f64 {
     /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
     fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
         let is_real = || {
-            // NumPy would allocate all of a range before it is known to be no number.
+            // NumPy would allocate all of a range before it finds that it is not a number.
             if !value.hasattr("__float__")? && !value.hasattr("__index__")? {
                 return Ok(false);
             }
@@ -250,7 +250,7 @@ impl Meant<'_, '_> for f64 {
 }
 
 impl Meant<'_, '_> for u64 {
-    /// Truths would be counts of 0 and 1, and masked numbers lose their masks.
+    /// Booleans would count as 0 and 1, and masked numbers would lose their masks.
     fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
         !value.is_instance_of::<PyBool>() && is_masked(&value).is_ok_and(|is_masked| !is_masked)
     }
@@ -260,7 +260,7 @@ impl Meant<'_, '_> for bool {}
 impl Meant<'_, '_> for String {}
 
 impl Real {
-    /// The number, whichever it is.
+    /// Any number.
     pub(crate) fn read(self, field: &str) -> PyResult<f64> {
         match self {
             Self::Is(value) => Ok(value),
@@ -273,7 +273,7 @@ impl Real {
 }
 
 impl Flag {
-    /// Whether it is true.
+    /// The boolean.
     pub(crate) fn read(self, field: &str) -> PyResult<bool> {
         match self {
             Self::Is(value) => Ok(value),
@@ -297,7 +297,7 @@ impl Name {
 }
 
 impl Whole {
-    /// The number, whichever it is.
+    /// Any number.
     pub(crate) fn read(self, field: &str) -> PyResult<u64> {
         match self {
             Self::Is(value) => Ok(value),
@@ -324,9 +324,9 @@ impl Whole {
     }
 }
 
-/// A count, if this is one, which is known not to be masked.
+/// A count, if this is one. It must not be masked.
 pub(crate) fn count(value: &Object<'_>) -> Option<u64> {
-    // Truths would be counts of 0 and 1.
+    // Booleans would count as 0 and 1.
     if value.is_instance_of::<PyBool>() {
         return None;
     }

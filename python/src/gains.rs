@@ -1,6 +1,6 @@
-//! The servo's gains, handed in and out.
+//! The controller's gains as arguments and results.
 //!
-//! **Invariant:** a gain that is left out is one that the caller of [`read`] knows.
+//! **Invariant:** the caller of [`read`] provides missing gains.
 
 use numpy::ToPyArray;
 use pendularm::math::pid::Gains;
@@ -30,7 +30,7 @@ pub(crate) fn default_gains(py: Python<'_>, links: Whole) -> PyResult<Held<'_, P
     Ok(found)
 }
 
-/// Gains by their names, `{"kp": …, "ki": …, "kd": …}`; one that is left out is that of `missing`.
+/// Gains by name, `{"kp": …, "ki": …, "kd": …}`. A missing one comes from `missing`.
 pub(crate) fn read<const N: usize>(
     value: Option<&Object<'_>>,
     missing: Gains<N>,

@@ -1,10 +1,10 @@
 //! The arm of pendularm for Python: the steps of the live runtime, as a library that takes and returns NumPy arrays.
 //!
-//! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every
-//! arm is stepped by. `package/pendularm/` is what users import; it words what this module answers.
+//! This layer is thin: it reads arguments, and the `pendularm` crate computes everything and steps every arm. Users
+//! import `package/pendularm/`, which wraps this module.
 //!
-//! **Invariant:** work of more than some milliseconds runs with the interpreter's lock released, and ends when a
-//! signal asks for it.
+//! **Invariant:** work of more than some milliseconds runs with the interpreter's lock released, and ends at a
+//! signal.
 
 mod arm;
 mod arrays;

@@ -1,4 +1,4 @@
-//! Long computations, and waiting for them: without the interpreter's lock, and in pieces, so that Ctrl-C ends them.
+//! Runs long computations without the interpreter's lock, in pieces, so that Ctrl-C ends them.
 //!
 //! **Invariant:** every computation notices a signal within a fraction of a second.
 
@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::{PyResult, Python};
 use pyo3::sync::MutexExt;
 
-/// How long a piece is: short for who presses Ctrl-C, long beside the time that it takes to look.
+/// The duration of a piece: short for a user who presses Ctrl-C, and long compared with the check for signals.
 const PIECE: Duration = Duration::from_millis(50);
 
-/// Advances a computation, with the interpreter's lock released, until it has an answer.
+/// Advances a computation, with the interpreter's lock released, until it has a result.
 ///
 /// # Errors
-/// Any that a signal's handler raises, such as `KeyboardInterrupt`.
+/// Every error that a signal's handler raises, such as `KeyboardInterrupt`.
 pub(crate) fn until_done<T: Send>(
     py: Python<'_>,
     mut advance: impl FnMut() -> Option<T> + Send,
@@ -38,24 +38,23 @@ pub(crate) fn until_done<T: Send>(
     }
 }
 
-/// Waits for a lock without keeping the interpreter's. The value behind it is whole, also after a panic of
-/// another thread.
+/// Waits for a lock without holding the interpreter's. Its value is consistent, even after a panic of another thread.
 pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
     one.lock_py_attached(py)
         .unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The threads that want to change a thing that they share: one at a time, in the order in which they came.
+/// A queue of threads that change a shared object: one at a time, in order.
 ///
-/// A handler of a signal that comes in the middle of its thread's turn has that turn too; it would wait for itself.
+/// A signal's handler that runs during its thread's turn shares this turn. Otherwise it would wait for itself.
 #[derive(Debug, Default)]
 pub(crate) struct Turns {
-    /// The thread whose turn it is, and those that wait.
+    /// The thread that has the turn, and those that wait.
     line: Mutex<VecDeque<ThreadId>>,
     moved: Condvar,
 }
 
-/// A turn, or a place in the line; it ends when this is dropped.
+/// A turn, or a place in the queue. It ends when this is dropped.
 #[derive(Debug)]
 pub(crate) struct Turn<'a> {
     of: &'a Turns,
@@ -63,10 +62,10 @@ pub(crate) struct Turn<'a> {
 }
 
 impl Turns {
-    /// Waits until it is this thread's turn, with the interpreter's lock released; `None` where it is already.
+    /// Waits for this thread's turn, with the interpreter's lock released; `None` if the thread has it already.
     ///
     /// # Errors
-    /// Any that a signal's handler raises, such as `KeyboardInterrupt`.
+    /// Every error that a signal's handler raises, such as `KeyboardInterrupt`.
     pub(crate) fn take(&self, py: Python<'_>) -> PyResult<Option<Turn<'_>>> {
         let thread = thread::current().id();
         let mut line = self.line();
@@ -98,7 +97,7 @@ impl Turns {
 impl Drop for Turn<'_> {
     fn drop(&mut self) {
         let mut line = self.of.line();
-        // A handler that ran while its thread waited came later than that.
+        // A handler that ran while its thread waited is later in the queue.
         if let Some(place) = line.iter().rposition(|thread| *thread == self.thread) {
             line.remove(place);
         }

@@ -1,6 +1,6 @@
 //! One arm under control.
 //!
-//! **Invariant:** every step is the live arm's own, so that the same calls give the same bits as the runtime.
+//! **Invariant:** every step is the live arm's own, so the same calls give the same bits as the runtime.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -21,23 +21,23 @@ use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused}
 use crate::gains;
 use crate::patience::{hold, until_done};
 
-/// Steps between two looks at the clock: some hundred microseconds.
+/// Steps between two checks of the clock: some hundred microseconds.
 const STEPS_PER_LOOK: u64 = 1000;
 
 type Numbers<'py> = Held<'py, PyArray1<f64>>;
 
-/// The number of links never changes. The state is behind a lock, since threads may share a simulation.
+/// The number of links never changes. A lock protects the state, because threads may share a simulation.
 #[derive(Debug)]
 enum Either {
     Two(Mutex<Loop<2>>),
     Three(Mutex<Loop<3>>),
 }
 
-/// The place at which a step led out of the finite numbers.
+/// The step at which a simulation diverged.
 #[pyclass(frozen, eq, get_all, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Divergence {
-    /// Number of the step since the reset that was not taken; the first step is 1.
+    /// Number of the step that was not taken, counted from 1 since the reset.
     step: u64,
     /// Simulation time at which that step began [s].
     time: f64,
@@ -68,12 +68,12 @@ impl Divergence {
 
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
-/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`,
-/// `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,) each. A gain
-/// that is not given has the value of a fresh runtime. The controller runs once per `control_period` [s], rounded to a
-/// whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is applied one period
-/// later. Threads may share one. It can be neither copied nor pickled. A process that is forked while another thread
-/// steps it must not use it.
+/// It starts as in a fresh runtime: stretched along +x, at rest, with the controller off. `method` is `euler`,
+/// `midpoint`, `verlet` or `rk4`. `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,)
+/// each. A missing gain has the value of a fresh runtime. The controller runs once per `control_period` [s],
+/// rounded to a whole number of timesteps, at least 1. Its effort is held in between. With `control_delay` it is
+/// applied one period later. Threads may share a simulation. It cannot be copied or pickled. A process that is
+/// forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
@@ -130,9 +130,9 @@ impl Simulation {
         Ok(Self { own })
     }
 
-    /// Takes up to `steps` steps and returns how many: all unless the simulation has diverged. The
-    /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps. With an `effort` [N m], (links,),
-    /// the controller does not run in these steps, and that effort is applied instead.
+    /// Takes up to `steps` steps and returns their number: all, unless the simulation diverges. The interpreter's lock
+    /// is released meanwhile, and Ctrl-C ends the call between two steps. With an `effort` [N m], (links,), that effort
+    /// is applied in these steps, and the controller does not run.
     #[pyo3(signature = (steps=Whole::Is(1), effort=None), text_signature = "($self, steps=1, effort=None)")]
     fn step(&self, py: Python<'_>, steps: Whole, effort: Option<&Object<'_>>) -> PyResult<u64> {
         let steps = steps.read("steps")?;
@@ -142,8 +142,9 @@ impl Simulation {
         })
     }
 
-    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, disturbance ended, divergence
-    /// cleared, and a control period begins. On or off, gains, arm, method, timestep and control period stay.
+    /// Returns to the starting pose at rest, at time 0. Setpoint and integral are reset, a disturbance and a
+    /// divergence end, and a control period begins. Gains, arm, method, timestep, control period and the
+    /// controller's on/off state do not change.
     fn reset(&self, py: Python<'_>) {
         for_either!(Either, &self.own, one => hold(py, one).reset());
     }
@@ -156,8 +157,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Has the controller hold the arm at `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,)
-    /// each.
+    /// Sets the setpoint: `positions` [rad] and `velocities` [rad/s] (zeros by default), (links,) each.
     #[pyo3(signature = (positions, velocities=None))]
     fn set_setpoint(
         &self,
@@ -172,8 +172,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Changes the gains that are given, (links,) each: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The
-    /// integral stays.
+    /// Changes the given gains, (links,) each: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integral
+    /// does not change.
     #[pyo3(signature = (kp=None, ki=None, kd=None))]
     fn set_gains(
         &self,
@@ -194,8 +194,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Puts the arm into another state, `position` [rad] and `velocity` [rad/s] (zeros unless given), (links,) each.
-    /// A divergence ends; clock and controller stay.
+    /// Sets the state: `position` [rad] and `velocity` [rad/s] (zeros by default), (links,) each. A divergence ends.
+    /// Clock and controller do not change.
     #[pyo3(signature = (position, velocity=None))]
     fn set_state(
         &self,
@@ -214,7 +214,7 @@ impl Simulation {
     }
 
     /// Adds `effort` [N m], (links,), to the controller's in every step that begins within `duration` [s] from now. It
-    /// replaces an earlier disturbance. With the controller off it is the whole effort.
+    /// replaces an earlier disturbance. With the controller off it is the only effort.
     fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: Real) -> PyResult<()> {
         let duration = fields::number("duration", duration, Bound::Positive)?;
         for_either!(Either, &self.own, one => {
@@ -224,7 +224,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The arm; another with as many links may be put in its place.
+    /// The arm. It can be replaced by another one with the same number of links.
     #[getter]
     fn arm(&self, py: Python<'_>) -> Arm {
         let chain = match &self.own {
@@ -265,7 +265,7 @@ impl Simulation {
         for_either!(Either, &self.own, one => property(py, &hold(py, one).state().velocity))
     }
 
-    /// Effort of the latest step [N m], (links,), the controller's and the disturbance's together.
+    /// Effort of the latest step [N m], (links,): the controller's plus the disturbance's.
     #[getter]
     fn effort<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
         for_either!(Either, &self.own, one => property(py, hold(py, one).effort()))
@@ -287,7 +287,7 @@ impl Simulation {
         })
     }
 
-    /// The gains in force, by name, in a read-only mapping; `set_gains` changes them.
+    /// The present gains by name, in a read-only mapping. `set_gains` changes them.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyMappingProxy>> {
         let found = PyDict::new(py);
@@ -333,8 +333,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Time between two runs of the controller [s], as asked for; 0 stands for every step. A change of it, of
-    /// `control_delay` or of the timestep begins a period.
+    /// The requested control period [s]; 0 means every step. A change of it, of `control_delay` or of the
+    /// timestep begins a period.
     #[getter]
     fn control_period(&self, py: Python<'_>) -> f64 {
         for_either!(Either, &self.own, one => hold(py, one).control_period()).period
@@ -351,7 +351,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The control period in whole timesteps [s]: the nearest number of them, at least 1.
+    /// The control period in whole timesteps [s]: the nearest number, at least 1.
     #[getter]
     fn effective_control_period(&self, py: Python<'_>) -> f64 {
         for_either!(Either, &self.own, one => {
@@ -360,7 +360,7 @@ impl Simulation {
         })
     }
 
-    /// Whether the controller's effort is applied one control period after the state that it was computed from.
+    /// Whether the controller's effort is applied one control period after its state was read.
     #[getter]
     fn control_delay(&self, py: Python<'_>) -> bool {
         for_either!(Either, &self.own, one => hold(py, one).control_period()).delay
@@ -408,8 +408,8 @@ impl Simulation {
         })
     }
 
-    /// The step whose result would not have been finite, if there was one since the reset. The simulation takes no
-    /// step after it.
+    /// The step whose result would not be finite, if there was one since the reset. The simulation takes no step
+    /// after it.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
         for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {
@@ -429,7 +429,7 @@ impl Simulation {
     }
 }
 
-/// Takes up to `steps` steps with this effort or the controller's, and returns how many.
+/// Takes up to `steps` steps with this effort or the controller's, and returns their number.
 fn take<const N: usize>(
     py: Python<'_>,
     one: &Mutex<Loop<N>>,
@@ -438,7 +438,7 @@ fn take<const N: usize>(
 ) -> PyResult<u64> {
     let mut left = steps;
     until_done(py, || {
-        // Held for a piece only: a signal's handler may want to look at the arm.
+        // The lock is held only for one piece, because a signal's handler may read the arm.
         let piece = left.min(STEPS_PER_LOOK);
         let mut one = one.lock().unwrap_or_else(PoisonError::into_inner);
         let is_driven = effort.is_some() && piece > 0;

@@ -1,6 +1,6 @@
-//! The study's predictions and runs, with the questions and the answers of the services `/study/*`.
+//! The study's predictions and runs, with the fields of the services `/study/*`.
 //!
-//! **Invariant:** an answer has the members that the service's has, under the same names.
+//! **Invariant:** a result has the members of the service's answer, with the same names.
 
 use std::time::{Duration, Instant};
 
@@ -103,7 +103,7 @@ fn listed_limits<'py, const N: usize>(
     Ok(found)
 }
 
-/// The time between two runs of the control law, without a delay.
+/// The control period, without a delay.
 fn read_period(period: Real) -> PyResult<ControlPeriod> {
     Ok(ControlPeriod {
         period: fields::number("control_period", period, Bound::NotNegative)?,
@@ -170,10 +170,11 @@ pub(crate) fn rollout<'py>(
     })
 }
 
-/// Makes the run by itself, which is timed, and again beside its reference, if one is wanted.
+/// Makes the run alone, which is timed, and repeats it beside its reference, if one is requested.
 fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<Held<'_, PyDict>> {
     let steps = request.steps().map_err(refused)?;
-    // More than two runs and the answer take, since a run's own vectors abort where there is no memory.
+    // More memory than two runs and the answer need. It is checked first, because the run's vectors
+    // abort without memory.
     let samples = usize::try_from(request.samples.min(steps + 1)).unwrap_or(usize::MAX);
     drop(room::<[f64; 80]>(samples)?);
     let mut took = Duration::ZERO;
@@ -312,7 +313,7 @@ pub(crate) fn plan<'py>(
     })
 }
 
-/// The loop under `gains`; without them nothing controls the arm, and a setpoint would count for nothing.
+/// The loop with `gains`. Without them the arm is free, and a setpoint would have no effect.
 fn read_loop<const N: usize>(
     arm: Rods<N>,
     gains: Option<&Object<'_>>,
@@ -320,7 +321,7 @@ fn read_loop<const N: usize>(
 ) -> PyResult<ControlLoop<N>> {
     if let (None, Some(setpoint)) = (gains, setpoint) {
         return Err(refused(format_args!(
-            "setpoint must be left out without gains, got {}",
+            "setpoint needs gains, got {}",
             fields::shown(setpoint)
         )));
     }

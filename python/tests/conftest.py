@@ -1,4 +1,4 @@
-"""A live runtime beside the tests, and a client for it of Python's own."""
+"""A live runtime for the tests, and a client of Python's standard library."""
 
 import json
 import signal
@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-# Far longer than anything takes; a longer wait is a failure.
+# A limit far above every expected wait. A longer wait is a failure.
 PATIENCE = 60.0
 
-# A script that a shell starts in the background ignores SIGINT, and so would all that the tests start.
+# A script that a shell starts in the background ignores SIGINT, and so would its child processes.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -40,7 +40,7 @@ class Runtime:
         self.socket.sendall(json.dumps(op).encode() + b"\n")
 
     def call(self, service: str, **args: object) -> dict:
-        """Calls a service and answers its values."""
+        """Calls a service and returns its values."""
         self.calls += 1
         name = f"call-{self.calls}"
         self.send(op="call_service", service=service, args=args, id=name)
@@ -49,14 +49,14 @@ class Runtime:
             if response.get("op") == "service_response" and response.get("id") == name:
                 assert response["result"], response
                 return response["values"]
-        raise AssertionError("the runtime has gone")
+        raise AssertionError("the runtime has ended")
 
     def next_message(self, topic: str) -> dict:
         for line in self.lines:
             frame = json.loads(line)
             if frame.get("op") == "publish" and frame.get("topic") == topic:
                 return frame["msg"]
-        raise AssertionError("the runtime has gone")
+        raise AssertionError("the runtime has ended")
 
     def end(self) -> None:
         self.lines.close()
@@ -86,8 +86,8 @@ def runtime(links: int) -> Iterator[Runtime]:
 
 @pytest.fixture
 def start_child() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
-    """Starts a script in an interpreter of its own. It ends with the test at the latest, and after some time in any
-    case, so that nobody waits for its next line for ever."""
+    """Starts a script in a separate interpreter. It ends with the test or after a time limit, so no test waits for
+    its next line for ever."""
     started = []
 
     def start(script: str) -> subprocess.Popen[str]:
@@ -108,14 +108,14 @@ def start_child() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
 
 @pytest.fixture
 def play_notebook() -> Callable[..., None]:
-    """Runs all cells of a notebook. It talks to its kernel over files: a port that is chosen may be somebody else's
-    when the kernel takes it."""
+    """Runs all cells of a notebook. It communicates with its kernel over files, because another process may take a
+    chosen port."""
 
     def play(book: object, **options: object) -> None:
         import nbclient
         from traitlets.config import Config
 
-        # The name of a socket's file may be no longer than a hundred characters or so.
+        # The path of a socket's file may have only about a hundred characters.
         with tempfile.TemporaryDirectory() as folder:
             config = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
             nbclient.NotebookClient(book, timeout=300, config=config, **options).execute()
@@ -125,8 +125,8 @@ def play_notebook() -> Callable[..., None]:
 
 @pytest.fixture
 def turns_of_another_thread() -> Callable[[Callable[[], object]], int]:
-    """Counts the turns of another thread in the middle of a call, with an interpreter that takes its lock from nobody;
-    the call is made until there is one, 1000 times at most."""
+    """Counts the turns of another thread during a call, with an interpreter that never takes its lock from a thread.
+    The call is repeated until there is a turn, at most 1000 times."""
 
     def count(call: Callable[[], object]) -> int:
         seen, done = 0, threading.Event()

@@ -9,7 +9,7 @@ METHODS = ["euler", "midpoint", "verlet", "rk4"]
 
 
 def settings(links, arms, seed=1):
-    """Arms that differ in everything, with the single simulations that they are to be."""
+    """Arms with different settings, and the single simulations to compare them with."""
     random = np.random.default_rng(seed)
     rows = lambda low, high: random.uniform(low, high, (arms, links))
     given = {
@@ -81,7 +81,7 @@ def test_every_lane_is_a_single_arm(links, threads):
         one.step(150)
     compare(batch, singles)
 
-    # An effort on top of the controllers', for all steps of the call and no longer.
+    # An effort added to the controllers', only for the steps of the call.
     effort = np.random.default_rng(2).uniform(-3, 3, (arms, links))
     batch.step(40, effort)
     for one, push in zip(singles, effort, strict=True):
@@ -172,7 +172,7 @@ def test_arrays_go_in_as_they_lie():
 
 
 def packed(numbers):
-    """A field of a packed record: its doubles lie at odd places."""
+    """A field of a packed record: its doubles are not aligned."""
     records = np.zeros(len(numbers), [("name", "u1"), ("field", numbers.dtype, numbers.shape[1:])])
     records["field"] = numbers
     return records["field"]

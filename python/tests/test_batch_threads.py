@@ -1,4 +1,5 @@
-"""Many arms and many threads: calls wait for each other or are refused whole, an interrupt leaves no effort on, and threads end."""
+"""Many arms and many threads: calls wait for each other or are refused as a whole, an interrupt ends an added effort,
+and threads end."""
 
 import os
 import signal
@@ -43,7 +44,7 @@ def test_an_interrupted_call_leaves_no_effort_on(links):
     batch.step(5)
     single.step(5)
     assert not batch.effort.any()
-    # But for what the steps before had carried of their rounding.
+    # Equal up to the carried rounding errors of the earlier steps.
     assert np.allclose(batch.position[0], single.position, rtol=1e-12)
 
 
@@ -57,7 +58,7 @@ def test_what_is_refused_has_not_happened():
         pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
         pushing.start()
         try:
-            # From its first piece on; there are a dozen.
+            # During its first piece of a dozen.
             while other.time[0] == 0:
                 time.sleep(0.001)
             refused = 0
@@ -69,7 +70,7 @@ def test_what_is_refused_has_not_happened():
                     assert batch.energy.tolist() == before
                     refused += 1
                 else:
-                    # Nobody refuses once the push is over.
+                    # Nothing is refused after the call has ended.
                     assert other.time[0] > 2999.9
                     break
         finally:
@@ -78,7 +79,7 @@ def test_what_is_refused_has_not_happened():
             batch.step()
             assert batch.effort.any()
             return
-        # On a machine that is busy elsewhere the push may be over before all is tried: then once more.
+        # On a busy machine the push may be over before all is tried: then once more.
     raise AssertionError("it was too late each time")
 
 
@@ -99,12 +100,12 @@ def test_calls_of_several_threads_wait_for_each_other():
 
 
 def test_a_call_waits_for_the_whole_of_another():
-    # On a machine that is busy elsewhere the other may be over before this one is called: then once more.
+    # On a busy machine the other may be over before this one is called: then once more.
     for _ in range(5):
         batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
         pushing = threading.Thread(target=batch.step, args=(5_000_000, [0.5, 0.0]))
         pushing.start()
-        # From its first piece on; there are twenty.
+        # During its first piece of twenty.
         while batch.time[0] == 0:
             time.sleep(0.001)
         if batch.time[0] < 5000:
@@ -143,7 +144,7 @@ def test_who_only_looks_keeps_nobody_from_stepping():
 WAITING = """
 import os, pendularm, signal, threading, time
 batch = pendularm.Batch(1, threads=1)
-# The handler runs in the middle of the main thread's own call, and waits for nothing.
+# The handler runs during the main thread's own call, and does not wait.
 signal.signal(signal.SIGALRM, lambda *_: print(batch.energy.size, batch.reset(), flush=True))
 def interrupt():
     while batch.time[0] == 0:
@@ -184,7 +185,7 @@ def test_threads_of_batches_that_have_gone_end():
     before = count()
     for threads in range(2, 40):
         pendularm.Batch(64, threads=threads).step()
-    # The threads of the last four batches may still be there.
+    # The threads of the last four batches may still exist.
     most = before + sum(range(36, 40))
     until = time.monotonic() + 30
     while count() > most:

@@ -1,4 +1,5 @@
-"""The lessons of `course/` run, their key is true, and their questions tell right answers from wrong ones."""
+"""The lessons of `course/` run, their key is correct, and their questions accept right answers and reject wrong
+ones."""
 
 import importlib.util
 import math
@@ -10,7 +11,7 @@ import pytest
 COURSE = Path(__file__).parents[2] / "course"
 LESSONS = sorted(COURSE.glob("*.ipynb"))
 
-# The answers that a lesson's own variables give, by question; the others are choices and rules.
+# Answers from a lesson's variables, by question. The others are choices and rules.
 COMPUTED = {
     "1.1": "round(order['midpoint'])",
     "1.2": "2 ** round(order['rk4'])",

@@ -1,4 +1,4 @@
-"""The equation of motion against reference values that were computed in 160 digits by another derivation."""
+"""The equation of motion, compared with reference values of another derivation in 160 digits."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ def test_all_terms_are_those_of_the_reference_values():
     for case in cases():
         arm = pendularm.Arm(case["n"], lengths=case["lengths"], masses=case["masses"], gravity=case["gravity"])
         q, qd, effort, qdd = case["q"], case["qdot"], case["tau"], case["qddot_id"]
-        # The first-order bound of the reference values, per unit of rounding, and some units for the sums themselves.
+        # The first-order bound of the reference values, per unit of rounding, plus some units for the sums.
         near = lambda found, name, bound="", of=case: np.all(
             np.abs(np.asarray(found) - np.asarray(of[name]))
             <= 32 * np.finfo(float).eps * (np.asarray(of[bound or f"sens_{name}"]) + np.abs(np.asarray(of[name])))
@@ -52,13 +52,13 @@ def test_many_states_are_as_many_single_ones(links):
         together = function(arm, *fields)
         singly = [function(arm, *row) for row in zip(*fields, strict=True)]
         assert together.tolist() == np.array(singly).tolist()
-    # Enough arms to fill the machine's registers, in more than one go and with a rest.
+    # Enough arms for several full blocks of registers and a partial one.
     many = [random.uniform(-3, 3, (1003, links)) for _ in range(3)]
     together = dynamics.forward_dynamics(arm, *many)
     singly = [dynamics.forward_dynamics(arm, *row) for row in zip(*many, strict=True)]
     assert together.tolist() == np.array(singly).tolist()
     assert dynamics.forward_dynamics(arm, *(np.empty((0, links)),) * 3).shape == (0, links)
-    # One row goes with every row of the others.
+    # One row is combined with every row of the others.
     for row in [q[0], q[:1]]:
         assert dynamics.coriolis(arm, row, qd).tolist() == dynamics.coriolis(arm, [q[0]] * 9, qd).tolist()
         assert dynamics.coriolis(arm, qd, row).tolist() == dynamics.coriolis(arm, qd, [q[0]] * 9).tolist()
@@ -75,7 +75,7 @@ def test_inverse_kinematics_puts_the_end_effector_there(links):
     arm = pendularm.Arm(links, lengths=[1.0, 0.8, 0.3][:links])
     for x, y in [(1.0, 0.5), (-0.7, 0.9), (0.4, -1.1)]:
         q = pendularm.inverse_kinematics(arm, x, y)
-        # A few roundings of lengths near 1 m.
+        # A few rounding errors of lengths near 1 m.
         assert np.allclose(pendularm.end_effector(arm, q), [x, y], rtol=0, atol=1e-14)
     down = pendularm.inverse_kinematics(arm, 1.0, 0.5, present=[2.0, -1.0, 0.0][:links])
     assert down[1] < 0

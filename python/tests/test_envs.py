@@ -1,4 +1,4 @@
-"""The environments are Gymnasium's own kind, and the vector ones are as many single ones."""
+"""The environments pass Gymnasium's checks, and the vector ones are equal to single ones."""
 
 import gymnasium
 import numpy as np
@@ -29,7 +29,7 @@ def test_gymnasiums_checker_passes(name, links):
 
 
 def test_the_vector_environment_is_as_many_single_ones(name, links):
-    """Through ends and resets, exactly; 30 steps an episode bring several of them."""
+    """They are equal through ends and resets, exactly. Episodes of 30 steps give several of them."""
     arms = 5
     ours = gymnasium.make_vec(name, arms, links=links, max_episode_steps=30)
     theirs = gymnasium.make_vec(name, arms, vectorization_mode="sync", links=links, max_episode_steps=30)
@@ -72,7 +72,7 @@ def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
     for env in (one, other):
         env.reset(seed=1)
         env.step(np.ones((3, 2), np.float32))
-        # From here on the arm in the middle ends a step before the others.
+        # From here on the middle arm ends one step before the others.
         env.reset(options={"reset_mask": np.array([True, False, True])})
         assert env.step(np.ones((3, 2), np.float32))[3].tolist() == [False, True, False]
     actions = np.ones((3, 2), np.float32)
@@ -81,7 +81,7 @@ def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
     for found, known in zip(one.step(actions)[:4], expected[:4], strict=True):
         assert np.array_equal(found, known)
         assert found.dtype == known.dtype
-    # Now the others have ended, and the one in the middle goes on.
+    # Now the others have ended, and the middle one continues.
     with pytest.raises(ValueError, match=r"^actions\[1\]\[0\] must be finite, got NaN"):
         one.step(np.full((3, 2), np.nan, np.float32))
 
@@ -122,7 +122,7 @@ def test_the_seeds_are_those_of_as_many_single_environments(name):
     assert ours.np_random_seed == (4, 2, 5)
     ours.reset(seed=9, options={"reset_mask": np.array([False, True, False])})
     assert ours.np_random_seed == (4, 10, 5)
-    # A caller that asks for the seeds before the first reset has the seeds that follow.
+    # A caller that reads the seeds before the first reset gets those of the next reset.
     one, other = gymnasium.make_vec(name, 3), gymnasium.make_vec(name, 3)
     seeds = one.np_random_seed
     assert len(set(seeds)) == 3
@@ -175,7 +175,7 @@ def test_an_arm_that_turns_too_fast_is_lost():
 
 
 def test_swinging_up_pays():
-    """Upright the reward is 1, hanging it is 0, and no effort that is allowed holds the arm stretched."""
+    """The reward is 1 upright and 0 hanging, and no allowed effort holds the arm stretched."""
     env = gymnasium.make("Pendularm-v0").unwrapped
     env.reset(seed=0)
     for angle, reward in [(np.pi / 2, 1.0), (-np.pi / 2, 0.0), (0.0, 0.5)]:
@@ -188,7 +188,7 @@ def test_swinging_up_pays():
 @pytest.mark.parametrize("method", ["euler", "midpoint", "verlet", "rk4"])
 @pytest.mark.parametrize("timestep", [0.05, 0.05 / 7, np.float32(0.0125), 0.001])
 def test_method_and_timestep_can_be_set(name, method, timestep):
-    """And a step takes 0.05 s by any."""
+    """A step takes 0.05 s with every method and timestep."""
     one = gymnasium.make(name, method=method, timestep=timestep).unwrapped
     many = gymnasium.make_vec(name, 2, method=method, timestep=timestep)
     found, among = one.reset(seed=3)[0], many.reset(seed=3)[0]
@@ -213,7 +213,7 @@ def test_a_method_that_is_none_is_refused(method):
 
 
 def test_a_free_arm_keeps_its_energy(name, links):
-    """To 0.1 % of that between hanging and upright, from any pose, as long as no episode ends."""
+    """The energy stays within 0.1 % of the energy between hanging and upright, from any pose, over an episode."""
     env = gymnasium.make_vec(name, 500, links=links).unwrapped
     env.reset(seed=1)
     batch, arm = env._task.batch, pendularm.Arm(links)

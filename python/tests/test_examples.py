@@ -1,4 +1,4 @@
-"""The examples do what their heads say."""
+"""The examples do what their docstrings say."""
 
 import importlib.util
 import json
@@ -31,10 +31,10 @@ def test_the_lesson_shows_what_it_says(tmp_path, play_notebook):
     said = "".join(output["text"] for output in outputs if output.get("name") == "stdout")
     orders = {line.split()[0]: float(line.split()[2]) for line in said.splitlines() if " order " in line}
     for method, order in {"euler": 1, "midpoint": 2, "verlet": 2, "rk4": 4}.items():
-        # Coarse steps are not yet where the order rules alone.
+        # With coarse steps the error does not yet follow the order.
         assert abs(orders[method] - order) < 0.3
     _, predicted, _, _, seen, _ = said.splitlines()[-1].split()
-    # The timesteps are a twentieth of a percent apart; near the limit growth is slow to show.
+    # The timesteps are a twentieth of a percent apart. Near the limit growth is slow.
     assert abs(float(seen) / float(predicted) - 1) < 0.003
 
 
@@ -67,7 +67,7 @@ def test_roslibpy_moves_the_live_arm(runtime):
     assert run.stdout.endswith("it is there\n")
 
 
-# Runs the example in this process, and then the same loop with the offline arm: the two must agree to the bit.
+# Runs the example in this process, and then the same loop with the offline arm. The two must be bit-identical.
 OFFLINE = """
 import json, runpy, sys, numpy as np, pendularm
 sys.argv = sys.argv[1:]
@@ -83,7 +83,7 @@ print(json.dumps([arm.time, arm.position.tolist(), arm.velocity.tolist()]))
 def test_a_loop_that_is_closed_over_the_wire_is_that_of_the_offline_arm_to_the_bit(runtime, links):
     away = {}
     for law in ["pd", "lqr"]:
-        # The client finds the arm as somebody left it.
+        # The client starts with an arm in any state.
         runtime.call("/arm_sim/set_state", position=[0.1] * links)
         example = [str(EXAMPLES / "closed_loop.py"), law, *runtime.address.rsplit(":", 1)]
         run = subprocess.run(

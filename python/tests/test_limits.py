@@ -1,4 +1,4 @@
-"""Too little memory, and too few threads: an error of Python or less speed, and the process goes on."""
+"""Too little memory and too few threads: a Python error or less speed, and the process continues."""
 
 import itertools
 import os
@@ -13,7 +13,7 @@ resource = pytest.importorskip("resource")
 
 
 class Endless:
-    """A sequence that says that it is very long."""
+    """A sequence that reports a very large length."""
 
     def __len__(self):
         return 2**62

@@ -1,4 +1,4 @@
-"""The lines of Python in the papers run as they are printed there."""
+"""The Python code in the documents runs unchanged."""
 
 import os
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# The README's other ones need a runtime, and are run by the tests of that.
+# The README's other blocks need a runtime, and other tests run them.
 README = (ROOT / "README.md").read_text(encoding="utf-8").split("## From Python")[1].split("\n## ")[0]
 MANUAL = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
 

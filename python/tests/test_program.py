@@ -1,4 +1,4 @@
-"""The program that comes with the wheel: on the path, as a module, with its arguments and its signals."""
+"""The program in the wheel: on the path, as a module, with its arguments and its signals."""
 
 import os
 import re
@@ -25,7 +25,7 @@ WAYS = [[PROGRAM], [sys.executable, "-m", "pendularm"]]
 
 
 def is_of_the_library(said: str) -> bool:
-    """Whether a program says the library's version, behind which a release build has its commit."""
+    """Whether a program prints the library's version, which a release build follows by its commit."""
     version = re.escape(pendularm.__version__)
     return re.fullmatch(rf"pendularm {version}(\+[0-9a-f]{{12}}(\.modified)?)? \(web\)\n", said) is not None
 
@@ -45,7 +45,7 @@ def test_bad_arguments_come_back_as_exit_status_2(way):
 
 @pytest.mark.parametrize("there", [True, False], ids=["beside it", "nowhere"])
 def test_a_module_in_a_folder_of_its_own_finds_the_program_beside_it(tmp_path, there):
-    # As `pip install --target` leaves it, with a record of a program that is elsewhere.
+    # The state after `pip install --target`, with a record of a program at another path.
     shutil.copytree(Path(pendularm.__file__).parent, tmp_path / "pendularm")
     record = tmp_path / f"pendularm-{pendularm.__version__}.dist-info" / "RECORD"
     record.parent.mkdir()
@@ -82,7 +82,7 @@ def test_a_rebuilt_wheel_replaces_the_installed_one(tmp_path):
         made.parent.mkdir()
         with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(made, "w") as new:
             for name in old.namelist():
-                # Without hashes, which the new content would not have.
+                # Without hashes, which would not match the new content.
                 text = re.sub(rb",sha256=[^,]*,\d*", b",,", old.read(name)) if name.endswith("/RECORD") else old.read(name)
                 new.writestr(name, content if name.endswith("/py.typed") else text)
         pip = [sys.executable, "-m", "pip", "--python", python, *command.split(), "--no-index", "--quiet", made]
@@ -109,7 +109,7 @@ def test_it_serves_the_page_until_a_signal(way, number):
         began = time.monotonic()
         run.send_signal(number)
         assert run.wait(60) == 0
-        # The runtime ends within a second by itself; the rest is for a machine that is busy with other work.
+        # The runtime ends within a second. The rest is allowance for a busy machine.
         assert time.monotonic() - began < 10
 
 

@@ -1,4 +1,4 @@
-"""A bad value is refused by the name of its field, and changes nothing: the rows of refusals.txt."""
+"""A wrong value is refused by the name of its field, and changes nothing: the rows of refusals.txt."""
 
 import fractions
 import math
@@ -15,7 +15,7 @@ NAMES = {**vars(pendularm), "HIDDEN": HIDDEN, "fractions": fractions, "math": ma
 
 
 def among_objects(*values):
-    """The values as they are, in an array."""
+    """The values, unchanged, in an array."""
     array = np.empty(len(values), object)
     array[:] = values
     return array
@@ -42,6 +42,6 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(row):
 
 
 def test_an_axis_may_be_longer_than_a_batch():
-    # The last of all is found, by its place in the axis; the other ones are taken.
+    # The last value is refused by its index in the axis. The others are accepted.
     with pytest.raises(ValueError, match=r"^gravity\[1000000\] must be finite and at least 0, got -1$"):
         pendularm.sweep({"gravity": [9.81] * 1_000_000 + [-1.0]})

@@ -1,4 +1,4 @@
-"""Pictures of the environments' arms, and the libraries that ask for them."""
+"""Pictures of the environments' arms, and the libraries that use them."""
 
 import sys
 
@@ -110,7 +110,7 @@ def test_steps_and_pictures_need_a_reset(kind):
 
 @pytest.mark.parametrize("start", ["spawn", "forkserver"])
 def test_workers_that_import_gymnasium_alone_make_environments(name, start, start_child):
-    """As stable-baselines3 makes them: from the name, with pictures in view."""
+    """Environments made by stable-baselines3: from the name, with pictures."""
     script = f"""
 import functools, gymnasium
 make = functools.partial(gymnasium.make, "pendularm.envs:{name}", render_mode="rgb_array")

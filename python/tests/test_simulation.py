@@ -18,7 +18,7 @@ from pendularm import dynamics
 
 
 def live_state(runtime, time_of_arm):
-    """The joint state that the runtime publishes once it is paused at that time."""
+    """The joint state that the runtime publishes while paused at that time."""
     while True:
         message = runtime.next_message("/joint_states")
         stamp = message["header"]["stamp"]
@@ -88,7 +88,7 @@ def test_a_control_period_and_steps_with_an_effort_have_the_live_bits(runtime, l
     step_both(20)
     runtime.call("/arm_sim/disturb", effort=effort, duration=0.02)
     ours.disturb(effort, 0.02)
-    # More than are taken in a row.
+    # More steps than in one piece.
     step_both(2500, effort=effort)
     step_both(20)
     runtime.call("/arm_sim/set_integrator", timestep=0.0007)
@@ -122,13 +122,13 @@ def test_an_effort_is_held_for_its_steps_and_the_controller_stands_still():
     assert arm.step(7, [1, -2]) == 7
     assert arm.effort.tolist() == [1, -2]
     assert arm.integral.tolist() == integral
-    # No step, no change: the next one is the controller's, in the same period.
+    # Without a step nothing changes: the next step is the controller's, in the same period.
     assert arm.step(0, effort=[5, 5]) == 0
     assert arm.effort.tolist() == [1, -2]
     arm.step()
     assert arm.effort.tolist() != [1, -2]
     assert arm.integral.tolist() != integral
-    # A state that is set ends a divergence.
+    # Setting a state ends a divergence.
     arm.set_state([0, 0], [1e200, 1e200])
     assert arm.step(5, [1, 1]) == 0
     assert arm.divergence is not None
@@ -151,7 +151,7 @@ def test_a_fresh_simulation_is_a_fresh_runtime(runtime, links):
 
 
 def arrays_of(thing):
-    """The arrays that the properties of an object return, also inside of tuples and mappings."""
+    """The arrays in the properties of an object, also inside tuples and mappings."""
     for name in dir(type(thing)):
         if not name.startswith("_") and not callable(value := getattr(thing, name)):
             parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else [value]
@@ -189,7 +189,7 @@ def test_a_settled_arm_carries_its_gravity_load(links):
     arm.set_setpoint([0.5, -0.8, 0.3][:links])
     arm.step(20_000)
     assert np.allclose(arm.position, [0.5, -0.8, 0.3][:links], atol=1e-6)
-    # The integrals still lack, after 20 s, some millionths of the load.
+    # After 20 s the integrals still differ by some millionths of the load.
     assert np.allclose(arm.effort, dynamics.gravity_load(arm.arm, arm.position), rtol=1e-4)
 
 
@@ -245,7 +245,7 @@ def test_arms_are_values():
     assert arm == pendularm.Arm(3, lengths=np.array([1.0, 2.0, 0.5]), masses=(1, 1, 1), gravity=1.6)
     assert arm != pendularm.Arm(3)
     assert len({arm, pendularm.Arm(3, lengths=[1, 2, 0.5], gravity=1.6), pendularm.Arm(3), pendularm.Arm(2)}) == 3
-    # Two zeros that are equal, though their bits are not.
+    # Two zeros that are equal, but have different bits.
     assert len({pendularm.Arm(gravity=0.0), pendularm.Arm(gravity=-0.0)}) == 1
     for again in [pickle.loads(pickle.dumps(arm)), copy.copy(arm), copy.deepcopy(arm)]:
         assert again == arm

@@ -1,4 +1,4 @@
-"""The study's answers are those of the services, to the bit."""
+"""The study's results are bit-identical to those of the services."""
 
 import dataclasses
 import signal
@@ -11,7 +11,7 @@ import pendularm
 
 
 def plain(answer):
-    """An answer as JSON has it."""
+    """A result in the form of JSON."""
     if dataclasses.is_dataclass(answer):
         return {field.name: plain(getattr(answer, field.name)) for field in dataclasses.fields(answer)}
     return answer.tolist() if isinstance(answer, np.ndarray) else answer
@@ -141,7 +141,7 @@ def test_suggested_gains_are_the_services(runtime, links):
     ],
 )
 def test_an_answer_is_equal_to_itself_alone(make):
-    """Its arrays have no one answer to `==`."""
+    """Its arrays have no single result of `==`."""
     answer = make()
     assert answer == answer
     assert answer != make()

@@ -1,4 +1,4 @@
-"""Sweeps: the same bits from any number of workers, kept on disk and gone on with, also where a worker is lost."""
+"""Sweeps: the same bits from any number of workers, stored on disk and continued, even after the loss of a worker."""
 
 import functools
 import json
@@ -21,7 +21,7 @@ FIXED = {"setpoint": [0.6, -0.4], "duration": 1.0, "samples": 51, "timestep": 0.
 
 
 class Counting(ThreadPoolExecutor):
-    """Threads that count what they are given."""
+    """Threads that count their tasks."""
 
     given = 0
 
@@ -86,7 +86,7 @@ def test_threads_are_as_many_as_cores():
 
 
 class Stopping(ThreadPoolExecutor):
-    """One thread, which fails after so many pieces."""
+    """One thread, which fails after a number of pieces."""
 
     def __init__(self, pieces):
         super().__init__(1)
@@ -206,7 +206,7 @@ def test_of_two_sweeps_that_begin_in_a_folder_one_has_it(tmp_path, monkeypatch, 
     def look(path, **how):
         found = exists(path, **how)
         if path.name == "sweep.json":
-            # Neither goes on before both have seen that there is none.
+            # Neither continues before both have found no file.
             looked.wait(60)
         return found
 
@@ -237,7 +237,7 @@ def test_of_two_sweeps_that_begin_in_a_folder_one_has_it(tmp_path, monkeypatch, 
 
 
 def test_a_folder_keeps_numbers_under_any_names(tmp_path):
-    # NumPy and zip files have uses of their own for most of these.
+    # NumPy and zip files give most of these a special meaning.
     names = ["a", "a.npy", "arr_0", "arr_1", "file", "allow_pickle", "", "/", "b\0c", "b\0d", "é\ud800"]
 
     def many(run):
@@ -264,7 +264,7 @@ def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     for other in [last(2.0), last(1.0, "first"), first, second]:
         with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
             pendularm.sweep(metric=other, **ask)
-    # NumPy gives the bytes that it would fill a masked array with: True, in one of truths.
+    # NumPy returns the fill value of a masked array: True for booleans.
     hidden = [last(np.ma.array([True], mask=mask)) for mask in (True, False)]
     assert len({fingerprint("metric", one) for one in hidden}) == 2
     kept = json.loads((tmp_path / "sweep.json").read_text())
@@ -318,17 +318,18 @@ def test_a_function_may_be_the_metric():
     # The nearest whole step of each.
     assert found["last"].tolist() == [1.0, 333 * 0.003, 1.0]
     assert (found["largest"] > 1).all()
-    with pytest.raises(ValueError, match="metric must answer one number for each of 2 arms, got metric of shape"):
+    with pytest.raises(ValueError, match="metric must return one number for each of 2 arms, got metric of shape"):
         pendularm.sweep({"kp": [1, 2]}, lambda run: run.positions, duration=0.1)
 
 
 def test_one_step_is_a_run():
-    # Three times 0.1 s is longer than 0.3 s by rounding alone.
+    # Three times 0.1 s is longer than 0.3 s only because of rounding.
     found = pendularm.sweep({"timestep": [3 * 0.1, 0.3, 0.1]}, lambda run: run.times[-1], duration=0.3, samples=2)
     assert found["metric"].tolist() == [3 * 0.1, 0.3, 3 * 0.1]
 
 
-# A fork beside this process's threads is not asked for by these tests, but by older Pythons' default.
+# These tests do not need a fork beside this process's threads. It is the default of older Python
+# versions.
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_processes_may_do_the_work():
     expected = pendularm.sweep(GRID, "final_error", **FIXED)
@@ -339,7 +340,7 @@ def test_processes_may_do_the_work():
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A Dask scheduler and two workers, each a process of its own, on loopback."""
+    """A Dask scheduler and two workers, each in its own process, on loopback."""
     distributed = pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
     begin = lambda *command: subprocess.Popen([sys.executable, "-m", *command], stderr=subprocess.DEVNULL)
@@ -362,7 +363,7 @@ def test_a_cluster_that_loses_a_worker_midway_answers_the_same(cluster, tmp_path
     client, workers = cluster
 
     def slowly(run):
-        # The lost worker then has a piece under way, and others are left, even if it is lost late.
+        # The lost worker then runs a piece, and others remain, even if it is lost late.
         time.sleep(0.3)
         return np.abs(run.positions[-1] - run.setpoint).max(axis=1)
 

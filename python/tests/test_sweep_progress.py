@@ -1,4 +1,4 @@
-"""Sweeps: their progress is shown where somebody looks, and Ctrl-C ends them amid their pieces."""
+"""Sweeps: progress is shown on visible output, and Ctrl-C ends them during a piece."""
 
 import signal
 import time

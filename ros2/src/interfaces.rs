@@ -1,21 +1,21 @@
-//! The types of the graph, made of the catalogue's. Messages are as they are; services and actions of ROS 2 are made
-//! of their parts.
+//! The types of the graph, from the catalog. Messages are unchanged. Services and actions of ROS 2 are built from
+//! their parts.
 //!
-//! A call that the arm refuses has no answer in ROS 2. So the services that are this project's own answer `success` and
-//! `message` too, behind the fields of the catalogue.
+//! ROS 2 has no answer to a refused call. So this project's own services also return `success` and `message`, after the
+//! fields of the catalog.
 //!
-//! **Invariant:** what is written by a type here has that type's hash.
+//! **Invariant:** bytes that are written by a type here have that type's hash.
 
 use pendularm::protocol::catalog::types::Type;
 use pendularm::protocol::catalog::{Action, Field};
 
 use crate::convention::hash::type_hash;
 
-/// Where this project's own types are.
+/// The package of this project's own types.
 const OURS: &str = "pendularm_interfaces/";
-/// The field that ROS 2 puts into a type without any, which DDS does not know.
+/// The field that ROS 2 adds to a type without fields, because DDS has no empty types.
 pub const NOTHING: [Field; 1] = [field("structure_needs_at_least_one_member", "uint8")];
-/// How a call went.
+/// The fields with the outcome of a call.
 const OUTCOME: [Field; 2] = [field("success", "bool"), field("message", "string")];
 
 /// A service's type.
@@ -51,13 +51,13 @@ impl ServiceInterface {
         Self::new(name, request, &response)
     }
 
-    /// A type of those fields, in a request and in a response.
+    /// A type with these fields in a request and in a response.
     #[must_use]
     pub fn new(name: &'static str, request: &[Field], response: &[Field]) -> Self {
         Self::with(name, request, response, &[])
     }
 
-    /// The same with types inside of which the catalogue has another shape.
+    /// The same with inner types that differ from the catalog.
     fn with(name: &'static str, request: &[Field], response: &[Field], inside: &[Type]) -> Self {
         let request = structure(format!("{name}_Request"), request);
         let response = structure(format!("{name}_Response"), response);
@@ -88,14 +88,14 @@ impl ServiceInterface {
         }
     }
 
-    /// Whether a response says how the call went.
+    /// Whether a response has the outcome of the call.
     #[must_use]
     pub fn tells_outcome(&self) -> bool {
         self.response.fields.ends_with(&OUTCOME)
     }
 }
 
-/// An action's type: two services and a message, beside those that all actions have.
+/// An action's type: two services and a message, besides those of all actions.
 #[derive(Debug, Clone)]
 pub struct ActionInterface {
     /// Sends a goal.
@@ -146,7 +146,7 @@ impl ActionInterface {
     }
 }
 
-/// The service by which goals of every action are cancelled.
+/// The cancel service of every action.
 #[must_use]
 pub fn cancel_goal() -> ServiceInterface {
     ServiceInterface::new(
@@ -159,8 +159,8 @@ pub fn cancel_goal() -> ServiceInterface {
     )
 }
 
-/// A type of that name, as ROS 2 has it: with one field at least, and without arrays of arrays, whose rows stand one
-/// behind the other.
+/// A type with that name in the form of ROS 2: with at least one field, and with arrays of arrays as one array, row
+/// after row.
 fn structure(name: String, fields: &[Field]) -> Type {
     let flat = |field: &Field| match field.kind.strip_suffix("[][]") {
         Some(kind) => Field {
@@ -177,7 +177,7 @@ fn structure(name: String, fields: &[Field]) -> Type {
     }
 }
 
-/// A text for as long as the program runs: types are made once, when it starts, and needed until it ends.
+/// A text with a static lifetime. Types are created once at the start, and needed until the end.
 fn kept(text: String) -> &'static str {
     Box::leak(text.into_boxed_str())
 }
@@ -200,7 +200,7 @@ mod tests {
         );
     }
 
-    /// By the code that ROS 2 generates for them.
+    /// From the code that ROS 2 generates for them.
     #[test]
     fn services_of_ros_2_have_its_hashes() {
         let names = Service::DescribeParameters.fields();

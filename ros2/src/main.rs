@@ -1,7 +1,7 @@
-//! `pendularm-ros2`: joins a running pendularm to a ROS 2 graph, on Zenoh, by the wire conventions of `rmw_zenoh`.
+//! `pendularm-ros2`: connects a running pendularm to a ROS 2 graph on Zenoh, with the wire format of `rmw_zenoh`.
 //!
-//! [`convention`], [`interfaces`] and [`translation`] are pure; [`actors`] joins the two sides; [`package`] writes types
-//! down for a workspace of ROS 2. Types, their CDR and the list of all that there is come from pendularm itself.
+//! [`convention`], [`interfaces`] and [`translation`] are pure. [`actors`] connects the two sides. [`package`] writes
+//! the types for a ROS 2 workspace. Types, their CDR and the catalog come from pendularm itself.
 //!
 //! **Invariant:** the program connects, and never listens.
 
@@ -30,7 +30,7 @@ fn main() -> std::io::Result<()> {
     system.run()
 }
 
-/// Writes the package of types, and says where it is.
+/// Writes the package of types, and prints its path.
 fn write_package(folder: &Path) {
     let path = folder.join(package::NAME);
     match package::write(&path) {

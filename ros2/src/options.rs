@@ -1,6 +1,6 @@
 //! The command line.
 //!
-//! **Invariant:** nothing here is asked to listen: the program connects, to the arm and to a router.
+//! **Invariant:** no option makes the program listen. It connects to the arm and to a router.
 
 use std::path::PathBuf;
 
@@ -15,11 +15,11 @@ pub struct Options {
     pub router: String,
     /// The ROS domain.
     pub domain: u32,
-    /// Empty, or a namespace with a slash in front.
+    /// Empty, or a namespace with a leading slash.
     pub namespace: String,
-    /// The token that the arm wants to be shown.
+    /// The arm's token.
     pub token: Option<String>,
-    /// Where to write the package of types, and to end.
+    /// The folder for the package of types. With it the program only writes the package.
     pub interfaces: Option<PathBuf>,
 }
 
@@ -31,11 +31,11 @@ For several arms, run one of these for each, with a namespace of its own.";
 
 const AFTER_HELP: &str = "\
 On the ROS side: `ros2 run rmw_zenoh_cpp rmw_zenohd`, and RMW_IMPLEMENTATION=rmw_zenoh_cpp everywhere.
-The program listens nowhere, and goes on trying when the arm or the router is not there.
+The program never listens. It reconnects while the arm or the router is not running.
 With `--interfaces src` in a workspace, `colcon build` builds the types that are this project's own.
 Exit status: 2 for a bad option, 1 if the package could not be written.";
 
-/// Reads the command line, or ends the program with what is wrong with it.
+/// Reads the command line, or ends the program with an error message.
 #[must_use]
 pub fn read() -> Options {
     let matches = command().get_matches();
@@ -50,7 +50,7 @@ pub fn read() -> Options {
     }
 }
 
-/// The variable that the arm itself reads.
+/// The variable of the arm's program.
 fn token_of_environment() -> Option<String> {
     std::env::var("ARM_SIM_TOKEN")
         .ok()
@@ -67,14 +67,14 @@ fn command() -> Command {
                 .long("connect")
                 .value_name("HOST:PORT")
                 .default_value("127.0.0.1:9095")
-                .help("Where the arm listens"),
+                .help("Address of the arm"),
         )
         .arg(
             Arg::new("router")
                 .long("router")
                 .value_name("ENDPOINT")
                 .default_value("tcp/127.0.0.1:7447")
-                .help("Where a Zenoh router listens, as Zenoh writes it; nothing is encrypted or asks who is there"),
+                .help("Endpoint of a Zenoh router; nothing is encrypted or authenticated"),
         )
         .arg(
             Arg::new("domain")
@@ -89,7 +89,7 @@ fn command() -> Command {
                 .long("namespace")
                 .value_name("/NAME")
                 .value_parser(read_namespace)
-                .help("Put in front of every name, for an arm among others"),
+                .help("Prefix of every name, for one of several arms"),
         )
         .arg(
             Arg::new("token").long("token").value_name("TOKEN").help(
@@ -102,11 +102,11 @@ fn command() -> Command {
                 .long("interfaces")
                 .value_name("FOLDER")
                 .value_parser(value_parser!(PathBuf))
-                .help("Write the source of the ROS 2 package pendularm_interfaces into FOLDER, and end"),
+                .help("Only write the source of the ROS 2 package pendularm_interfaces into FOLDER"),
         )
 }
 
-/// A namespace as ROS 2 allows it, with a slash in front.
+/// A valid ROS 2 namespace with a leading slash.
 fn read_namespace(text: &str) -> Result<String, String> {
     let names = text.strip_prefix('/').unwrap_or(text);
     if names.is_empty() {
@@ -122,7 +122,7 @@ fn read_namespace(text: &str) -> Result<String, String> {
         Ok(format!("/{names}"))
     } else {
         Err(
-            "it has to be names of letters, digits and underscores behind slashes, such as /left"
+            "it must be names of letters, digits and underscores, each after a slash, such as /left"
                 .to_owned(),
         )
     }

@@ -1,7 +1,7 @@
-//! The package of this project's own types as source, which a ROS 2 workspace builds to talk to the bridge.
+//! The source of the package with this project's own types, which a ROS 2 workspace builds to use the bridge.
 //!
-//! **Invariant:** types that are built from it have the hashes that the graph shows. None has a type of another package
-//! inside, so that it needs no package but those of ROS 2's generators.
+//! **Invariant:** types built from it have the hashes in the graph. No type has an inner type of another package, so
+//! only ROS 2's generators are needed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,13 +16,13 @@ use crate::interfaces::{NOTHING, ServiceInterface};
 
 /// The package's name.
 pub const NAME: &str = "pendularm_interfaces";
-/// Stands between the parts of a service and of an action.
+/// The separator between the parts of a service or an action.
 const DIVIDER: &str = "---\n";
 
-/// Writes the package into `folder`, and says how many types it has.
+/// Writes the package into `folder`, and returns its number of types.
 ///
 /// # Errors
-/// If a folder or a file can't be written.
+/// If a folder or a file cannot be written.
 pub fn write(folder: &Path) -> io::Result<usize> {
     let interfaces = interfaces();
     for kind in ["msg", "srv", "action"] {
@@ -71,7 +71,7 @@ fn interfaces() -> BTreeMap<String, String> {
 fn text(part: &Type) -> String {
     let constants = part.constants.iter();
     let constants = constants.map(|one| format!("{} {}={}\n", one.kind, one.name, one.value));
-    // ROS 2 puts its filler into an empty type by itself.
+    // ROS 2 adds its filler to an empty type itself.
     let fields = part.fields.iter().filter(|field| !NOTHING.contains(field));
     let fields = fields.map(|field: &Field| {
         let kind = short_type(field.kind);

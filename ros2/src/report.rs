@@ -1,21 +1,20 @@
 //! Lines on standard error.
 //!
-//! **Invariant:** nobody has to read it: a standard error that is closed stops nothing.
+//! **Invariant:** a closed standard error has no effect on the program.
 
 use std::io::Write;
 
-/// Says a line.
+/// Prints a line.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "pendularm-ros2: {line}");
 }
 
-/// Says a line unless it was the last one said here: a failure that comes every second is said
-/// once.
+/// Prints a line, unless it is the same as the last one, so a failure that repeats every second is printed once.
 #[derive(Debug, Default)]
 pub struct Repeated(String);
 
 impl Repeated {
-    /// Says it, if it is news.
+    /// Prints it, if it is new.
     pub fn say(&mut self, line: String) {
         if self.0 != line {
             say(&line);
@@ -23,7 +22,7 @@ impl Repeated {
         }
     }
 
-    /// The next line is news, even if it was the last one.
+    /// Prints the next line in any case.
     pub fn clear(&mut self) {
         self.0.clear();
     }

@@ -1,6 +1,7 @@
-//! Between messages of ROS 2, in which every field is always there, and the arm's, where fields may be absent. Pure.
+//! Translates between messages of ROS 2, which always have every field, and those of the arm, where fields may be
+//! absent. Pure.
 //!
-//! **Invariant:** a request that was never filled in changes nothing but what `bool`s say.
+//! **Invariant:** a request with only default values changes nothing, except by its `bool`s.
 
 use pendularm::protocol::catalog::Field;
 use pendularm::protocol::catalog::types;
@@ -8,8 +9,8 @@ use serde_json::{Map, Value};
 
 use crate::interfaces::ServiceInterface;
 
-/// The arguments of a call without the optional fields that are empty: 0, NaN, an empty text or array, or an object
-/// with nothing in it. A `bool` is never empty.
+/// The arguments of a call without empty optional fields: 0, NaN, an empty text or array, or an object with only
+/// such members. A `bool` is never empty.
 #[must_use]
 pub fn arguments(fields: &[Field], request: &mut Value) -> Value {
     let mut arguments = Map::new();
@@ -40,12 +41,12 @@ fn is_empty(value: &Value) -> bool {
     }
 }
 
-/// A response with the arm's values, and how the call went where the type has room for that.
+/// A response with the arm's values, and with the outcome of the call if the type has fields for it.
 #[must_use]
 pub fn response(of: &ServiceInterface, values: Value, is_success: bool, status: &str) -> Value {
     let mut members = match values {
         Value::Object(members) => members,
-        // A service of the arm's answers with an object; a refusal may have a text instead.
+        // A service of the arm returns an object. A refusal may have a text instead.
         _ => Map::new(),
     };
     for value in members.values_mut() {
@@ -58,7 +59,7 @@ pub fn response(of: &ServiceInterface, values: Value, is_success: bool, status: 
     Value::Object(members)
 }
 
-/// Puts the rows of an array of arrays one behind the other.
+/// Joins the rows of an array of arrays.
 fn flatten(value: &mut Value) {
     let Value::Array(rows) = value else { return };
     if rows.first().is_some_and(Value::is_array) {

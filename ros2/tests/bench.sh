@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# `make bench-ros2`: two hosts with a Zenoh router each, and up to 50 watchers on the far one: bench.sh ARM
-# BUILD_FOLDER. Needs root, for the hosts are network namespaces. Takes some minutes; ARGS=--quick takes seconds and measures nothing; KEEP=1 keeps the figures in
-# benches/results/<date>-<processor>/ros2/.
+# `make bench-ros2`: two hosts with a Zenoh router each, and up to 50 subscribers on the far one: bench.sh ARM
+# BUILD_FOLDER. It needs root, because the hosts are network namespaces. It takes some minutes. ARGS=--quick takes
+# seconds without measuring. KEEP=1 keeps the figures in benches/results/<date>-<processor>/ros2/.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"

@@ -1,9 +1,9 @@
-"""Two hosts with a Zenoh router each, arm and bridge on the near one, watchers on the far one: hosts.py ARM BRIDGE
-[--bench].
+"""Two hosts with a Zenoh router each, arm and bridge on the near one, subscribers (watchers) on the far one: hosts.py
+ARM BRIDGE [--bench].
 
-The hosts are network namespaces, joined by a pair of virtual interfaces and by nothing else; they are gone when this
-program is. To make them takes root, `ip`, `unshare` and `nsenter`; where one is missing it says so, and that is all.
-Without `--bench` it checks what must hold anywhere; with it, it measures for longer and prints tables.
+The hosts are network namespaces, connected only by a pair of virtual interfaces. They end with this program. They
+need root, `ip`, `unshare` and `nsenter`; if one is missing, the program reports it and ends. Without `--bench` it
+checks what must hold on every machine. With it, it measures for longer and prints tables.
 """
 
 import contextlib
@@ -23,18 +23,18 @@ ARM, BRIDGE = sys.argv[1:3]
 IS_BENCH = "--bench" in sys.argv
 DOMAIN = 7
 KEY = f"{DOMAIN}/joint_states/**"
-# Addresses that are for documents: no host has them. Ports are the hosts' own.
+# Addresses reserved for documentation, which no host has. Each host has its own ports.
 NEAR, FAR = "192.0.2.1", "192.0.2.2"
 HERE = "tcp/127.0.0.1:7447"
 COUNTS = [1, 10, 50] if IS_BENCH else [1, 50]
-# How many messages a measurement hears: 20 s or 2 s.
+# The number of messages in a measurement: 20 s or 2 s.
 MESSAGES = 1200 if IS_BENCH else 120
-# How long a killed router is away [s]. A searcher makes longer and longer pauses.
+# Time without the killed router [s]. A searching client makes increasing pauses.
 AWAY = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] if IS_BENCH else [1.0]
 
 
 def reason_against_hosts():
-    """Why no hosts can be made here, if so."""
+    """Why hosts cannot be made here; `None` if they can."""
     missing = [name for name in ["ip", "unshare", "nsenter"] if not shutil.which(name)]
     if missing:
         return f"no {missing[0]} here"
@@ -44,7 +44,7 @@ def reason_against_hosts():
 
 
 class Host:
-    """A network namespace, for as long as a process in it waits for the end of its input, which is this program's."""
+    """A network namespace. It exists as long as its process, which ends with this program."""
 
     def __init__(self):
         self.holder = subprocess.Popen(["unshare", "--net", "cat"], stdin=subprocess.PIPE)
@@ -65,7 +65,7 @@ class Host:
             host.do("ip", "link", "set", "link0", "up")
 
     def sent(self):
-        """Bytes that went out to the other host."""
+        """Bytes sent to the other host."""
         rows = (line.split(":") for line in (self.proc / "net/dev").read_text().splitlines()[2:])
         return next(int(numbers.split()[8]) for name, numbers in rows if name.strip() == "link0")
 
@@ -78,7 +78,7 @@ class Host:
 
 
 class Watchers:
-    """Watchers, and what they have heard."""
+    """Watchers and their received messages."""
 
     def __init__(self, program):
         self.program = program
@@ -106,7 +106,7 @@ class Watchers:
 
 
 def processor_time(program):
-    """Nanoseconds that its threads have run, as the scheduler counts them."""
+    """Run time of its threads in nanoseconds, from the scheduler."""
     ran = 0
     for task in Path(f"/proc/{program.process.pid}/task").iterdir():
         # A thread may have ended since it was listed.
@@ -122,7 +122,7 @@ def spread(values):
 
 
 class Scene:
-    """All that runs on both hosts."""
+    """All programs on both hosts."""
 
     def __init__(self):
         self.near, self.far = Host(), Host()
@@ -134,7 +134,7 @@ class Scene:
         bridge = self.near.start(BRIDGE, "--connect", self.address, "--router", HERE, "--domain", DOMAIN)
         bridge.said("is in domain")
         self.programs = {"arm": arm, "bridge": bridge}
-        # Delays are those of the first watcher, which has a process of its own.
+        # Delays are those of the first watcher, which has its own process.
         self.watchers = [self.far.watch("graph", HERE, KEY, 1)]
 
     def start_near_router(self):
@@ -147,7 +147,7 @@ class Scene:
         return sum(len(one.read()["watchers"]) for one in self.watchers)
 
     def bring(self, count):
-        """Lets there be so many watchers, who all hear the arm."""
+        """Starts watchers up to this number, and waits until all get messages."""
         more = count - self.count()
         if more > 0:
             self.watchers.append(self.far.watch("graph", HERE, KEY, more))
@@ -155,13 +155,13 @@ class Scene:
             one.wait_until_each_has(1)
 
     def messages_and_bytes(self):
-        """What the first watcher has heard and what went over the link, as good as at one moment."""
+        """The first watcher's messages and the bytes on the link, at nearly the same time."""
 
         def get():
             before = self.watchers[0].read()["watchers"][0]["count"]
             sent = self.near.sent()
             after = self.watchers[0].read()["watchers"][0]["count"]
-            # Two looks take about a twentieth of a second, unless the machine is busy elsewhere.
+            # Two readings take about a twentieth of a second, unless the machine is busy.
             return (before, sent) if after - before < 10 else None
 
         return wait_for("a moment's figures", get)
@@ -169,7 +169,8 @@ class Scene:
     def measure(self):
         """One row of figures."""
         programs = {**self.programs, "near router": self.near_router, "far router": self.far_router}
-        # The first of them last: its messages are counted from here on, as is what goes over the link.
+        # The first one is last, because its messages and the bytes on the link are counted from here
+        # on.
         for one in reversed(self.watchers):
             one.begin()
         began = time.monotonic()
@@ -193,7 +194,7 @@ class Scene:
         }
 
     def lateness(self):
-        """How much later than a client of the arm's own protocol, on the arm's host, a watcher hears [ms]."""
+        """The delay of a watcher compared with a rosbridge client on the arm's host [ms]."""
         client = self.near.watch("arm", self.address)
         self.watchers[0].begin()
         client.begin()
@@ -203,7 +204,7 @@ class Scene:
         return spread((came - direct[stamp]) * 1e-6 for stamp, _, came in rows if stamp in direct)
 
     def kill(self, name, away):
-        """Seconds from when a router listens again until all watchers hear the arm."""
+        """Seconds from a router's restart until all watchers get messages."""
         getattr(self, f"{name}_router").end()
         time.sleep(away)
         for one in self.watchers:
@@ -244,7 +245,8 @@ def main():
         rows.append(scene.measure())
     show(rows)
     one, many = rows[0], rows[-1]
-    # One stream, however many watch: 50 would be fifty times as much, and the hosts' other talk is far less than twice.
+    # There is one stream for any number of watchers. 50 streams would be fifty times as much, and other traffic is far
+    # less than twice.
     assert many["bytes a message"] < 2 * one["bytes a message"], rows
     median, high = scene.lateness()
     say(f"a watcher hears {median:.2f} ms (p50), {high:.2f} ms (p99) later than a client on the arm's host")

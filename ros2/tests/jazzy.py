@@ -1,8 +1,8 @@
 """Type hashes by ROS 2 Jazzy itself: jazzy.py PENDULARM_INTERFACES ANSWER.
 
-They are those that its built packages have with them, and those that its generator computes from definitions; both come
-from PyPI, as packages of `ros-...` (jazzy.txt). The answer is a file with the names of types and their hashes; standard
-output is the generator's own.
+The hashes are those in its built packages, and those that its generator computes from definitions. Both come from
+PyPI, as packages `ros-...` (jazzy.txt). The answer is a file with the names of types and their hashes. Standard
+output is the generator's.
 """
 
 import json
@@ -48,7 +48,7 @@ trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error
 
 
 def hashes_in(folder):
-    """The hashes of all types that are described below a folder, by their names."""
+    """The hashes of all types described in a folder, by name."""
     descriptions = (json.loads(path.read_text()) for path in folder.rglob("*.json"))
     lists = (one["type_hashes"] for one in descriptions if "type_hashes" in one)
     return {one["type_name"]: one["hash_string"] for types in lists for one in types}

@@ -1,4 +1,4 @@
-"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE.
+"""Tests the bridge with peers of other projects: peers.py ARM BRIDGE.
 
 The router is eclipse-zenoh, the other ROS 2 nodes are zenoh-ros2-sdk, hashes and definitions are those of rosbags
 (Jazzy).
@@ -69,7 +69,7 @@ def test_hashes_of_standard_types_are_those_of_jazzy(session):
 
 
 def test_hashes_are_those_that_ros_2_itself_has(session):
-    """Of every type in the graph but those of packages that PyPI does not have."""
+    """Checks every type in the graph, except types of packages that are not on PyPI."""
     if not Path(sys.prefix, "share/rosidl_generator_type_description").is_dir():
         return "SKIPPED: there are no packages of ROS 2 for this Python"
     with tempfile.TemporaryDirectory() as folder:
@@ -108,7 +108,7 @@ def test_joint_states_are_decoded_and_numbered(peer, session):
         assert state.name == ["joint1", "joint2"], state
         assert [len(state.position), len(state.velocity), len(state.effort)] == [2, 2, 2], state
     stamps = [state.header.stamp.sec + state.header.stamp.nanosec * 1e-9 for state in heard]
-    # A tick that comes late is followed at once by the next, perhaps before the arm has taken a step.
+    # After a late tick the next one follows at once, possibly before the arm has taken a step.
     assert stamps == sorted(stamps) and len(set(stamps)) >= 100, stamps
     wait_for("120 attachments", lambda: len(attachments) >= 120)
     watcher.undeclare()
@@ -152,9 +152,10 @@ def test_a_trajectory_moves_the_arm(peer, states):
     )
 
     def is_there():
-        # Published until it is heard: a publisher's first message may be gone before the router knows of it.
+        # Published repeatedly, because a publisher's first message may be lost before the router has
+        # registered it.
         publisher.publish(header=header, joint_names=["joint1", "joint2"], points=[point])
-        # 0.01 rad: the rest that the integral leaves after some seconds is far less.
+        # 0.01 rad: the remaining error after some seconds is far smaller.
         return all(abs(a - b) < 0.01 for a, b in zip(states[-1].position, goal))
 
     wait_for("the arm at the setpoint", is_there)
@@ -194,34 +195,34 @@ def test_services_answer_and_say_what_is_wrong(peer):
         f"float64[] times\nfloat64[] positions\nfloat64[] velocities\n{outcome}",
     )
     response = run.call(function="2", x0=0.0, xdot0=0.0, dt=0.5, steps=2, integrator="rk4")
-    # 2 t^2 / 2, which Runge-Kutta has without an error.
+    # 2 t^2 / 2, for which Runge-Kutta is exact.
     assert list(response.positions) == [0.0, 0.25, 1.0], response
-    # Its response has no type inside, so that the SDK needs no definition that it would fetch.
+    # Its response has no inner type, so the SDK does not fetch a definition.
     types = peer.service(
         "/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", "string[] names", "uint8[] types"
     )
     response = types.call(names=["gravity", "masses", "nonsense"])
     assert list(response.types) == [3, 8, 0], response
-    # A type that has no place for a reason: the request fails.
+    # A type without a field for the reason: the request fails.
     kind = peer.service("/rosapi/topic_type", "rosapi_msgs/srv/TopicType", "string topic", "string type")
     assert kind.call(topic="/joint_states").type == "sensor_msgs/msg/JointState"
 
 
 def test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session):
-    """The request fails, at once, and the reason is in what the client logs."""
+    """The request fails at once, and the client logs the reason."""
     logged = []
     handler = logging.Handler(logging.ERROR)
     handler.emit = lambda record: logged.append(record.getMessage())
     logger = logging.getLogger("zenoh_ros2_sdk")
     told, logger.handlers = logger.handlers, [handler]
     hashed = next(token[11] for token in tokens(session, "SS") if token[9] == "%rosapi%message_details")
-    # The response's own fields need not be known: there is none.
+    # The response's fields need not be known, because there is no response.
     kind = ("rosapi_msgs/srv/MessageDetails", "string type", "string nothing", hashed)
     assert peer.service("/rosapi/message_details", *kind).call(type="nonsense/Nothing") is None
     logger.handlers = told
     assert any("type must name a type that this runtime knows" in line for line in logged), logged
     assert not any("timed out" in line for line in logged), logged
-    # So does a request that is cut off.
+    # A truncated request fails too.
     key = f"{DOMAIN}/rosapi/message_details/rosapi_msgs::srv::dds_::MessageDetails_/{hashed}"
     cut = next(iter(session.get(key, payload=b"\0\1\0\0\xff"))).err
     assert cut and cut.payload.to_string(), cut
@@ -230,9 +231,9 @@ def test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session):
 
 def test_the_router_comes_back(port, bridge, router, states):
     router.end()
-    bridge.said("has gone; looking for it")
+    bridge.said("lost the router at")
     router = start_router(f"tcp/127.0.0.1:{port}")
-    bridge.said("is here", times=2)
+    bridge.said("connected to the router at", times=2)
     session = open_session(port)
     wait_for("the node", lambda: [token for token in tokens(session, "NN") if token[8] == "arm_sim"])
     heard = []
@@ -267,7 +268,7 @@ def test_another_arm_has_its_namespace(address, port, session):
 
 
 def test_the_bridge_listens_nowhere(bridge):
-    """By what Linux tells of its sockets: two connections, to the arm and to the router, and nothing that waits."""
+    """Linux lists two connections, to the arm and to the router, and no listening socket."""
     folder = Path(f"/proc/{bridge.process.pid}")
     if not folder.exists():
         return
@@ -299,7 +300,7 @@ def main():
     began = time.monotonic()
     port, arm_port = free_port(), free_port()
     bridge = start_bridge(f"127.0.0.1:{arm_port}", port)
-    # Neither is there: the order in which the three start does not matter.
+    # Neither is running: the three programs may start in any order.
     bridge.said("no arm at")
     bridge.said("no router at")
     router = start_router(f"tcp/127.0.0.1:{port}")

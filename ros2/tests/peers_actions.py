@@ -1,4 +1,5 @@
-"""Actions of the bridge's, for peers.py: the SDK has no action client, so each is sent as its services and topics."""
+"""Actions of the bridge, for peers.py. The SDK has no action client, so each action is used through its services and
+topics."""
 
 from peers_stage import JAZZY, LATCHED, tokens
 from programs import wait_for
@@ -9,13 +10,13 @@ TIME = "builtin_interfaces/msg/Time"
 
 
 def definition(fields, **inside):
-    """A definition with the definitions of what is inside, as text."""
+    """A definition with those of its inner types, as text."""
     parts = ["=" * 80 + f"\nMSG: {name.replace('__', '/')}\n{text}" for name, text in inside.items()]
     return "\n".join([fields, *parts])
 
 
 def test_a_goal_is_sent_as_an_action(peer, session):
-    """Its services and subscriptions are one action. They take the hashes that the graph tells."""
+    """The services and subscriptions of one action, with the hashes in the graph."""
     import numpy
 
     place = "/ik_action/_action/"
@@ -93,7 +94,7 @@ def test_a_goal_is_sent_as_an_action(peer, session):
     assert all(len(one.feedback.positions) == 2 for one in mine), heard
     _, accepted = goal(2, 5.0, 5.0)
     assert not accepted, "five metres are out of reach"
-    # It does not end by itself, however late it is cancelled.
+    # It does not end by itself before it is cancelled.
     name, accepted = goal(3, -1.0, 0.5, success_hold=1e6)
     assert accepted
     everything = of["action_msgs/msg/GoalInfo"](goal_id=name, stamp=of[TIME](sec=0, nanosec=0))
@@ -106,7 +107,7 @@ def test_a_goal_is_sent_as_an_action(peer, session):
 
 
 def test_a_path_is_sent_as_an_action(peer, session, states):
-    """By the definition that ROS 2 has, with all that is for other robots left empty."""
+    """Uses ROS 2's definition. Fields for other robots are empty."""
     import numpy
 
     name = "control_msgs/action/FollowJointTrajectory"
@@ -208,7 +209,7 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     told = wait_for("feedback", lambda: [one.feedback for one in heard])
     for one in told:
         assert one.joint_names == ["joint1", "joint2"] and len(one.actual.positions) == 2, one
-        # For other robots; in CDR they are there all the same.
+        # These fields are for other robots, but CDR has them too.
         assert not one.multi_dof_joint_names and not one.multi_dof_error.transforms, one
     # A path ends within 0.05 rad of its goal, but perhaps not at rest. The goal above must be reached to 0.01 rad.
     wait_for("the end of the path", lambda: all(abs(a - b) < 0.01 for a, b in zip(states[-1].position, goal)))

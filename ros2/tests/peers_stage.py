@@ -1,4 +1,4 @@
-"""The stage of peers.py: the arm, the bridge, sessions on the router, and nodes of the SDK's."""
+"""Support for peers.py: the arm, the bridge, sessions on the router, and nodes of the SDK."""
 
 import socket
 import subprocess
@@ -19,8 +19,7 @@ kept_ports = []
 
 
 def free_port():
-    """A port that stays free for who is told of it: a socket of ours has it, does not listen, and lets those have it too
-    who ask for it by its number."""
+    """A reserved port: a socket here holds it without listening, and allows other sockets to use the same number."""
     one = socket.socket()
     one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     one.bind(("127.0.0.1", 0))
@@ -47,7 +46,7 @@ def open_session(port):
 
 
 def tokens(session, kind="*"):
-    """The tokens of that kind in the domain, taken apart: 8 is the node, 9 the name, 10 the type, 11 the hash."""
+    """The parts of the tokens of that kind in the domain: 8 is the node, 9 the name, 10 the type, 11 the hash."""
     replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**")
     return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok]
 
@@ -60,7 +59,7 @@ def command_line(port, *arguments):
 
 
 class Peer:
-    """Nodes of the SDK's."""
+    """Nodes of the SDK."""
 
     def __init__(self, port):
         self.at = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
@@ -78,6 +77,6 @@ class Peer:
         return ROS2Publisher(topic, name, **self.message(name))
 
     def service(self, name, kind, request, response, type_hash=None):
-        """A client that computes the type's hash from the definitions by itself, unless it is told."""
+        """A client that computes the type's hash from the definitions, unless the hash is given."""
         definitions = {"request_definition": request, "response_definition": response}
         return ROS2ServiceClient(name, kind, timeout=LIMIT, type_hash=type_hash, **definitions, **self.at)

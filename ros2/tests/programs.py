@@ -1,5 +1,5 @@
-"""Programs that tests start, what they say, and waiting for it. Every wait ends when what is waited for is there, or
-fails after a minute."""
+"""Programs that tests start, their output, and waiting for it. Every wait ends with its condition, or fails after a
+minute."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ def say(text):
 
 
 def wait_for(what, get):
-    """Waits until `get` gives something, and gives that."""
+    """Waits until `get` returns a value, and returns it."""
     deadline = time.monotonic() + LIMIT
     while not (found := get()):
         assert time.monotonic() < deadline, f"not within {LIMIT} s: {what}"
@@ -27,7 +27,7 @@ def wait_for(what, get):
 
 
 class Process:
-    """A program, and the lines that it says."""
+    """A program and its output lines."""
 
     all = []
 
@@ -44,7 +44,7 @@ class Process:
             self.lines.append(line.rstrip("\n"))
 
     def said(self, text, times=1):
-        """The last of so many lines with that text."""
+        """The last of this number of lines with that text."""
 
         def get():
             found = [line for line in self.lines if text in line]
@@ -70,7 +70,7 @@ def start_router(listen, *connect, before=()):
 
 
 def run(main):
-    """Runs `main`, ends all that was started, and ends; also when it is told to end."""
+    """Runs `main`, ends all started programs, and ends, also after SIGTERM."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("told to end"))
     try:
         main()
@@ -81,5 +81,5 @@ def run(main):
     for process in Process.all:
         process.kill()
     sys.stdout.flush()
-    # Zenoh's sessions would look for their routers for a long time.
+    # Zenoh's sessions would search their routers for a long time.
     os._exit(status)

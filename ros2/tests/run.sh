@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
-# the first time. It installs into the build folder. BENCH=1 measures instead, with a release build. BENCH=quick only tries
-# that the two hosts work.
+# Tests pendularm-ros2 with peers of other projects: run.sh ARM [BUILD_FOLDER]. It needs cargo, python3 and, the first
+# time, a network. It installs into the build folder. BENCH=1 measures instead, with a release build. BENCH=quick only
+# checks that the two hosts work.
 set -euo pipefail
 program=$(realpath "$1")
 target=$(realpath -m "${2:-target/ros2}")
 cd "$(dirname "$0")/.."
 environment=$target/peers
 
-# Python packages of ROS 2 Jazzy itself; each names all that it needs.
+# Python packages of ROS 2 Jazzy. Each lists its dependencies.
 has_jazzy() {
     "$environment/bin/python" -c 'import platform, sys
 sys.exit(not (platform.machine() == "x86_64" and (3, 11) <= sys.version_info < (3, 14)))'

@@ -1,7 +1,7 @@
 """Watchers of `/joint_states`: watchers.py graph ROUTER KEY COUNT, or watchers.py arm HOST:PORT.
 
-Through the graph each watcher has a Zenoh session of its own; at the arm it is a client of its own protocol. Lines on
-standard input ask: `begin` forgets what was heard, `read` tells it.
+In the graph each watcher has its own Zenoh session. At the arm it is a rosbridge client. Lines on standard input are
+commands: `begin` discards the received messages, `read` prints them.
 """
 
 import json
@@ -16,7 +16,7 @@ MOST_ROWS = 20_000
 
 
 class Watcher:
-    """What one of them has heard."""
+    """The messages of one watcher."""
 
     def __init__(self, keeps_rows):
         self.keeps_rows = keeps_rows
@@ -26,7 +26,8 @@ class Watcher:
     def begin(self):
         with self.lock:
             self.count, self.missing, self.first, self.last_number = 0, 0, None, None
-            # The arm's stamp, when the bridge sent it, when it came; all in nanoseconds.
+            # The arm's stamp, the time of sending by the bridge, and the time of arrival, all in
+            # nanoseconds.
             self.rows = []
 
     def hear(self, number, stamp, sent):
@@ -58,7 +59,7 @@ def watch_graph(router, key, count):
 
         def hear(sample, watcher=watcher):
             number, sent = struct.unpack_from("<qq", sample.attachment.to_bytes())
-            # Behind four bytes that say how it is written, the message begins with its stamp.
+            # After four bytes for the encoding, the message begins with its stamp.
             seconds, nanoseconds = struct.unpack_from("<iI", sample.payload.to_bytes(), 4)
             watcher.hear(number, seconds * 10**9 + nanoseconds, sent)
 

@@ -1,5 +1,5 @@
-//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and route messages.
-//! Operations of clients are read, and answers written, beside them.
+//! The nodes: one actix actor each, connected by typed messages. They call `math` and route
+//! messages. Other modules read clients' operations and write answers.
 //!
 //! ```text
 //!              accepts                 Request, Disconnect              Call of a question, SetSetpoint, Interest
@@ -8,12 +8,12 @@
 //!                            └──────────────────────────────┘ └──────────────────────────────────────── nodes
 //! ```
 //!
-//! There is a connection for each client, and one of everything else. The nodes are `arm_sim` on a thread of its own,
+//! There is a connection for each client, and one of every other actor. The nodes are `arm_sim` on its own thread,
 //! `ik`, `ik_action`, `ik_trial`, `follow`, `rosapi`, `parameters`, `rosout`, `tf_web` and `recorder`. The pool of
 //! workers does the work of `integration` and `study`.
 //!
-//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
-//! or from another node; the [`node::Reply`] knows the way back.
+//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, through the question's reader, or
+//! from another node. The [`node::Reply`] is the way back.
 //!
 //! The documentation of each message gives its meaning and its sender. The drawing in `ARCHITECTURE.md` has all of
 //! them.
@@ -34,6 +34,6 @@ pub mod runtime;
 pub mod signals;
 pub mod wire;
 
-/// Names one client connection for as long as the process lives; never reused.
+/// Identifies one client connection during the life of the process. It is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ConnectionId(pub u64);

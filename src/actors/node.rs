@@ -1,10 +1,10 @@
-//! The language of the nodes: questions with their one answer, messages on topics, interest.
+//! The messages of the nodes: questions with one answer, messages on topics, interest.
 //!
 //! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. The asker,
 //! a client or another node, is behind the [`Reply`].
 //!
-//! **Invariant:** every [`Call`] is answered exactly once, even if the node that has it fails: a [`Reply`] that
-//! is dropped unanswered answers with an error.
+//! **Invariant:** every [`Call`] is answered exactly once, even if its node fails: a [`Reply`] that is dropped
+//! unanswered sends an error.
 
 use std::sync::Arc;
 
@@ -22,10 +22,10 @@ pub use crate::services::Ask;
 
 // ---- questions ------------------------------------------------------------------------------------------------------
 
-/// A question on its way to the node that serves it, answered through `reply`.
+/// A question for the node that serves it, answered through `reply`.
 ///
-/// actix's own answers come back by a way of their own. A client's answer has to stay behind the messages that the node
-/// has published before it, so it takes the way that they take, to the registry.
+/// actix's own answers have a separate path. A client's answer must follow the messages that the node has published
+/// before, so it takes their path through the registry.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Call<A: Ask> {
@@ -35,59 +35,59 @@ pub struct Call<A: Ask> {
     pub reply: Reply<A::Answer>,
 }
 
-/// The end, and the reason for it: calls that wait are refused, goals aborted. From the runtime, once the registry lets
-/// nothing more through.
+/// The end, with its reason: waiting calls are refused, goals aborted. From the runtime, once the registry forwards
+/// nothing more.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct ShutDown(pub &'static str);
 
-/// Why a question has no answer. Its effect has not happened, and will not.
+/// Why a question has no answer. It has had no effect, and will have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unserved {
     /// The node dropped it.
     #[error("the node that serves this ended before it answered")]
     Ended,
-    /// Another node, which that one had to ask, is gone.
+    /// Another node that was needed has ended.
     #[error("{0} does not answer")]
     NoAnswer(
         /// Its name.
         &'static str,
     ),
-    /// Nobody waits for the answer.
+    /// The caller has disconnected.
     #[error("the caller is gone")]
     CallerGone,
-    /// Too many questions wait, or none is taken.
+    /// Too many questions wait, or none is accepted.
     #[error("{0}")]
     Refused(
-        /// Why.
+        /// The reason.
         &'static str,
     ),
 }
 
-/// A guard of an op that has yet to take effect: a call, a goal, or a message on its way to its subscribers. The
+/// A guard of an op that has not yet taken effect: a call, a goal, or a message for its subscribers. The
 /// connection reads the client's next frame once the last clone is dropped.
 pub type Done = Arc<oneshot::Sender<()>>;
 
-/// A guard, and the receiver that ends with its last clone.
+/// A guard, and a receiver that ends with its last clone.
 #[must_use]
 pub fn guard() -> (Done, oneshot::Receiver<()>) {
     let (done, ended) = oneshot::channel();
     (Arc::new(done), ended)
 }
 
-/// An answer of megabytes, which is written piece by piece.
+/// An answer of megabytes, written in pieces.
 pub trait Pieces: Send {
-    /// Writes a piece; true once that was the last and the answer is on its way.
+    /// Writes a piece. Returns `true` after the last one, when the answer has been sent.
     fn advance(&mut self) -> bool;
 
-    /// Says that there is no answer after all.
+    /// Sends the error that there is no answer.
     fn refuse(&mut self, why: Unserved);
 
-    /// True once nobody waits for the answer any more.
+    /// Whether the caller has disconnected.
     fn is_gone(&self) -> bool;
 }
 
-/// An answer that needs no writing: it has been given.
+/// An answer that needs no writing and has been sent.
 struct AlreadyGiven;
 
 impl Pieces for AlreadyGiven {
@@ -104,49 +104,49 @@ impl Pieces for AlreadyGiven {
 
 /// The asker.
 pub trait Asker<T>: Send {
-    /// Takes the one answer. The news of the call's end, where it is there, travels with it.
+    /// Sends the one answer. The guard of the call, if there is one, is sent with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Takes an answer of megabytes, which is written by its receiver.
+    /// Sends an answer of megabytes, which its receiver writes.
     fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
         self.answer(Ok(answer), None);
         Box::new(AlreadyGiven)
     }
 
-    /// The client that asked; none if it was a node.
+    /// The client that sent the question; `None` if it was a node.
     fn client(&self) -> Option<ConnectionId> {
         None
     }
 
-    /// True once nobody waits for the answer any more.
+    /// Whether the caller has disconnected.
     fn is_gone(&self) -> bool {
         false
     }
 
-    /// Hears, before the answer, why what it asked for has no effect yet. A node finds that in the answer.
+    /// Sends, before the answer, the reason why the request has no effect yet. For a node this is in the answer.
     fn warn(&self, _why: &str) {}
 
-    /// Takes room for an answer of at most `bytes` bytes before it is computed.
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed.
     ///
     /// # Errors
-    /// While there is none.
+    /// While there is not enough.
     fn reserve(&mut self, _bytes: usize) -> Result<(), NoRoom> {
         Ok(())
     }
 }
 
-/// The way back to the asker: one answer, then the end of the call.
+/// The way back to the caller: one answer, then the end of the call.
 ///
-/// A client that called is read no further until this value is dropped. So a call that has effects after its
-/// answer (a goal's setpoint) has had them before the client's next request is looked at.
+/// The client's next frame is read only after this value is dropped. So effects after the answer (a goal's
+/// setpoint) precede the client's next request.
 pub struct Reply<T> {
-    /// None once the answer has been given.
+    /// `None` once the answer has been sent.
     asker: Option<Box<dyn Asker<T>>>,
     done: Option<Done>,
 }
 
 impl<T> Reply<T> {
-    /// A reply to `asker`; `done` is dropped with it.
+    /// A reply to `asker`. `done` is dropped with it.
     #[must_use]
     pub fn new(asker: impl Asker<T> + 'static, done: Option<Done>) -> Self {
         Self {
@@ -155,22 +155,22 @@ impl<T> Reply<T> {
         }
     }
 
-    /// The client that asked; none if it was a node.
+    /// The client that sent the question; `None` if it was a node.
     #[must_use]
     pub fn client(&self) -> Option<ConnectionId> {
         self.asker.as_ref().and_then(|asker| asker.client())
     }
 
-    /// True once nobody waits for the answer any more.
+    /// Whether the caller has disconnected.
     #[must_use]
     pub fn caller_is_gone(&self) -> bool {
         self.asker.as_ref().is_some_and(|asker| asker.is_gone())
     }
 
-    /// Takes room for an answer of at most `bytes` bytes before it is computed. Small ones need none to be taken.
+    /// Reserves memory for an answer of at most `bytes` bytes before it is computed. Short answers need no reservation.
     ///
     /// # Errors
-    /// While there is none.
+    /// While there is not enough.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
         match &mut self.asker {
             Some(asker) => asker.reserve(bytes),
@@ -178,25 +178,25 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Tells a client by a status, before the answer, why what it asked for has no effect yet.
+    /// Sends a client a status, before the answer, with the reason why the request has no effect yet.
     pub fn warn(&self, why: &str) {
         if let Some(asker) = &self.asker {
             asker.warn(why);
         }
     }
 
-    /// Answers and ends the call: all its effects have been had. One message carries both.
+    /// Answers and ends the call, after all its effects. One message has both.
     pub fn conclude(mut self, answer: T) {
         let done = self.done.take();
         self.send(Ok(answer), done);
     }
 
-    /// Answers; the call ends when this is dropped.
+    /// Answers. The call ends when this value is dropped.
     pub fn answer(&mut self, answer: T) {
         self.send(Ok(answer), None);
     }
 
-    /// Answers with something long, which is given once the caller of this has written its pieces.
+    /// Begins a long answer. It is sent after the caller of this function has written its pieces.
     #[must_use]
     pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
         match self.take() {
@@ -205,7 +205,7 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Says that there is no answer.
+    /// Sends the error that there is no answer.
     pub fn refuse(&mut self, why: Unserved) {
         self.send(Err(why), None);
     }
@@ -233,7 +233,7 @@ impl<T> Drop for Reply<T> {
 
 impl<T: Send> Asker<T> for oneshot::Sender<Result<T, Unserved>> {
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
-        // Nobody may be waiting any more.
+        // The caller may have disconnected.
         let _ = self.send(answer);
     }
 
@@ -242,7 +242,7 @@ impl<T: Send> Asker<T> for oneshot::Sender<Result<T, Unserved>> {
     }
 }
 
-/// Asks another node.
+/// Sends a question to another node.
 ///
 /// # Errors
 /// If it does not answer.
@@ -258,20 +258,20 @@ pub fn ask<A: Ask>(
 
 // ---- between the registry and the nodes -----------------------------------------------------------------------------
 
-/// Whether anybody subscribes to a topic that the node publishes. From the registry, at every change.
+/// Whether a topic of the node has subscribers. From the registry, at every change.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Interest {
     /// The topic.
     pub topic: Topic,
-    /// True from the first subscriber until the last one is gone.
+    /// True while there is a subscriber.
     pub wanted: bool,
 }
 
-/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has
-/// not.
+/// A frame for clients, written already or to be written by the registry. So the arm's thread does not have to
+/// write it.
 pub enum FrameOut {
-    /// The frame as it goes out.
+    /// The encoded frame.
     Written(Bytes),
     /// Writes it.
     Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
@@ -284,7 +284,7 @@ impl FrameOut {
         Self::Unwritten(Box::new(write))
     }
 
-    /// The frame as it goes out.
+    /// The encoded frame.
     #[must_use]
     pub fn write(self) -> Bytes {
         match self {
@@ -311,7 +311,7 @@ pub struct Publish {
 }
 
 impl Publish {
-    /// The message that `make` makes; it is made and written by the registry.
+    /// The message of `make`, which the registry calls and encodes.
     #[must_use]
     pub fn made<M: Serialize>(topic: Topic, make: impl FnOnce() -> M + Send + 'static) -> Self {
         let frame = FrameOut::unwritten(move || messages::publish(topic.name(), &make()));
@@ -327,22 +327,22 @@ pub struct Respond {
     pub connection: ConnectionId,
     /// The whole frame.
     pub frame: FrameOut,
-    /// The service that it answers, if it is the runtime's own.
+    /// The answered service, if it is the runtime's own.
     pub service: Option<Service>,
-    /// The level, if it is a status: sent only if the client wants such.
+    /// The level, if it is a status. It is sent only to clients that selected this level.
     pub status: Option<Level>,
-    /// Dropped once the frame is on its way, where that is also the end of the call.
+    /// Dropped once the frame is sent, if that is also the end of the call.
     pub done: Option<Done>,
 }
 
 impl Respond {
-    /// An error status that says why; `id` is that of the frame at fault.
+    /// An error status with the reason. `id` is that of the faulty frame.
     #[must_use]
     pub fn error(connection: ConnectionId, why: &str, id: Option<&Payload>) -> Self {
         Self::status(connection, Level::Error, why, id)
     }
 
-    /// A status of this level; `id` is that of the frame that it is about.
+    /// A status of this level. `id` is that of its frame.
     #[must_use]
     pub fn status(connection: ConnectionId, level: Level, msg: &str, id: Option<&Payload>) -> Self {
         let (msg, id) = (msg.to_owned(), id.cloned());
@@ -357,8 +357,7 @@ impl Respond {
     }
 }
 
-/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the
-/// goal.
+/// Feedback of a goal for the client that sent it. It may be dropped for a slow client. From the node of the goal.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Feedback {

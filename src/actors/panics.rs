@@ -1,10 +1,10 @@
-//! The end of a panic: it ends one client or computation, or the process.
+//! Containment of panics: a panic ends one client or computation, or the process.
 //!
-//! No input is known to cause one. Should one happen all the same: in what serves one client it ends that client, in a
-//! computation that computation. Anywhere else, in a node or the registry, others would wait for ever. There the
-//! process ends at once, with one line that names the place, so that its supervisor can start it again.
+//! No input is known to cause a panic. A panic while serving one client ends that client, and a panic in a computation
+//! ends that computation. Anywhere else, in a node or the registry, clients would wait for ever. There the process
+//! ends at once, with one line that names the place, so a supervisor can restart it.
 //!
-//! **Invariant:** a panic is contained by the caller of [`contain`], or it is the last thing that the process does.
+//! **Invariant:** a caller of [`contain`] contains a panic, or the process ends.
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Write as _;
@@ -17,19 +17,18 @@ use std::task::{Context, Poll};
 const MAX_WORDS: usize = 200;
 
 thread_local! {
-    /// How many calls of `contain` are under way on this thread.
+    /// The number of active calls of `contain` on this thread.
     static CONTAINED: Cell<usize> = const { Cell::new(0) };
-    /// The last panic on this thread that was contained.
+    /// The last contained panic on this thread.
     static LAST: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// A panic that was contained; reads as where it happened and its own words.
+/// A contained panic. Its text has the place and the message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Contained(String);
 
-/// From now on a panic that nothing contains is passed to `end`, on the thread where it happened; `end` should not
-/// return.
+/// From now on a panic that is not contained is passed to `end`, on its thread. `end` should not return.
 pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     set_hook(Box::new(move |info| {
         let what = describe(info);
@@ -41,7 +40,7 @@ pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     }));
 }
 
-/// Does `work`, and survives its panic. The subject of the panic must not be used afterwards.
+/// Runs `work` and catches its panic. Values that `work` has changed must not be used after a panic.
 ///
 /// # Errors
 /// The panic.
@@ -52,7 +51,7 @@ pub fn contain<T>(work: impl FnOnce() -> T) -> Result<T, Contained> {
     outcome.map_err(|_| Contained(LAST.with_borrow_mut(std::mem::take)))
 }
 
-/// The same for a task: each of its turns is contained.
+/// The same for a task: each poll is contained.
 #[must_use]
 pub fn contained<F: Future>(task: F) -> Contain<F> {
     Contain(Box::pin(task))
@@ -73,7 +72,7 @@ impl<F: Future> Future for Contain<F> {
     }
 }
 
-/// One line: where, and the panic's own words, escaped and cut.
+/// One line: the place and the panic's message, escaped and shortened.
 fn describe(info: &PanicHookInfo<'_>) -> String {
     let mut line = String::from("panicked");
     // Writing to a `String` cannot fail.

@@ -1,9 +1,8 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes, one for the arm, a few
-//! workers for heavy requests, and one that waits for signals. The gateway starts a few more for its long work, and the
-//! log and a record have one each. The only place that decides which thread a node is on, and that looks at the number
-//! of links.
+//! workers for long requests, and one that waits for signals. The gateway starts a few more for its long work. The log
+//! and a record have one each. Only this file chooses the thread of a node and depends on the number of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
@@ -56,22 +55,22 @@ use crate::{
 
 /// Most threads for long work of the gateway.
 const THREADS_ASIDE: usize = 4;
-/// Longer than any program runs.
+/// A time longer than any run of the program.
 const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
-/// The answer to waiting calls when the runtime ends.
+/// The reason for waiting calls when the runtime ends.
 const SHUTTING_DOWN: &str = "shutting down";
-/// How long computations may take to answer that they were refused, and outboxes to empty, when the runtime ends:
-/// together well within the second that a signal is given.
+/// Time for refused computations to answer, and for outboxes to empty, when the runtime ends: together well below
+/// the second after a signal.
 const ANSWER_TIME: Duration = Duration::from_millis(250);
 const FLUSH_TIME: Duration = Duration::from_millis(400);
-/// How long the end of a record may take when the runtime ends.
+/// Longest time for the end of a record when the runtime ends.
 #[cfg(feature = "record")]
 const RECORD_TIME: Duration = Duration::from_millis(250);
 
 /// Why the runtime could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The address can't be listened on.
+    /// The runtime cannot listen on the address.
     #[error("cannot listen on {address}: {}", unbound::remedy(source))]
     Bind {
         /// The address.
@@ -79,21 +78,21 @@ pub enum RunError {
         /// The operating system's reason.
         source: std::io::Error,
     },
-    /// The run can't be recorded.
+    /// The run cannot be recorded.
     #[cfg(feature = "record")]
     #[error("cannot record: {0}")]
     Record(#[from] NotRecorded),
-    /// A thread or a signal handler was refused.
+    /// The system refused a thread or a signal handler.
     #[error("cannot start: {0}")]
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until a signal ends it. Should the end that it asks for take too long, `last_resort` is called, on
-/// another thread; it should not return. It is boxed because a generic runtime would be compiled anew, with all of its
-/// actors, in every crate that runs one.
+/// Serves clients until a signal ends it. If an orderly end takes too long, `last_resort` is called on another thread,
+/// and should not return. It is boxed, because a generic runtime would be compiled again, with all its actors, in
+/// every crate that runs one.
 ///
 /// # Errors
-/// If the port can't be bound, or the operating system refuses a thread or a signal handler.
+/// If the port cannot be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
     let tokio = Builder::new_current_thread()
@@ -103,12 +102,12 @@ pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(
         .thread_keep_alive(FOR_EVER)
         .build()?;
     start_threads_aside(&tokio)?;
-    // Answers that clients were owed are dropped here, which is part of the end.
+    // Remaining answers are dropped here, as part of the end.
     System::with_tokio_rt(move || tokio).block_on(serve(options, &mut signals))
 }
 
-/// Starts the threads for long work of the gateway, all at once: as many as there will be, and none ends. Where the
-/// system refuses a further one, work waits for those that there are.
+/// Starts all threads for long work of the gateway at once. None of them ends. If the system refuses one, work uses
+/// the threads that exist.
 fn start_threads_aside(tokio: &Runtime) -> std::io::Result<()> {
     let all_are_busy = Arc::new(Mutex::new(()));
     let _until_all_are_there = all_are_busy.lock();
@@ -133,7 +132,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         .serving_at_most(room.clients)
         .start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
-    // The arm has no sockets: without them its thread sleeps on a lock instead of a poll, and wakes sooner.
+    // The arm has no sockets, so its thread sleeps on a lock instead of a poll, and wakes faster.
     let arm_thread =
         Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
@@ -153,7 +152,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     );
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
-    // The registry lives as long as this function: it can't be gone.
+    // The registry lives as long as this function.
     let _ = registry.send(Attach(nodes)).await;
     #[cfg(feature = "record")]
     ends.record(options).await?;
@@ -208,9 +207,9 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
     }
 }
 
-/// The channels that tell the nodes of an arm about the end.
+/// The channels that inform the nodes of an arm of the end.
 struct NodeEnds {
-    /// The nodes that have something under way for clients.
+    /// The nodes with running work for clients.
     busy: Vec<Recipient<ShutDown>>,
     #[cfg(feature = "record")]
     record: Recipient<RecordTo>,
@@ -220,12 +219,12 @@ struct NodeEnds {
 
 #[cfg(feature = "record")]
 impl NodeEnds {
-    /// Begins the record that was asked for, and sees to it that clients can have theirs.
+    /// Starts the requested record, and the recorder for clients' records.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
         let folder = options.record.folder.as_deref();
         folder.map(recorder::look_into).transpose()?;
         if let Some(file) = &options.record.file
-            // The recorder lives as long as the registry: it can't be gone.
+            // The recorder lives as long as the registry.
             && let Ok(begun) = self.record.send(RecordTo(file.clone())).await
         {
             begun?;
@@ -243,7 +242,7 @@ impl NodeEnds {
     }
 }
 
-/// The arm and the nodes that know its number of links.
+/// The arm and the nodes that depend on its number of links.
 fn start_nodes<const N: usize>(
     options: &Options,
     seed: u64,
@@ -319,7 +318,7 @@ where
     }
 }
 
-/// The address asked for; for the default one also its IPv6 twin, where that is to be had.
+/// The requested address. For the default one also its IPv6 counterpart, if it is available.
 fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
     let address = options.bind;
     let first = listener::bind(address).map_err(|source| RunError::Bind { address, source })?;
@@ -334,7 +333,8 @@ fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
     Ok(sockets)
 }
 
-/// Prints the one line on standard output. A full pipe would block, so a thread does it that nothing waits for.
+/// Prints the one line on standard output. A full pipe would block, so a separate thread prints it, and no
+/// thread waits for that.
 fn announce(address: SocketAddr) {
     let print = move || {
         let mut stdout = std::io::stdout();
@@ -350,7 +350,7 @@ fn announce(address: SocketAddr) {
     tracing::info!(%address, "serving rosbridge clients");
 }
 
-/// Says at which address a browser finds the page. The token is not for the log.
+/// Logs the address of the page for browsers, without the token.
 #[cfg(feature = "web")]
 fn announce_page(address: SocketAddr, asks_token: bool) {
     let host = if address.ip().is_unspecified() {

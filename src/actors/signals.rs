@@ -1,9 +1,9 @@
-//! Signals, awaited on a thread that does nothing else, so that no other thread delays them.
+//! Signals, awaited on a separate thread, so no other thread delays them.
 //!
-//! An orderly end answers what waits, and asks every thread to take part. One that is busy with what a client has sent
-//! might not in time: then the last resort ends the process all the same.
+//! An orderly end answers waiting calls, and needs every thread. If a busy thread does not respond in time, the last
+//! resort ends the process.
 //!
-//! **Invariant:** from a signal on the process lives for [`LAST_RESORT`] at most.
+//! **Invariant:** after a signal the process lives for at most [`LAST_RESORT`].
 
 use std::future::poll_fn;
 use std::io;
@@ -21,19 +21,17 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::signal::windows;
 use tokio::sync::oneshot;
 
-/// How long an orderly end may take: all of the second that a signal is given, but for what the log and the process
-/// itself need.
+/// Longest time of an orderly end: one second, minus the time for the log and the end of the process.
 pub const LAST_RESORT: Duration = Duration::from_millis(850);
 
-/// A request that has come, by name; or the task is woken when one does.
+/// The name of the request that has arrived; otherwise the task is woken when one arrives.
 type Arrivals = Box<dyn FnMut(&mut Context<'_>) -> Poll<&'static str> + Send>;
 
-/// Requests to end. They count even if the program was started with them ignored, as a shell starts jobs in the
-/// background.
+/// Requests to end. They apply even if they were ignored at the start, as in a shell's background jobs.
 #[cfg(unix)]
 const REQUESTS: [(&str, Signal); 2] = [("SIGINT", Signal::INT), ("SIGTERM", Signal::TERM)];
-/// Further signals that end a process by default. They end the program in order, unless it was started with them
-/// ignored, as `nohup` starts a program. SIGABRT is not among them, because it asks for a core dump.
+/// Further signals that end a process by default. They end the program in order, unless they were ignored at the
+/// start, as with `nohup`. SIGABRT is not among them, because it asks for a core dump.
 #[cfg(unix)]
 const FATAL: &[(&str, Signal)] = &[
     ("SIGHUP", Signal::HUP),
@@ -52,8 +50,8 @@ const FATAL: &[(&str, Signal)] = &[
     ("SIGSTKFLT", Signal::STKFLT),
 ];
 
-/// From now on a write beyond the limit of file sizes (`ulimit -f`) fails like one to a full disk. By default SIGXFSZ
-/// kills the process.
+/// From now on a write beyond the limit of file sizes (`ulimit -f`) fails like a write to a full disk. By default
+/// SIGXFSZ kills the process.
 ///
 /// # Errors
 /// If the operating system refuses the signal handler.
@@ -61,7 +59,7 @@ const FATAL: &[(&str, Signal)] = &[
 pub fn survive_file_size_limit() -> io::Result<()> {
     let runtime = runtime()?;
     let _entered = runtime.enter();
-    // The handler stays for as long as the process lives.
+    // The handler exists as long as the process.
     signal(SignalKind::from_raw(Signal::XFSZ.as_raw())).map(drop)
 }
 
@@ -69,7 +67,7 @@ fn runtime() -> io::Result<Runtime> {
     Builder::new_current_thread().enable_all().build()
 }
 
-/// The fatal signals that the program was not started with ignored.
+/// The fatal signals that were not ignored at the start.
 #[cfg(unix)]
 fn further() -> impl Iterator<Item = (&'static str, Signal)> {
     let ignored = ignored_at_start();
@@ -77,7 +75,7 @@ fn further() -> impl Iterator<Item = (&'static str, Signal)> {
     FATAL.iter().copied().filter(move |(_, one)| is_heard(*one))
 }
 
-/// The signals of this process, from now on. It needs a runtime of Tokio's.
+/// The signals of this process from now on. It needs a Tokio runtime.
 #[cfg(unix)]
 fn arrivals() -> io::Result<Vec<Arrivals>> {
     let all = REQUESTS.into_iter().chain(further());
@@ -89,7 +87,7 @@ fn arrivals() -> io::Result<Vec<Arrivals>> {
     .collect()
 }
 
-/// The events of a console that end a process by default, from now on. It needs a runtime of Tokio's.
+/// The console events that end a process by default, from now on. It needs a Tokio runtime.
 #[cfg(windows)]
 fn arrivals() -> io::Result<Vec<Arrivals>> {
     let mut ctrl_c = windows::ctrl_c()?;
@@ -104,7 +102,7 @@ fn arrivals() -> io::Result<Vec<Arrivals>> {
     ])
 }
 
-/// The signals that the program was started with ignored, a bit for each. Only Linux says.
+/// The signals that were ignored at the start, one bit each. Only Linux provides this.
 #[cfg(unix)]
 fn ignored_at_start() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -115,17 +113,16 @@ fn ignored_at_start() -> u64 {
     mask.unwrap_or_default()
 }
 
-/// The signals of this process, as long as this value lives.
+/// Handles the signals of this process while this value exists.
 pub(super) struct Signals {
-    /// Comes when a signal does.
+    /// Receives a signal.
     pub(super) came: oneshot::Receiver<()>,
-    /// Dropped by an orderly end, which makes the last resort needless.
+    /// An orderly end drops this, and so cancels the last resort.
     _orderly: mpsc::Sender<()>,
 }
 
 impl Signals {
-    /// From now on signals are heard. `last_resort` is called if the end that one asks for takes too long; it should
-    /// not return.
+    /// Handles signals from now on. `last_resort` is called if an orderly end takes too long, and should not return.
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.
@@ -142,7 +139,7 @@ impl Signals {
                 let mut all = arrivals.iter_mut().map(|poll| poll(cx));
                 all.find(Poll::is_ready).unwrap_or(Poll::Pending)
             }));
-            // Nobody hears it if the runtime has ended by itself.
+            // There is no receiver if the runtime has already ended.
             let _ = come.send(());
             tracing::info!("{name}: shutting down");
             if let Err(mpsc::RecvTimeoutError::Timeout) = has_ended.recv_timeout(LAST_RESORT) {
@@ -167,7 +164,7 @@ mod tests {
         rustix::process::kill_process(rustix::process::getpid(), one).unwrap();
     }
 
-    /// One test, since a signal is for the whole process. A shell may have started it with SIGHUP ignored.
+    /// This is one test, because a signal is for the whole process. A shell may have started it with SIGHUP ignored.
     #[test]
     fn who_does_not_end_in_time_is_ended_and_nobody_else() {
         for (name, one) in REQUESTS.into_iter().chain(further().next()) {

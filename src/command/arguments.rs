@@ -1,7 +1,7 @@
 //! Values in JSON or YAML on the command line, read as JSON and checked against their type.
 //!
-//! **Invariant:** a value is nested no deeper than the runtime takes. A type that the runtime does not know may have
-//! any field.
+//! **Invariant:** a value is nested at most as deep as the runtime accepts. A type that the runtime does not know
+//! may have any field.
 
 use std::str::Chars;
 
@@ -16,11 +16,11 @@ use super::output::{CommandError, plain};
 use super::session::Session;
 use crate::protocol::limits::MAX_NESTING;
 
-/// The refusal of a value that came in several words.
+/// The refusal of a value in several arguments.
 pub(crate) const UNQUOTED: &str = "\
     an argument in YAML or JSON came as several words: put quotes around all of it, such as '{data: true}'";
 
-/// Fields of ROS 1 that the runtime reads too, behind their types.
+/// Fields of ROS 1 that the runtime also reads, after their types.
 const ROS_1: [(&str, &str); 5] = [
     ("builtin_interfaces/Duration", "nsecs"),
     ("builtin_interfaces/Duration", "secs"),
@@ -29,13 +29,13 @@ const ROS_1: [(&str, &str); 5] = [
     ("std_msgs/Header", "seq"),
 ];
 
-/// A type, and a value of that type; either may be left out.
+/// A type and a value of that type, both optional.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct TypedValue {
-    /// Its type, as pkg/Name; it need not be given, and is checked if it is
+    /// Its type, as pkg/Name; optional, and checked if given
     #[arg(value_name = "TYPE")]
     type_name: Option<String>,
-    /// The value, in JSON or YAML; without one it is {}
+    /// The value, in JSON or YAML; {} by default
     value: Option<String>,
 }
 
@@ -58,9 +58,9 @@ impl TypedValue {
 /// Reads a value in JSON or YAML.
 ///
 /// # Errors
-/// [`CommandError::Usage`] with the reader's complaint.
+/// [`CommandError::Usage`] with the reader's message.
 pub fn read(text: &str) -> Result<Value, CommandError> {
-    // JSON has a reader of its own: in YAML a pair of `\u` escapes is no character.
+    // JSON has its own reader, because in YAML a pair of `\u` escapes is not one character.
     serde_json::from_str(text).or_else(|_| {
         read_yaml(&mut Parser::new_from_str(text)).map_err(|why| {
             let why = plain(&why);
@@ -86,7 +86,7 @@ fn read_yaml(events: &mut Events<'_>) -> Result<Value, String> {
     next(events)?;
     match next(events)? {
         Event::StreamEnd => Ok(value),
-        _ => Err("it is more than one document".to_owned()),
+        _ => Err("it must be one document, not several".to_owned()),
     }
 }
 
@@ -113,13 +113,13 @@ fn read_node(events: &mut Events<'_>, first: Event, depth: usize) -> Result<Valu
                 let name = match next(events)? {
                     Event::MappingEnd => return Ok(members.into()),
                     Event::Scalar(name, ..) => name,
-                    _ => return Err("the name of a member is no text".to_owned()),
+                    _ => return Err("the name of a member must be a text".to_owned()),
                 };
                 let member = next(events)?;
                 members.insert(name, read_node(events, member, depth + 1)?);
             }
         }
-        _ => Err("an alias (*name) or a tag (!name) is not taken".to_owned()),
+        _ => Err("aliases (*name) and tags (!name) are not supported".to_owned()),
     }
 }
 
@@ -130,14 +130,14 @@ fn read_plain(text: String) -> Result<Value, String> {
         Yaml::Integer(value) => value.into(),
         number @ Yaml::Real(_) => {
             let number = number.as_f64().filter(|number| number.is_finite());
-            let refusal = || format!("{text} is no number of JSON");
+            let refusal = || format!("{text} is not a JSON number");
             number.ok_or_else(refusal)?.into()
         }
         _ => text.into(),
     })
 }
 
-/// A type as the runtime lays it out, field by field.
+/// The fields of a type, from the runtime.
 #[derive(Deserialize)]
 struct Layout {
     #[serde(rename = "type")]
@@ -147,7 +147,8 @@ struct Layout {
 }
 
 impl Session {
-    /// Refuses a `value` for `name` that has fields which its type, as `question` of rosapi lays it out, does not have.
+    /// Refuses a `value` for `name` with fields that its type does not have. `question` is rosapi's service for the
+    /// type.
     pub(super) async fn check_fields(
         &mut self,
         name: &str,
@@ -164,7 +165,7 @@ impl Session {
             return Ok(());
         };
         let checked = match value {
-            // A list has the values of all fields, in their order.
+            // A list has the values of all fields in order.
             Value::Array(items) => {
                 let named = layout.fieldnames.iter().cloned().zip(items.iter().cloned());
                 check(&layouts, &layout.name, &Value::Object(named.collect()), "")
@@ -175,7 +176,7 @@ impl Session {
     }
 }
 
-/// Refuses the first field in `value`, which stands at `path`, that its type does not have.
+/// Refuses the first field in `value`, at `path`, that its type does not have.
 fn check(layouts: &[Layout], kind: &str, value: &Value, path: &str) -> Result<(), String> {
     let Some(layout) = layouts.iter().find(|one| one.name == kind) else {
         return Ok(());
@@ -199,18 +200,18 @@ fn check(layouts: &[Layout], kind: &str, value: &Value, path: &str) -> Result<()
 }
 
 impl Layout {
-    /// The refusal of a field. In YAML, a name and a value without a space between them are one name.
+    /// The refusal of a field. In YAML, a name and a value without a space after the colon are one name.
     fn lacks(&self, name: &str, path: &str) -> String {
         let fields = match self.fieldnames.is_empty() {
             true => "none".to_owned(),
             false => self.fieldnames.join(", "),
         };
         let path = path.trim_start_matches('.');
-        let refusal = format!("no field {path:?}; it has {fields}");
+        let refusal = format!("unknown field {path:?}; known fields: {fields}");
         match name.split_once(':') {
             Some((name, value)) => {
                 let value = value.trim();
-                format!("{refusal}. There must be a space behind the colon: {{{name}: {value}}}")
+                format!("{refusal}. Put a space after the colon: {{{name}: {value}}}")
             }
             None => refusal,
         }

@@ -1,6 +1,6 @@
 //! `pendularm service call` and `pendularm action send_goal`.
 //!
-//! **Invariant:** a goal that was sent is awaited to its end; a signal asks for that end, and does not just leave.
+//! **Invariant:** the command waits for the end of its goal. A signal cancels the goal first.
 
 use clap::Subcommand;
 use serde_json::{Value, json};
@@ -28,7 +28,7 @@ const STATUSES: [&str; 7] = [
     "ABORTED",
 ];
 
-/// The topic through which the arm is moved while the controller is on. Of a goal the runtime says that itself.
+/// The topic that moves the arm while the controller is on. For a goal the runtime sends the warning itself.
 const MOVING: &str = Topic::JointTrajectory.name();
 
 /// The verbs of services.
@@ -75,7 +75,7 @@ for its end; the second ends at once. Status 0 is SUCCEEDED; CANCELED and ABORTE
         action: String,
         #[command(flatten)]
         goal: TypedValue,
-        /// Print how it goes
+        /// Print the feedback
         #[arg(short = 'f', long)]
         feedback: bool,
     },
@@ -119,7 +119,7 @@ pub(super) async fn run_action(
     }
 }
 
-/// The requests that end a command.
+/// The signals that end a command.
 #[cfg(unix)]
 fn signals() -> std::io::Result<(unix::Signal, unix::Signal)> {
     let hear = unix::signal;
@@ -129,13 +129,13 @@ fn signals() -> std::io::Result<(unix::Signal, unix::Signal)> {
     ))
 }
 
-/// The same from a console of Windows.
+/// The console events that end a command on Windows.
 #[cfg(windows)]
 fn signals() -> std::io::Result<(windows::CtrlC, windows::CtrlBreak)> {
     Ok((windows::ctrl_c()?, windows::ctrl_break()?))
 }
 
-/// Waits for the end of a goal that was sent. The first signal cancels it, the second ends the command.
+/// Waits for the end of a goal. The first signal cancels it, the second ends the command.
 async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError> {
     let cancel = json!({"op": "cancel_action_goal", "id": "goal", "action": action});
     let (mut interrupt, mut terminate) = signals()?;
@@ -145,7 +145,7 @@ async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError>
             said = session.receive() => said?,
             _ = async { tokio::select! { _ = interrupt.recv() => {}, _ = terminate.recv() => {} } } => {
                 if is_canceled {
-                    return Err(CommandError::refused("ended before the goal"));
+                    return Err(CommandError::refused("ended before the result of the goal"));
                 }
                 is_canceled = true;
                 session.send(&cancel).await?;
@@ -177,7 +177,7 @@ async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError>
 
 impl Session {
     /// Checks a value against the type of its topic, service or action, before it is sent. Returns the type. Warns if
-    /// the value moves the arm through the controller and that is off.
+    /// the value moves the arm through the controller, which is off.
     pub(super) async fn check(
         &mut self,
         kind: &str,

@@ -1,6 +1,6 @@
 //! `list` and `info`: the topics, services, actions and nodes of a runtime.
 //!
-//! **Invariant:** an `info` is of something that the runtime lists.
+//! **Invariant:** `info` works only for names that the runtime lists.
 
 use clap::Subcommand;
 use serde_json::json;
@@ -10,23 +10,23 @@ use super::output::{CommandError, raw};
 use super::session::Session;
 use crate::protocol::names::are_same;
 
-/// The verbs that look at topics, services, actions and nodes.
+/// The verbs for topics, services, actions and nodes.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum GraphVerb {
     /// List all
     List {
-        /// Show the type of each; a node has none
+        /// Show the types (nodes have none)
         #[arg(short = 't', long)]
         show_types: bool,
     },
-    /// Print the type of one, and its nodes where they are known; the topics and services of a node
+    /// Print the type of a topic, service or action and its nodes, or the topics and services of a node
     Info {
         /// Its name, with or without the leading slash
         name: String,
     },
 }
 
-/// Questions of rosapi about a thing of that kind, each with the printed member of its answer.
+/// The services of rosapi about that kind, each with the printed member of its answer.
 fn questions(kind: &str) -> &'static [(&'static str, &'static str)] {
     match kind {
         "topic" => &[
@@ -60,7 +60,7 @@ pub(super) async fn run(
     };
     if !names.iter().any(|one| are_same(one, name)) {
         return Err(CommandError::refused(&format!(
-            "{name} is no {kind}; `pendularm {kind} list` has those that are"
+            "there is no {kind} {name}; `pendularm {kind} list` lists all"
         )));
     }
     let mut members = Vec::new();

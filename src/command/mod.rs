@@ -1,8 +1,8 @@
-//! Commands that ask a running pendularm, in the words of `ros2`: each connects, calls or subscribes, and prints.
+//! Commands for a running pendularm, with the names of `ros2`: each connects, calls or subscribes, and prints.
 //!
-//! A command is a client like any other, over TCP. It uses nothing of the runtime but the protocol.
+//! A command is an ordinary client over TCP. It shares only the protocol with the runtime.
 //!
-//! **Invariant:** no answer, no closed pipe and no signal makes a command panic, and its exit status says how it ended.
+//! **Invariant:** no answer, closed pipe or signal makes a command panic. The exit status shows how it ended.
 
 pub mod arguments;
 mod call;
@@ -24,7 +24,7 @@ use self::parameters::ParamVerb;
 use self::session::RuntimeOptions;
 use self::topic::TopicVerb;
 
-/// Ends the help of each subject.
+/// The end of each subject's help.
 const STATUS: &str = "\
 Exit status: 0 if it was done, 1 if the runtime refused (it says why) or did not succeed, 2 for bad usage, 3 without an
 answer: no connection, one that ended, or nothing within --timeout.";
@@ -38,7 +38,7 @@ pub enum CommandSubject {
     Service(Subject<ServiceVerb>),
     /// Send goals to actions of a running pendularm
     Action(Subject<ActionVerb>),
-    /// Look at the nodes of a running pendularm
+    /// List and describe the nodes of a running pendularm
     Node(Subject<GraphVerb>),
     /// Read and set parameters of a running pendularm
     Param(Subject<ParamVerb>),
@@ -52,7 +52,7 @@ With --json the message is one line.")]
     Diagnostics(RuntimeOptions),
 }
 
-/// The verbs of a subject, and how to reach the runtime.
+/// The verbs of a subject, and the address of the runtime.
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(after_help = STATUS)]
 pub struct Subject<V: Subcommand> {
@@ -62,7 +62,7 @@ pub struct Subject<V: Subcommand> {
     verb: V,
 }
 
-/// Does a command, and prints its result. Values are read before it connects: a wrong one changes nothing.
+/// Runs a command and prints its result. Values are read before it connects, so a wrong one changes nothing.
 ///
 /// # Errors
 /// [`CommandError`], which has the exit status.

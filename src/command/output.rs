@@ -1,7 +1,7 @@
 //! The output of a command, and its end.
 //!
-//! **Invariant:** a complaint is one line on which nothing acts on a terminal. A reader that closes standard output
-//! ends the command quietly.
+//! **Invariant:** an error is one line without terminal control characters. A reader that closes standard output
+//! ends the command without an error.
 
 use std::io::{self, Write};
 use std::time::Duration;
@@ -10,13 +10,13 @@ use serde_json::value::RawValue;
 
 use crate::protocol::wire::text::push_plain;
 
-/// Why a command was not done.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     /// The runtime refused, or the command did not succeed.
     #[error("{0}")]
     Refused(String),
-    /// An argument is not as it should be.
+    /// An argument is not valid.
     #[error("{0}")]
     Usage(String),
     /// No runtime listens at the address.
@@ -25,8 +25,8 @@ pub enum CommandError {
     /// The connection ended.
     #[error("the connection ended: {0}")]
     Lost(String),
-    /// No awaited frame came in time.
-    #[error("nothing that was awaited came within {} s", .0.as_secs_f64())]
+    /// No awaited frame arrived in time.
+    #[error("no answer or message within {} s", .0.as_secs_f64())]
     Late(Duration),
     /// The system refused a thread or a descriptor.
     #[error("the system refused: {0}")]
@@ -34,13 +34,13 @@ pub enum CommandError {
     /// Standard output cannot be written.
     #[error("standard output: {0}")]
     Output(io::Error),
-    /// The reader of standard output is gone: it has read enough.
+    /// The reader has closed standard output.
     #[error("standard output is closed")]
     Closed,
 }
 
 impl CommandError {
-    /// A refusal in words of the runtime or of another client.
+    /// A refusal with the text of the runtime or of another client.
     pub(super) fn refused(words: &str) -> Self {
         Self::Refused(plain(words))
     }
@@ -64,21 +64,21 @@ impl CommandError {
     }
 }
 
-/// Text as one line on which nothing acts.
+/// Text as one line without control characters.
 pub(super) fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     text.chars().for_each(|one| push_plain(&mut plain, one));
     plain
 }
 
-/// Prints to standard output, at once.
+/// Prints to standard output without buffering.
 pub(super) fn print(text: &str) -> Result<(), CommandError> {
     let mut out = io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     written.map_err(CommandError::output)
 }
 
-/// JSON that is put together from JSON.
+/// JSON that is built from JSON.
 pub(super) fn raw(text: String) -> Result<Box<RawValue>, CommandError> {
     RawValue::from_string(text).map_err(|error| CommandError::Lost(error.to_string()))
 }

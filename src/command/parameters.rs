@@ -1,7 +1,8 @@
-//! `pendularm param`, the arm's parameters by name, and `pendularm diagnostics`, its state in short.
+//! `pendularm param`, the arm's parameters by name, and `pendularm diagnostics`, a summary of its
+//! state.
 //!
-//! **Invariant:** a parameter that is printed can be set again as it was printed. The exit status of diagnostics is 0
-//! only if every part is OK.
+//! **Invariant:** a printed parameter can be set again in the same form. The exit status of diagnostics is 0 only if
+//! every part is OK.
 
 use clap::{Args, Subcommand};
 use serde::Deserialize;
@@ -17,13 +18,13 @@ use crate::protocol::ros::parameters::NO_SUCH;
 const TOPIC: &str = Topic::Diagnostics.name();
 /// The levels of `diagnostic_msgs/msg/DiagnosticStatus`, by their numbers.
 const LEVELS: [&str; 4] = ["OK", "WARN", "ERROR", "STALE"];
-/// Width of the column of keys: the runtime's own have room.
+/// Width of the column of keys. All keys of the runtime fit.
 const KEY_WIDTH: usize = 24;
 
 /// The verbs of parameters.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum ParamVerb {
-    /// List the parameters, each behind its node
+    /// List the parameters, each after its node
     #[command(after_help = "Example:\n  pendularm param list")]
     List,
     /// Print a parameter's value
@@ -56,12 +57,12 @@ Nothing is printed if it was set.")]
 pub struct ParameterName {
     /// Its node: `/arm_sim`
     node: String,
-    /// Its name; `pendularm param list` has all
+    /// Its name; `pendularm param list` lists all
     name: String,
 }
 
 impl ParameterName {
-    /// The name under which rosapi knows it.
+    /// Its name in rosapi.
     fn full(&self) -> String {
         format!("/{}:{}", self.node.trim_start_matches('/'), self.name)
     }
@@ -103,7 +104,7 @@ pub(super) async fn run(verb: &ParamVerb, runtime: &RuntimeOptions) -> Result<()
     }
 }
 
-/// The answer to a question about a parameter.
+/// The answer to a call about a parameter.
 #[derive(Deserialize)]
 struct ParameterAnswer {
     successful: bool,
@@ -123,16 +124,16 @@ async fn call(
         .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;
     match answer.reason.as_str() {
         _ if answer.successful => Ok(answer),
-        // In the words of a shell, and with the node.
+        // The message names the command and the node.
         NO_SUCH => Err(CommandError::refused(&format!(
-            "there is no parameter {}; `pendularm param list` has all",
+            "there is no parameter {}; `pendularm param list` lists all",
             args["name"]
         ))),
         other => Err(CommandError::refused(other)),
     }
 }
 
-/// A message of the diagnostics, as far as it is printed.
+/// The printed parts of a message of the diagnostics.
 #[derive(Deserialize)]
 struct Diagnostics {
     status: Vec<DiagnosedPart>,

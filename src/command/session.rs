@@ -1,7 +1,7 @@
 //! A connection to a running pendularm: rosbridge over TCP, one JSON object per line.
 //!
-//! **Invariant:** frames are read line by line, each of bounded length. Every refusal ends the command in the words of
-//! the runtime.
+//! **Invariant:** frames are read line by line, each of bounded length. A refusal ends the command with the runtime's
+//! text.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
@@ -27,21 +27,21 @@ use crate::protocol::op::token::Token;
 use crate::protocol::outbox::MAX_MESSAGE;
 use crate::value::{ValueReader, needed, within};
 
-/// How long each address of the host may take to accept the connection.
+/// Longest time for each address of the host to accept the connection.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// Longest frame that is read \[bytes\]: the runtime's longest answer is a trajectory of a million steps, each of three
-/// numbers of 25 bytes with their commas, 75 MB together.
+/// Longest frame that is read \[bytes\]. The runtime's longest answer is a trajectory of a million steps. Each has
+/// three numbers of 25 bytes with their commas, 75 MB together.
 const MAX_ANSWER: usize = 80 * 1024 * 1024;
 
 /// The options that all commands have.
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "The runtime")]
 pub struct RuntimeOptions {
-    /// Print JSON, one object or value a line, instead of YAML
+    /// Print JSON, one object or value per line, instead of YAML
     #[arg(long, global = true)]
     json: bool,
-    /// Where the runtime listens: a port, a host, both, or a URL
+    /// Address of the runtime: a port, a host, both, or a URL
     #[arg(
         long,
         global = true,
@@ -50,22 +50,23 @@ pub struct RuntimeOptions {
     )]
     #[arg(value_parser = ValueReader(read_address))]
     connect: String,
-    /// How long an answer or the next message may take; for ever unless given, 5 s for the connection
+    /// Longest wait for an answer or the next message, in seconds; without it there is no limit,
+    /// except 5 s for the connection
     #[arg(long, global = true, value_name = "SECONDS", value_parser = ValueReader(read_positive))]
     timeout: Option<f64>,
-    /// The runtime's token; prefer the variable: others see options
+    /// The runtime's token; prefer the variable, because other users can see options
     #[arg(long, global = true, value_name = "TOKEN", env = "ARM_SIM_TOKEN")]
     #[arg(value_parser = ValueReader(|text| Token::new(text).map_err(|why| why.to_string())))]
     token: Option<Token>,
 }
 
-/// An address with a port; its name is looked up later.
+/// An address with a port. Its name is resolved later.
 fn read_address(text: &str) -> Result<String, String> {
     let needs = "a port, a host, both or a URL without TLS, such as 9095, 127.0.0.1:9095 or ws://127.0.0.1:9095/";
     needed(address::read(text), needs, text)
 }
 
-/// A number greater than 0, and no more than a day or a million.
+/// A number from 1e-6 to 1e6.
 pub(super) fn read_positive(text: &str) -> Result<f64, String> {
     within(&(1e-6..=1e6), "a number", text)
 }
@@ -73,18 +74,17 @@ pub(super) fn read_positive(text: &str) -> Result<f64, String> {
 /// A connection.
 pub(super) struct Session {
     stream: BufReader<TcpStream>,
-    /// The beginning of a frame that has not come whole.
+    /// The beginning of an incomplete frame.
     line: Vec<u8>,
     calls: u64,
     patience: Option<Duration>,
-    /// By then the next awaited frame has to come.
+    /// Deadline of the next awaited frame.
     deadline: Option<Instant>,
     /// Whether JSON is printed.
     pub(super) is_json: bool,
 }
 
-/// A frame of the runtime, as far as a command needs it. Values stay as text: a tree of them takes seventy times the
-/// memory.
+/// The parts of a frame that commands need. Values stay as text, because a tree of them takes seventy times the memory.
 #[derive(Debug, Deserialize)]
 pub(super) struct Received {
     pub(super) op: String,
@@ -102,12 +102,12 @@ pub(super) struct Received {
 }
 
 impl Received {
-    /// Why it was refused: `status`, or a text in place of the values.
+    /// The reason of a refusal: `status`, or a text in place of the values.
     pub(super) fn refusal(&self, name: &str) -> CommandError {
         let status: Option<String> = read_as(self.status.as_deref());
         let status = status.filter(|status| !status.is_empty());
         let why = status.or_else(|| read_as(self.values.as_deref()));
-        CommandError::refused(&why.unwrap_or_else(|| format!("{name} failed, and said no more")))
+        CommandError::refused(&why.unwrap_or_else(|| format!("{name} failed without a reason")))
     }
 
     /// The number of an action's status.
@@ -121,7 +121,7 @@ fn read_as<T: DeserializeOwned>(raw: Option<&RawValue>) -> Option<T> {
 }
 
 impl RuntimeOptions {
-    /// Connects. The first frame shows the token, and says that this is a command: it may use a kept place.
+    /// Connects. The first frame has the token and marks a command, which may use a kept place.
     pub(super) async fn open(&self) -> Result<Session, CommandError> {
         let patience = self.timeout.map(Duration::from_secs_f64);
         let stream = dial(&self.connect, patience.unwrap_or(CONNECT).min(CONNECT))
@@ -158,7 +158,7 @@ async fn dial(address: &str, patience: Duration) -> io::Result<TcpStream> {
     Err(why)
 }
 
-/// Does `work` until the deadline.
+/// Runs `work` until the deadline.
 async fn in_time<T>(
     deadline: Option<Instant>,
     work: impl Future<Output = io::Result<T>>,
@@ -172,12 +172,12 @@ async fn in_time<T>(
 }
 
 impl Session {
-    /// The next awaited frame has to come within `--timeout` from now on.
+    /// Sets the deadline of the next awaited frame to `--timeout` from now.
     pub(super) fn await_next(&mut self) {
         self.deadline = self.patience.map(|patience| Instant::now() + patience);
     }
 
-    /// Sends a frame, and begins to wait for its answer.
+    /// Sends a frame, and sets the deadline of its answer.
     pub(super) async fn send(&mut self, frame: &Value) -> Result<(), CommandError> {
         self.await_next();
         let line = format!("{frame}\n");
@@ -185,7 +185,7 @@ impl Session {
             .await
             .is_err()
         {
-            // The runtime has closed the connection. Its reason is still to be read.
+            // The runtime has closed the connection. Its reason can still be read.
             loop {
                 self.receive().await?;
             }
@@ -197,11 +197,11 @@ impl Session {
         self.receive_within(MAX_ANSWER).await
     }
 
-    /// The next frame that is no status, of at most `longest` bytes. A status of an error ends the command. A caller
-    /// that stops waiting loses nothing.
+    /// The next frame that is not a status, of at most `longest` bytes. An error status ends the command. A caller
+    /// that stops waiting loses no bytes.
     async fn receive_within(&mut self, longest: usize) -> Result<Received, CommandError> {
         loop {
-            // A byte more tells a frame that is longer.
+            // One more byte detects a longer frame.
             let room = (longest + 1).saturating_sub(self.line.len());
             let mut bounded = (&mut self.stream).take(room as u64);
             let read = in_time(self.deadline, bounded.read_until(b'\n', &mut self.line)).await;
@@ -245,7 +245,7 @@ impl Session {
         }
     }
 
-    /// One member of the answer to a question of rosapi.
+    /// One member of the answer of a rosapi service.
     pub(super) async fn ask<T: DeserializeOwned>(
         &mut self,
         question: &str,
@@ -260,7 +260,7 @@ impl Session {
             .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))
     }
 
-    /// The type of a topic, service or action, empty if the runtime knows none. A given type has to be the same.
+    /// The type of a topic, service or action; empty if it is unknown. A given type must be the same.
     pub(super) async fn type_of(
         &mut self,
         kind: &str,
@@ -279,7 +279,7 @@ impl Session {
         }
     }
 
-    /// Subscribes to a topic that exists, or whose type is given.
+    /// Subscribes to a topic that exists or whose type is given.
     pub(super) async fn subscribe(
         &mut self,
         topic: &str,
@@ -292,10 +292,10 @@ impl Session {
         };
         if !topics.iter().any(|one| are_same(one, topic)) {
             return Err(CommandError::refused(&format!(
-                "{topic} is no topic yet; `pendularm topic list` has those that are, and a TYPE waits for one"
+                "there is no topic {topic} yet; `pendularm topic list` lists all, and with a TYPE the command waits"
             )));
         }
-        // Without a type the messages are as in ROS 2, also if the given type is one of ROS 1.
+        // Without a type the messages have the form of ROS 2, also if the given type is one of ROS 1.
         self.send(&json!({"op": "subscribe", "topic": topic})).await
     }
 
@@ -310,7 +310,7 @@ impl Session {
         }
     }
 
-    /// Prints an answer, and `end` behind it if that is in YAML: each of several answers ends with `---`.
+    /// Prints an answer, in YAML with `end` after it: each of several answers ends with `---`.
     pub(super) fn show(&self, raw: &RawValue, end: &str) -> Result<(), CommandError> {
         match self.is_json {
             true => print(&json_line(raw)),
@@ -318,7 +318,7 @@ impl Session {
         }
     }
 
-    /// Prints a line for each entry of a list: the object, or the text that says the same.
+    /// Prints a line for each entry of a list: the object, or the same as text.
     pub(super) fn show_list(&self, entries: &[(Value, String)]) -> Result<(), CommandError> {
         let line = |(object, text): &(Value, String)| match self.is_json {
             true => format!("{object}\n"),
@@ -334,7 +334,7 @@ fn frame(line: &[u8], longest: usize) -> Result<Received, CommandError> {
     match (line.len(), serde_json::from_slice(line)) {
         (0, _) => lost("the runtime closed it".to_owned()),
         (length, _) if length > longest => lost(format!("a frame is longer than {longest} bytes")),
-        (_, Err(error)) if line.ends_with(b"\n") => lost(format!("no frame came: {error}")),
+        (_, Err(error)) if line.ends_with(b"\n") => lost(format!("cannot read a frame: {error}")),
         (_, Err(error)) => lost(format!("within a frame: {error}")),
         (_, Ok(received)) => Ok(received),
     }

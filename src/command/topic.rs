@@ -1,6 +1,6 @@
 //! `pendularm topic`: prints messages, measures their rate, and publishes.
 //!
-//! **Invariant:** a publisher waits until the runtime has taken each message, so that a refusal is heard.
+//! **Invariant:** a publisher waits until the runtime has handled each message, so it gets every refusal.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -26,7 +26,7 @@ const REPORT: Duration = Duration::from_secs(1);
 pub enum TopicVerb {
     #[command(flatten)]
     Graph(GraphVerb),
-    /// Print the messages of a topic as they come
+    /// Print the messages of a topic as they arrive
     #[command(after_help = "\
 Examples:
   pendularm topic echo /joint_states --once
@@ -38,7 +38,7 @@ ends it with status 0.")]
     Echo {
         #[command(flatten)]
         source: SubscribedTopic,
-        /// Print this part alone, such as `header.stamp` or `position[0]`
+        /// Print only this part, such as `header.stamp` or `position[0]`
         #[arg(long)]
         field: Option<String>,
         /// Print one message and end
@@ -48,7 +48,7 @@ ends it with status 0.")]
         #[arg(short = 'n', long, value_name = "N", value_parser = ValueReader(read_count))]
         times: Option<usize>,
     },
-    /// Measure how often messages come
+    /// Measure the rate of messages
     #[command(after_help = "\
 Example:
   pendularm topic hz /joint_states
@@ -58,12 +58,12 @@ messages [s].")]
     Hz {
         #[command(flatten)]
         source: SubscribedTopic,
-        /// How many of the last messages count
+        /// Number of the last messages in the measurement
         #[arg(short = 'w', long, value_name = "N", default_value = "10000")]
         #[arg(value_parser = ValueReader(read_count))]
         window: usize,
     },
-    /// Publish a message, once or again and again
+    /// Publish a message, once or repeatedly
     #[command(after_help = "\
 Examples:
   pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'
@@ -81,7 +81,7 @@ Without --once or --times it publishes until a signal ends it.")]
         /// Publish N messages and end
         #[arg(short = 't', long, value_name = "N", value_parser = ValueReader(read_count))]
         times: Option<usize>,
-        /// How many a second
+        /// Messages per second
         #[arg(short = 'r', long, value_name = "HZ", default_value = "1")]
         #[arg(value_parser = ValueReader(read_positive))]
         rate: f64,
@@ -93,7 +93,7 @@ Without --once or --times it publishes until a signal ends it.")]
 pub struct SubscribedTopic {
     /// Its name, with or without the leading slash
     topic: String,
-    /// Its type, as pkg/Name, to wait for a topic that is not there yet
+    /// Its type, as pkg/Name; with it the command waits for a topic that does not exist yet
     #[arg(value_name = "TYPE")]
     type_name: Option<String>,
 }
@@ -149,7 +149,7 @@ impl SubscribedTopic {
     }
 }
 
-/// The part of a message at a path, spelled as it came: names with dots between, items in brackets.
+/// The part of a message at a path: names separated by dots, items in brackets. Numbers keep their spelling.
 fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandError> {
     let step = |value: &'a RawValue, step: &str| -> Option<&'a RawValue> {
         if let Some(index) = step.strip_suffix(']') {
@@ -183,7 +183,7 @@ async fn measure(topic: &str, window: usize, mut session: Session) -> Result<(),
     }
 }
 
-/// Rate and spread of the times between messages, in the words of `ros2`.
+/// Rate and spread of the times between messages, in the format of `ros2`.
 fn rhythm(spans: &VecDeque<f64>, is_json: bool) -> String {
     #[expect(clippy::cast_precision_loss, reason = "there are at most a million")]
     let count = spans.len() as f64;
@@ -223,7 +223,7 @@ async fn publish(
     let mut due = Instant::now();
     for count in 1.. {
         session.send(&publish).await?;
-        // Its answer comes once the message has been taken. A refusal comes before it.
+        // The answer to this call arrives after the message has been handled. A refusal arrives before it.
         session
             .call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))
             .await?;

@@ -1,8 +1,9 @@
 //! Values of the runtime, written as YAML or as a line of JSON.
 //!
-//! YAML is written here: the library's writer keeps an escape character in a text as it is, and a terminal obeys it.
+//! YAML is written here, because the library's writer does not escape control characters, which act on a terminal.
 //!
-//! **Invariant:** members keep their order, numbers their value, and nothing in a text acts on a terminal.
+//! **Invariant:** members keep their order and numbers their value. Control characters in texts are
+//! escaped.
 
 use std::fmt;
 use std::io::{self, BufWriter, Write};
@@ -15,18 +16,18 @@ use super::output::CommandError;
 use crate::protocol::limits::MAX_NESTING;
 use crate::protocol::wire::text::{acts, push_quoted};
 
-/// Texts that a reader of YAML would take for something else, in lower case.
+/// Texts that YAML readers would not read as text, in lower case.
 pub const WORDS: [&str; 10] = [
     "true", "false", "null", "yes", "no", "on", "off", "y", "n", "~",
 ];
 
-/// JSON on one line, as it came except for characters that act on a terminal.
+/// JSON on one line, unchanged except for escaped control characters.
 #[must_use]
 pub fn json_line(raw: &RawValue) -> String {
     let mut line = String::with_capacity(raw.get().len() + 1);
     for character in raw.get().chars() {
         match character {
-            // Between tokens; within a text JSON has none of them.
+            // These are between tokens. Inside a text JSON does not allow them.
             '\t' | '\r' | '\n' => line.push(' '),
             _ if acts(character) => push_quoted(&mut line, character),
             _ => line.push(character),
@@ -36,18 +37,18 @@ pub fn json_line(raw: &RawValue) -> String {
     line
 }
 
-/// Writes the value as lines of YAML, and `end` behind them. It writes while it reads: a value that is nested deep has
-/// a hundred times the bytes in YAML that it has in JSON.
+/// Writes the value as lines of YAML, and `end` after them. It writes while it reads, because a deeply nested value is
+/// a hundred times longer in YAML than in JSON.
 ///
 /// # Errors
-/// [`CommandError::Lost`] if it is nested deeper than the runtime takes, or that of `out`.
+/// [`CommandError::Lost`] if it is nested deeper than the runtime accepts, or the error of `out`.
 pub fn write_yaml(raw: &RawValue, end: &str, out: impl Write) -> Result<(), CommandError> {
     let mut out = BufWriter::new(out);
     let written = write_value(raw, 0, &Place::Top, &mut out)
         .and_then(|()| out.write_all(end.as_bytes()))
         .and_then(|()| out.flush());
     written.map_err(|why| match why.kind() {
-        io::ErrorKind::InvalidData => CommandError::Lost(format!("no frame came: {why}")),
+        io::ErrorKind::InvalidData => CommandError::Lost(format!("cannot read a frame: {why}")),
         _ => CommandError::output(why),
     })
 }
@@ -87,7 +88,7 @@ impl<'de: 'a, 'a> Deserialize<'de> for OrderedMembers<'a> {
     }
 }
 
-/// Writes a value whose name or dash stands behind `indent` spaces.
+/// Writes a value whose name or dash follows `indent` spaces.
 fn write_value(
     raw: &RawValue,
     indent: usize,
@@ -110,7 +111,7 @@ fn write_value(
         let space = if *place == Place::Top { "" } else { " " };
         return writeln!(out, "{space}{}", scalar(json)?);
     }
-    // The dashes of a member stand under its name.
+    // The dashes of a member are below its name.
     let indent = match place {
         Place::Top => indent,
         Place::Member if is_list => indent,
@@ -136,7 +137,7 @@ fn write_value(
     Ok(())
 }
 
-/// A value without parts. Python reads numbers of YAML 1.1: with a point, and a sign in the exponent.
+/// A scalar value. Python reads numbers of YAML 1.1: with a point, and a sign in the exponent.
 fn scalar(json: &str) -> io::Result<String> {
     if json.starts_with('"') {
         return Ok(text(&serde_json::from_str::<String>(json)?));
@@ -160,7 +161,7 @@ fn scalar(json: &str) -> io::Result<String> {
     })
 }
 
-/// A text, quoted unless every reader takes it for one as it is.
+/// A text, with quotes unless every reader reads it as a text without them.
 fn text(value: &str) -> String {
     let begins = |one: char| one.is_ascii_alphabetic() || one == '/' || one == '_';
     let goes_on = |one: char| one.is_ascii_alphanumeric() || "/_.-+() ".contains(one);

@@ -1,6 +1,6 @@
-//! Counts between two messages of `/diagnostics`, and the topics that somebody wants.
+//! Counts between two messages of `/diagnostics`, and the topics with subscribers.
 //!
-//! **Invariant:** rates are of one window, which is never shorter than they can be told from.
+//! **Invariant:** all rates are over one window, which is long enough to measure them.
 
 use std::time::Duration;
 
@@ -10,31 +10,31 @@ use crate::math::pacer::CATCH_UP;
 use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Topic;
 
-/// Rates are given over at least this long: over less they say nothing.
+/// Shortest window for rates. Over a shorter one they are meaningless.
 const SHORTEST_WINDOW: Duration = Duration::from_millis(250);
 
-/// Counts between two messages of `/diagnostics`, and the topics that somebody wants.
+/// Counts between two messages of `/diagnostics`, and the topics with subscribers.
 pub(crate) struct Telemetry {
     wanted: Vec<Topic>,
     /// Publishing ticks so far.
     pub(crate) ticks: u64,
-    /// Energy when it was last changed from outside \[J\]: the drift is measured from it.
+    /// Energy after the last external change \[J\]. The drift is measured from it.
     pub(crate) energy_reference: f64,
     pub(crate) window: Window,
-    /// Wall time that the latest wake-up left owed \[s\].
+    /// Wall time by which the arm was late after the latest wake-up \[s\].
     owed: f64,
-    /// Rates over the window before, for a message that comes early in the present one.
+    /// Rates over the previous window, for a message early in the present one.
     pub(crate) last_rates: Rates,
 }
 
 /// Work since `began`.
 pub(crate) struct Window {
-    /// By the clock that simulation time goes by.
+    /// By the clock of the simulation time.
     began: Duration,
     steps: u64,
     /// Simulation time \[s\].
     simulated: f64,
-    /// The wake-up that took longest since the last message.
+    /// The longest wake-up since the last message.
     pub(crate) longest: WakeUp,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct WakeUp {
 }
 
 impl WakeUp {
-    /// Time per step \[s\]; 0 where there was none.
+    /// Time per step \[s\]; 0 without steps.
     pub(crate) fn step_time(self) -> f64 {
         self.took.as_secs_f64() / in_f64(self.steps.max(1))
     }
@@ -81,7 +81,7 @@ impl Telemetry {
         self.wanted.contains(&topic)
     }
 
-    /// Notes the steps of a wake-up and the processor's time that it took.
+    /// Records the steps of a wake-up and its processor time.
     pub(crate) fn stepped(&mut self, steps: u64, took: Duration, timestep: f64) {
         if steps == 0 {
             return;
@@ -93,12 +93,12 @@ impl Telemetry {
         }
     }
 
-    /// Notes how many steps a wake-up left owed.
+    /// Records the number of steps due after a wake-up.
     pub(crate) fn note_backlog(&mut self, steps: u64, timestep: f64) {
         self.owed = in_f64(steps) * timestep;
     }
 
-    /// Whether the arm lags so far behind wall time that it soon has to drop some, or does so already.
+    /// Whether the arm is so late that it will soon drop steps, or drops them already.
     pub(crate) fn lags(&self) -> bool {
         self.owed > CATCH_UP.as_secs_f64() / 2.0
     }
@@ -114,7 +114,7 @@ impl Window {
         }
     }
 
-    /// Rates since the window began; `None` while it is too short to tell.
+    /// Rates since the window began; `None` while the window is too short.
     pub(crate) fn rates(&self, now: Duration) -> Option<Rates> {
         let elapsed = now.saturating_sub(self.began);
         (elapsed >= SHORTEST_WINDOW).then(|| Rates {

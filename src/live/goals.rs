@@ -1,6 +1,6 @@
-//! The active goal as the arm sees it, and the arm's memory of goals. The rules are `math::goal`'s.
+//! The active goal in the arm, and the record of earlier goals. The rules are in `math::goal`.
 //!
-//! **Invariant:** every goal ends once, and every query about the latest end gives the same.
+//! **Invariant:** every goal ends once, and every query about the latest end has the same result.
 
 use glam::DVec2;
 
@@ -9,7 +9,7 @@ use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Service;
 
-/// Why no setpoint moves the arm.
+/// Why the arm does not follow its setpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Obstacle {
     /// Its simulation has diverged.
@@ -33,7 +33,7 @@ impl Obstacle {
     }
 }
 
-/// The arm at one instant.
+/// The state of the arm at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose<const N: usize> {
     /// Lengths of the links \[m\].
@@ -44,21 +44,21 @@ pub struct Pose<const N: usize> {
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
-    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
-    /// at a reset that forgets a past of thirty years.
+    /// Simulation time since the start of the arm, over all resets \[s\]. It decreases only at a reset
+    /// after thirty years.
     pub simulated: f64,
-    /// Why it does not follow its setpoint; none if it does.
+    /// Why it does not follow its setpoint; `None` if it does.
     pub obstacle: Option<Obstacle>,
 }
 
 /// A goal for the arm.
 #[derive(Debug, Clone, Copy)]
 pub struct GoalOrder<const N: usize> {
-    /// Names the goal; each is used once.
+    /// Identifies the goal. Each id is used once.
     pub number: u64,
     /// The target of the end effector \[m\].
     pub target: DVec2,
-    /// When it counts as there.
+    /// The condition for success.
     pub criteria: Criteria,
     /// Joint positions that put the end effector there \[rad\].
     pub solution: [f64; N],
@@ -67,15 +67,15 @@ pub struct GoalOrder<const N: usize> {
 /// The goal has begun.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracking<const N: usize> {
-    /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to be sent.
+    /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to publish.
     pub positions: [f64; N],
-    /// How the goal before it ended, now or earlier, if there was one.
+    /// How the previous goal ended, if there was one.
     pub before: Option<GoalJudged<N>>,
-    /// Why the arm will not follow that setpoint yet; none if it will.
+    /// Why the arm does not follow that setpoint yet; `None` if it does.
     pub obstacle: Option<Obstacle>,
 }
 
-/// How a goal stands after a step, or how it ended.
+/// The progress of a goal after a step, or its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GoalJudged<const N: usize> {
     /// The goal.
@@ -84,39 +84,39 @@ pub struct GoalJudged<const N: usize> {
     pub distance: f64,
     /// Simulation time since the goal's start \[s\].
     pub elapsed: f64,
-    /// The arm at that instant.
+    /// The state of the arm at that time.
     pub pose: Pose<N>,
-    /// How it ended; none while it is active.
+    /// How it ended; `None` while it is active.
     pub outcome: Option<Outcome>,
 }
 
-/// The arm's memory of goals.
+/// The arm's record of goals.
 #[derive(Default)]
 pub(crate) struct Goals<const N: usize> {
     pub(super) tracked: Option<Tracked>,
-    /// How the latest goal ended, for a question that crossed the news on its way.
+    /// How the latest goal ended, for a query that was sent before its news arrived.
     pub(super) latest: Option<GoalJudged<N>>,
-    /// A client has sent a setpoint while the controller was off, and it is off still.
+    /// A client has sent a setpoint while the controller was off, and the controller is still off.
     pub(crate) setpoint_waits: bool,
-    /// Everything before the last reset.
+    /// The past before the last reset.
     pub(crate) past: Past,
 }
 
-/// Everything before the last reset.
+/// The past before the last reset.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Past {
-    /// Resets so far.
+    /// The number of resets.
     pub(crate) resets: u64,
-    /// Simulation time up to the last \[s\].
+    /// Simulation time up to the last reset \[s\].
     time: f64,
 }
 
 impl Past {
-    /// A longer past is forgotten \[s\]: after thirty years a clock no longer tells parts of a second. Long timesteps
-    /// lead there soon.
+    /// Longest recorded past \[s\]. After thirty years a double cannot resolve small parts of a second. With long
+    /// timesteps this is reached soon.
     const LONGEST: f64 = 1e9;
 
-    /// A reset comes, with the time since the one before \[s\].
+    /// Records a reset, with the time since the previous one \[s\].
     pub(super) fn end(&mut self, time: f64) {
         let time = self.time + time;
         self.time = if time < Self::LONGEST { time } else { 0.0 };
@@ -129,7 +129,7 @@ pub(super) struct Tracked {
     pub(super) number: u64,
     pub(super) goal: Goal,
     pub(super) feedback: Cadence,
-    /// Its setpoint is held, and it is judged.
+    /// Its setpoint is held, and each step is checked.
     pub(super) commanded: bool,
 }
 
@@ -139,7 +139,7 @@ impl<const N: usize> Goals<N> {
         self.tracked.is_some()
     }
 
-    /// Ends the goal, if there is one, where the arm is now.
+    /// Ends the goal, if there is one, in the arm's present state.
     pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalJudged<N>> {
         let tracked = self.tracked.take()?;
         let mut judged = tracked.stands(simulation, self.past);
@@ -150,7 +150,7 @@ impl<const N: usize> Goals<N> {
 }
 
 impl Tracked {
-    /// Judges the step that was just made: progress that is to be told, and the news that it is reached.
+    /// Checks the last step: returns due feedback, and the news that the goal is reached.
     pub(super) fn judge<const N: usize>(
         &mut self,
         simulation: &Simulation<N>,
@@ -181,7 +181,7 @@ impl Tracked {
     }
 }
 
-/// Position of the end effector \[m\], with the lengths as they are now.
+/// Position of the end effector \[m\], with the present lengths.
 fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
     forward(simulation.arm().lengths(), &simulation.state().position).position
 }

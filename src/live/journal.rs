@@ -1,7 +1,6 @@
-//! Everything that the arm's steps depend on, for a record, with the number of steps before it.
+//! The inputs of the arm's steps, for a record, with the number of steps before each.
 //!
-//! **Invariant:** a listener that has not taken an input hears nothing more but the whole simulation, until it has
-//! taken that.
+//! **Invariant:** if a listener misses an input, its next event is the whole simulation.
 
 use crate::math::arm::State;
 use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
@@ -9,20 +8,20 @@ use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
 /// An event of the arm, for a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmNews<const N: usize> {
-    /// Steps taken so far; goes on through resets.
+    /// Steps taken so far. A reset does not restart the count.
     pub step: u64,
-    /// The news.
+    /// The content.
     pub event: ArmEvent<N>,
 }
 
-/// The kinds of news.
+/// The kinds of events.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ArmEvent<const N: usize> {
-    /// The whole simulation: the news begin here.
+    /// The whole simulation, as the start.
     Began(Box<Checkpoint<N>>),
     /// An input has taken effect.
     Changed(ArmInput<N>),
-    /// The step from here on was not finite and was not taken.
+    /// The next step was not finite and was not taken.
     Diverged,
     /// The arm's state.
     Stands {
@@ -33,22 +32,22 @@ pub enum ArmEvent<const N: usize> {
     },
 }
 
-/// Hears the arm's news, on its thread, and may not wait; answers whether it has taken them.
+/// Receives the arm's events, on the arm's thread, without blocking. Returns whether it has accepted the event.
 pub type ArmListener<const N: usize> = Box<dyn FnMut(ArmNews<N>) -> bool + Send>;
 
-/// The listener, and how far the news have come.
+/// The listener, and the last event for it.
 pub struct Journal<const N: usize> {
     listener: ArmListener<N>,
     /// Steps taken up to the latest reset.
     before_reset: u64,
-    /// The step of the latest state told.
+    /// The step of the latest recorded state.
     stood: Option<u64>,
-    /// The listener has heard all since the simulation was told as a whole.
+    /// The listener has all events since the whole simulation.
     is_whole: bool,
 }
 
 impl<const N: usize> Journal<N> {
-    /// News for this listener, which has heard none.
+    /// A journal for this listener, which has no event yet.
     #[must_use]
     pub fn new(listener: ArmListener<N>) -> Self {
         Self {
@@ -59,7 +58,7 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// An input has taken effect, after that many steps.
+    /// Records that an input has taken effect, after this number of steps.
     pub(crate) fn change(&mut self, steps: u64, input: ArmInput<N>) {
         self.tell(steps, ArmEvent::Changed(input));
         if matches!(input, ArmInput::Reset) {
@@ -67,19 +66,19 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// The step that was due has not been taken.
+    /// Records that the due step has not been taken.
     pub(crate) fn diverge(&mut self, simulation: &Simulation<N>) {
         self.tell(simulation.steps(), ArmEvent::Diverged);
     }
 
-    /// Tells something that must not be missed.
+    /// Sends an event that must not be missed.
     fn tell(&mut self, steps: u64, event: ArmEvent<N>) {
         if self.is_whole {
             self.is_whole = self.say(steps, event);
         }
     }
 
-    /// Tells the state, unless that has been told.
+    /// Sends the state, unless it has been sent.
     pub(crate) fn stand(&mut self, simulation: &Simulation<N>) {
         let steps = simulation.steps();
         if !self.is_whole {
@@ -89,7 +88,7 @@ impl<const N: usize> Journal<N> {
         let step = self.before_reset + steps;
         if self.is_whole && self.stood != Some(step) {
             self.stood = Some(step);
-            // A missed state is skipped: later ones are compared all the same.
+            // A missed state is skipped. Later ones are still compared.
             self.say(
                 steps,
                 ArmEvent::Stands {

@@ -1,11 +1,10 @@
-//! The arm judges its own clocks: how large timestep and control period may be at the present setpoint, and by how much
-//! each step is off.
+//! The limits of the arm's timestep and control period at the present setpoint, and the error estimate of a step.
 //!
-//! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It
-//! is looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the
-//! controller off the loop in force is the arm alone. Gains and setpoint have no effect on it.
+//! The node `study` predicts the limit on its workers. It is kept here until the control loop changes. Publishing
+//! ticks check it, only while a topic that shows it has subscribers. With the controller off the active loop is the
+//! free arm, without gains and setpoint.
 //!
-//! **Invariant:** nothing is ever refused or changed because of a limit or an error; they are only published.
+//! **Invariant:** limits and errors are only published. Nothing is refused or changed because of them.
 
 use std::time::Duration;
 
@@ -20,11 +19,11 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::error_estimate::estimate;
 use crate::study::motion::Motion;
 
-/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may
-/// come by the thousand a second.
+/// Least time between two predictions for one arm with one set of gains. Each takes a millisecond of a worker, and
+/// thousands of setpoints may arrive per second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
 
-/// A limit that is exceeded.
+/// An exceeded limit.
 enum Exceeded {
     /// The control period is beyond the controller's limit.
     Period,
@@ -35,7 +34,7 @@ enum Exceeded {
 }
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// At a tick: tells at once if a warning comes or goes.
+    /// At a tick: publishes at once if a warning appears or ends.
     pub(super) fn watch_warnings(&mut self) {
         if !self.wants_limit() {
             return;
@@ -53,14 +52,14 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Whether a goal or a setpoint waits for the controller to be switched on.
+    /// Whether a goal or a setpoint waits for the controller, which is off.
     pub(super) fn is_held_up(&self) -> bool {
         let is_meant_to_move = self.goals.is_tracked() || self.goals.setpoint_waits;
         is_meant_to_move && !self.simulation.pid().is_enabled()
     }
 
-    /// The loop in force, if its limit has to be predicted: not if that is known, on its way, or wanted by nobody.
-    /// The caller has [`LiveArm::keep_limit`] hear of the prediction.
+    /// The active loop, if its limit must be predicted. `None` if the limit is known, requested already, or not
+    /// shown. The caller passes the prediction to [`LiveArm::keep_limit`].
     pub fn limit_to_predict(&mut self) -> Option<ControlLoop<N>> {
         if self.limit.waiting || !self.wants_limit() {
             return None;
@@ -90,9 +89,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
     }
 
-    /// The latest predictions \[s\], of the timestep and of the control period: infinite where nothing limits, NaN
-    /// while there are none. Limits for an earlier setpoint will do until the next are there. Limits for another
-    /// arm, other gains, another method or another period say nothing.
+    /// The latest predictions \[s\], of the timestep and of the control period: infinite if nothing limits, NaN
+    /// while there are none. Limits for an earlier setpoint are used until the next prediction. Limits for another
+    /// arm, other gains, another method or another period are not used.
     fn limits(&self) -> (f64, f64) {
         let infinite = |limit: Option<f64>| limit.unwrap_or(f64::INFINITY);
         match &self.limit.known {
@@ -103,12 +102,12 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// The largest timestep that is predicted to be stable \[s\], at the present control period.
+    /// The largest stable timestep \[s\] at the present control period, as predicted.
     pub(super) fn timestep_limit(&self) -> f64 {
         self.limits().0
     }
 
-    /// The largest control period that is predicted to be stable \[s\].
+    /// The largest stable control period \[s\], as predicted.
     pub(super) fn period_limit(&self) -> f64 {
         self.limits().1
     }
@@ -119,13 +118,13 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         period.effective(self.simulation.timestep())
     }
 
-    /// The motion that is ahead of the arm, and its largest timestep.
+    /// The coming motion of the arm, and its largest timestep.
     pub(super) fn motion(&self) -> Motion {
         let control = ControlLoop::in_force(&self.simulation);
         Motion::ahead(&control, self.simulation.state())
     }
 
-    /// The limit that is exceeded. Where both clocks are too slow it is the period's, which no timestep mends.
+    /// The exceeded limit. If both are exceeded it is the control period's, because no timestep corrects that.
     fn exceeded(&self) -> Option<Exceeded> {
         let simulation = &self.simulation;
         let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
@@ -141,7 +140,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// The warning about the present timestep or control period, if a limit calls for one.
+    /// The warning about the present timestep or control period, if one exceeds its limit.
     pub(super) fn limit_warning(&self) -> Option<String> {
         let simulation = &self.simulation;
         let (timestep, (limit, period_limit)) = (simulation.timestep(), self.limits());
@@ -158,11 +157,11 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         };
         Some(match self.exceeded()? {
             Exceeded::Period => format!(
-                "the control period {}, up to which the controller is predicted to be stable {place}",
+                "the control period {}, the predicted stability limit of the controller {place}",
                 over(effective, period_limit)
             ),
             Exceeded::Motion(motion) => format!(
-                "the timestep {}, up to which {method} is predicted to carry a motion of {} rad/s",
+                "the timestep {}, the predicted limit of {method} for a motion of {} rad/s",
                 over(timestep, motion.timestep),
                 Shown(motion.speed)
             ),
@@ -177,14 +176,14 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
                     format!(" with a control period of {} s", Shown(effective))
                 };
                 format!(
-                    "the timestep {}, up to which {method} is predicted to be stable {place}{period}",
+                    "the timestep {}, the predicted stability limit of {method} {place}{period}",
                     over(timestep, limit)
                 )
             }
         })
     }
 
-    /// The message of `/arm_sim/error_estimate`: of the step that is about to be taken, paused or not.
+    /// The message of `/arm_sim/error_estimate`, for the next step, paused or not.
     pub(super) fn error_estimate(&self) -> ErrorEstimateMessage<'static> {
         let estimate = estimate(&self.simulation);
         self.world.count_estimate();

@@ -1,32 +1,32 @@
-//! The arm's memory of its largest stable timestep and control period, and which loops share one.
+//! The last predicted limits of the arm, and which loops they apply to.
 //!
-//! **Invariant:** a limit is kept together with the loop that it is about.
+//! **Invariant:** a limit is stored together with its loop.
 
 use std::time::Duration;
 
 use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
 
-/// The arm's memory of its limit.
+/// The last predicted limit.
 #[derive(Default)]
 pub(crate) struct LimitWatch<const N: usize> {
-    /// The loop that was last asked about, and when.
+    /// The loop of the last request, and its time.
     pub(crate) asked: Option<(ControlLoop<N>, Duration)>,
-    /// The answer is on its way.
+    /// Whether the answer is still pending.
     pub(crate) waiting: bool,
-    /// The latest answer, and the loop that it is about.
+    /// The latest answer and its loop.
     pub(crate) known: Option<(ControlLoop<N>, ClockLimits)>,
-    /// Whether a timestep or a period was too long, and whether the controller held a goal up, when that was last
-    /// published.
+    /// The last published warnings: whether a timestep or a period was too long, and whether a goal waited for
+    /// the controller.
     pub(crate) warned: (bool, bool),
 }
 
-/// Whether two loops have one limit: it depends on everything but the timestep.
+/// Whether two loops have the same limit. It depends on everything except the timestep.
 pub(crate) fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
     one.setpoint == other.setpoint && resemble(one, other)
 }
 
-/// Whether two loops differ in setpoint and timestep at most.
+/// Whether two loops differ at most in setpoint and timestep.
 pub(crate) fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
     one.arm == other.arm
         && one.gains == other.gains

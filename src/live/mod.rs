@@ -1,11 +1,11 @@
 //! The live arm without an actor: steps that are due, requests, goals, limits, topics. The node `arm_sim` runs it on a
 //! thread of its own, and the page without a server in its worker.
 //!
-//! The arm asks its surroundings ([`World`]) for the time, and gives them its messages. The steps that are due are
-//! computed by `math::pacer`, and each step by `math::simulation`.
+//! The arm gets the time from its environment ([`World`]), and passes its messages there. `math::pacer` computes
+//! the number of due steps, and `math::simulation` each step.
 //!
-//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. The
-//! simulation is changed from outside by `change` alone.
+//! **Invariant:** there is no physics here. The live arm and an offline `Simulation` are bit-identical. Only
+//! `change` changes the simulation from outside.
 
 mod counts;
 mod goals;
@@ -39,54 +39,54 @@ pub use self::limit::LEAST_PAUSE;
 pub use self::requests::{ArmRequest, ControllerOn};
 pub use self::steps::StepsAsked;
 
-/// Publishing ticks a second, and so the rate of `/joint_states` and `/clock` \[Hz\].
+/// Publishing ticks per second: the rate of `/joint_states` and `/clock` \[Hz\].
 pub const PUBLISH_RATE: u32 = 60;
-/// Time that one wake-up may spend on steps: a message to the arm may have to wait for that.
+/// Most time of one wake-up for steps. A message to the arm may have to wait so long.
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
-/// Between two wake-ups while steps are owed. So the arm takes as much of its core as it needs, not a share that is
-/// fixed by the rate of publishing. A timestep that no machine can follow leaves the others some of it.
+/// Pause between two wake-ups while steps are due. So the arm can use most of its core, independent of the
+/// publishing rate. With a timestep that is too short for the machine, other threads still get part of the core.
 pub const BREATHER: Duration = Duration::from_millis(1);
-/// Steps between two looks at the clock: some 10 microseconds of work.
+/// Steps between two checks of the clock: about 10 microseconds of work.
 const STEPS_BETWEEN_LOOKS: u64 = 64;
 
-/// The surroundings of the arm: clocks, and those who hear of it.
+/// The environment of the arm: clocks and receivers of its messages.
 pub trait World<const N: usize> {
-    /// The time since a fixed moment, by which simulation time goes.
+    /// The time since a fixed moment, the clock of the simulation time.
     fn now(&self) -> Duration;
 
-    /// A clock for the cost of work. Only differences mean something.
+    /// A clock for the cost of work. Only differences count.
     fn work_time(&self) -> Duration;
 
-    /// Publishes the frame that `write` writes, on a topic that somebody wants.
+    /// Publishes the frame that `write` writes, on a topic with subscribers.
     fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static);
 
-    /// Tells the owner of the goal how it goes or how it ended.
+    /// Sends feedback or the end of the goal to its owner.
     fn tell(&self, judged: GoalJudged<N>);
 
-    /// The number of clients, and of the messages that were dropped.
+    /// The number of clients and of dropped messages.
     fn clients(&self) -> (u64, u64);
 
     /// The simulation has diverged.
     fn note_divergence(&self, _: Divergence) {}
 
-    /// An estimate of the local error has been made.
+    /// Counts an estimate of the local error.
     fn count_estimate(&self) {}
 }
 
-/// An arm of `N` links that moves as time goes on.
+/// An arm of `N` links that moves in real time.
 pub struct LiveArm<const N: usize, W> {
     pub(crate) world: W,
     pub(crate) simulation: Simulation<N>,
     pacer: Pacer,
     pub(crate) paused: bool,
-    /// Simulation time at the latest pause, or at the reset since \[s\].
+    /// Simulation time at the latest pause or reset \[s\].
     pub(crate) paused_at: f64,
-    /// Steps are owed, and a wake-up after a [`BREATHER`] will take them up.
+    /// Whether steps are due that a wake-up after a [`BREATHER`] will take.
     catching_up: bool,
     pub(crate) telemetry: Telemetry,
     pub(crate) goals: Goals<N>,
     limit: LimitWatch<N>,
-    /// The listener to everything that the steps depend on, if there is one.
+    /// The journal of the steps' inputs, if there is one.
     pub(crate) journal: Option<Journal<N>>,
 }
 
@@ -109,26 +109,26 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Changes the time between two runs of the control law \[s\], not negative, before anything else is done.
+    /// Changes the control period \[s\], not negative, before any other call.
     pub fn set_period(&mut self, period: f64) {
         let delay = false;
         self.simulation
             .set_control_period(ControlPeriod { period, delay });
     }
 
-    /// The simulation as it is now.
+    /// The present simulation.
     #[must_use]
     pub fn simulation(&self) -> &Simulation<N> {
         &self.simulation
     }
 
-    /// The surroundings.
+    /// The environment.
     #[must_use]
     pub fn world(&self) -> &W {
         &self.world
     }
 
-    /// The settings as they are now.
+    /// The present settings.
     #[must_use]
     pub fn present(&self) -> Present<N> {
         Present {
@@ -137,20 +137,20 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Somebody subscribes to a topic of the arm from now on, or nobody does.
+    /// Sets whether a topic of the arm has subscribers.
     pub fn set_wanted(&mut self, topic: Topic, wanted: bool) {
         self.telemetry.set_wanted(topic, wanted);
         self.publish_lasting(topic);
     }
 
-    /// Takes the steps that are due, as far as one wake-up's budget goes. True if others stay owed: the caller calls
+    /// Takes due steps within one wake-up's budget. Returns `true` if steps remain: the caller then calls
     /// [`LiveArm::catch_up`] after a [`BREATHER`].
     pub fn advance_to_now(&mut self) -> bool {
         if self.paused || self.simulation.divergence().is_some() {
             return false;
         }
-        // One budget for all that comes before the breather is over: were each message to cost one, a client that sends
-        // many would keep the arm from everybody else.
+        // There is one budget until the breather is over. With one per message, a client with many messages could block
+        // the arm for all others.
         if self.catching_up {
             return false;
         }
@@ -170,15 +170,15 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.catching_up
     }
 
-    /// Takes up what was owed before the breather; the answer is that of [`LiveArm::advance_to_now`].
+    /// Takes the remaining steps after the breather. Returns the same as [`LiveArm::advance_to_now`].
     pub fn catch_up(&mut self) -> bool {
         self.catching_up = false;
         self.advance_to_now()
     }
 
-    /// Takes up to `due` steps, and no longer than the budget; answers how many.
+    /// Takes up to `due` steps within the budget. Returns their number.
     fn take_steps(&mut self, due: u64) -> u64 {
-        // The budget is about the processor's time, which tests in virtual time have too.
+        // The budget is processor time, which exists in virtual time too.
         let started = self.world.work_time();
         let mut taken = 0;
         while taken < due && self.spent_since(started) < WAKE_UP_BUDGET {
@@ -197,7 +197,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.world.work_time().saturating_sub(started)
     }
 
-    /// Tells of a divergence that has just happened.
+    /// Reports a divergence that has just happened.
     pub(crate) fn note_divergence(&mut self) {
         if let Some(journal) = &mut self.journal {
             journal.diverge(&self.simulation);
@@ -209,14 +209,14 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.publish_diagnostics();
     }
 
-    /// Time counts from here: the part of an unfinished step is dropped.
+    /// Time counts from here. The fraction of an unfinished step is dropped.
     pub(crate) fn restart_pacer(&mut self) {
         self.telemetry.note_backlog(0, 0.0);
         self.pacer
             .restart(self.world.now(), self.simulation.timestep());
     }
 
-    /// Has `input` take effect, from the next step on.
+    /// Applies `input` from the next step on.
     pub(crate) fn change(&mut self, input: ArmInput<N>) {
         let steps = self.simulation.steps();
         self.simulation.apply(input);
@@ -225,7 +225,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Tells the state, if anybody listens and it has not been told.
+    /// Records the state, if there is a journal and the state is new.
     pub(crate) fn tell_state(&mut self) {
         if let Some(journal) = &mut self.journal {
             journal.stand(&self.simulation);

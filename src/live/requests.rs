@@ -1,7 +1,7 @@
 //! The effects of requests on the arm.
 //!
-//! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step. A
-//! switch that is in that position already changes nothing, but ends a commanded effort.
+//! **Invariant:** a request with the present values does not change the arm, not even the fraction of a step.
+//! Setting a switch to its present position only ends a commanded effort.
 
 use super::{LiveArm, World};
 use crate::math::arm::{Arm, State};
@@ -41,12 +41,12 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 }
 
-/// A question that the arm answers at once.
+/// A request that the arm answers at once.
 pub trait ArmRequest<const N: usize>: Ask {
-    /// Does what is asked for.
+    /// Executes the request.
     fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Self::Answer;
 
-    /// Whether the answer has to wait until all news of goals so far have been passed on.
+    /// Whether the answer must wait until all earlier news of goals have been sent.
     fn waits_for_news<W: World<N>>(_arm: &LiveArm<N, W>) -> bool {
         false
     }
@@ -86,7 +86,7 @@ impl<const N: usize> ArmRequest<N> for SetIntegrator {
         if let Some(method) = self.method {
             arm.change(ArmInput::Method(method));
         }
-        // Setting the timestep that is in force already must not cost the unfinished fraction of a step.
+        // Setting the present timestep must not discard the unfinished fraction of a step.
         let present = arm.simulation.timestep().to_bits();
         if let Some(timestep) = self.timestep.filter(|new| new.to_bits() != present) {
             arm.change(ArmInput::Timestep(timestep));
@@ -115,7 +115,7 @@ impl<const N: usize> ArmRequest<N> for SetParams<N> {
                 arm.publish_description();
             }
             Ok(_) => {}
-            // The fields were checked with the same bounds; should the two ever differ, the arm's word counts.
+            // The fields were checked with the same bounds. If the two differ, the arm's error counts.
             Err(why) => rejected.refuse("params", &why),
         }
         let values = *arm.simulation.arm();
@@ -143,7 +143,7 @@ impl<const N: usize> ArmRequest<N> for SetPeriod {
     }
 }
 
-/// A goal that ends by it is announced before the answer.
+/// The result of a goal that it ends is published before the answer.
 impl<const N: usize> ArmRequest<N> for Reset<N> {
     fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<State<N>> {
         if self.rejected.is_empty() {
@@ -180,7 +180,7 @@ impl<const N: usize> ArmRequest<N> for SetState<N> {
             }));
             arm.restart_energy_drift();
             if had_diverged {
-                // Time has stood still meanwhile.
+                // Simulation time did not pass meanwhile.
                 arm.restart_pacer();
                 arm.publish_diagnostics();
             }
@@ -195,7 +195,7 @@ impl<const N: usize> ArmRequest<N> for SetState<N> {
 impl<const N: usize> ArmRequest<N> for Pause {
     fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> Echo<bool> {
         if self.paused == Some(true) {
-            // One that was stepped meanwhile stands still again.
+            // An arm that was stepped while paused counts as paused from here.
             arm.paused_at = arm.simulation.time();
         }
         let present = arm.paused;
@@ -231,7 +231,7 @@ impl<const N: usize> ArmRequest<N> for Enable {
         }
     }
 
-    /// A path ends with the controller, and before the answer.
+    /// A path ends when the controller is switched off, before the answer.
     fn waits_for_news<W: World<N>>(arm: &LiveArm<N, W>) -> bool {
         !arm.simulation.pid().is_enabled()
     }

@@ -1,6 +1,6 @@
 //! Topics for 3D tools: `/tf` at every tick, `/tf_static` and `/robot_description` once and at every change of the arm.
 //!
-//! **Invariant:** nothing is made for a topic that nobody subscribes to.
+//! **Invariant:** nothing is computed for a topic without subscribers.
 
 use super::{LiveArm, World};
 use crate::protocol::catalog::Topic;
@@ -10,7 +10,7 @@ use crate::protocol::ros::{srdf, urdf};
 use crate::services::arm::joint_names;
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// `/tf`, if anybody wants it.
+    /// Publishes `/tf`, if it has subscribers.
     pub(super) fn publish_transforms(&self, stamp: Stamp) {
         if self.telemetry.wants(Topic::Tf) {
             let lengths = *self.simulation.arm().lengths();
@@ -21,13 +21,13 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Publishes the topics that change with lengths and masses alone.
+    /// Publishes the topics that change only with lengths and masses.
     pub(super) fn publish_description(&self) {
         self.publish_lasting(Topic::TfStatic);
         self.publish_lasting(Topic::RobotDescription);
     }
 
-    /// A message that holds until the next, if anybody wants it.
+    /// Publishes a message that stays valid until the next one, if the topic has subscribers.
     pub(super) fn publish_lasting(&self, topic: Topic) {
         if !self.telemetry.wants(topic) {
             return;

@@ -1,13 +1,14 @@
-//! Single steps of a paused arm, taken in rows.
+//! Single steps of a paused arm, taken in rows (a limited number per turn).
 //!
-//! **Invariant:** a row ends with what is to be told of a goal, so that no step comes before it is told.
+//! **Invariant:** a row ends with each message about a goal, so the message is sent before the next
+//! step.
 
 use super::{GoalJudged, LiveArm, World};
 use crate::math::simulation::ArmInput;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{DIVERGED, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
 
-/// Steps that somebody has asked for and that are not all taken.
+/// Requested steps that are not all taken.
 #[derive(Debug, Clone, Copy)]
 pub struct StepsAsked<const N: usize> {
     asked: u64,
@@ -17,10 +18,10 @@ pub struct StepsAsked<const N: usize> {
 }
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// Whether the steps may be taken.
+    /// Checks whether the steps can be taken.
     ///
     /// # Errors
-    /// All that is wrong with the request.
+    /// All rejected fields of the request.
     pub fn begin_steps(&self, ask: Step<N>) -> Result<StepsAsked<N>, Rejections> {
         let mut rejected = ask.rejected;
         if !self.paused {
@@ -38,8 +39,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Takes the next steps in a row. Returns the answer if they were the last, and what is to be told of the goal
-    /// before the next row.
+    /// Takes the next row of steps. Returns the answer after the last one, and the message about the goal to be
+    /// sent before the next row.
     pub fn take_row(
         &mut self,
         steps: &mut StepsAsked<N>,
@@ -53,7 +54,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
         let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
         let mut progress = None;
-        // A goal that is reached on the way ends an advance, not the steps. News of a goal end the row.
+        // A reached goal ends an advance, but not the request. News of a goal end the row.
         while steps.taken < row_end && progress.is_none() && self.simulation.divergence().is_none()
         {
             let taken;

@@ -1,7 +1,7 @@
 //! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
 //! `/diagnostics` once a second and at every change.
 //!
-//! **Invariant:** nothing is computed for a topic without a subscriber; messages are written elsewhere.
+//! **Invariant:** nothing is computed for a topic without subscribers. Messages are encoded elsewhere.
 
 use serde::Serialize;
 
@@ -17,12 +17,11 @@ use crate::protocol::messages::{
 };
 use crate::services::arm::joint_names;
 
-/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for
-/// control.
+/// Ticks between two messages of `/arm_sim/error_estimate`. Its rate is 10 Hz, because people read it.
 const ESTIMATE_TICKS: u64 = 6;
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// Has the arm tell what is due at a tick, after the steps until then.
+    /// Publishes the messages that are due at a tick, after the steps until then.
     pub fn tick(&mut self) {
         self.watch_warnings();
         self.publish_state();
@@ -53,7 +52,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// `/diagnostics`, if anybody wants it.
+    /// Publishes `/diagnostics`, if it has subscribers.
     pub(super) fn publish_diagnostics(&mut self) {
         if self.telemetry.wants(Topic::Diagnostics) {
             let diagnostics = self.diagnostics();
@@ -62,12 +61,12 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// The drift counts from the present energy.
+    /// Measures the drift from the present energy.
     pub(super) fn restart_energy_drift(&mut self) {
         self.telemetry.energy_reference = energy(&self.simulation);
     }
 
-    /// Publishes the message that `make` makes, when its frame is written.
+    /// Publishes the message of `make`, which is called when the frame is written.
     pub(super) fn publish<M: Serialize>(
         &self,
         topic: Topic,
@@ -136,7 +135,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             ("timestep_limit_motion", self.motion().timestep),
         ];
         let mut values = vec![entry("state", state)];
-        // Debug prints what is huge or tiny with an exponent.
+        // The Debug format writes very large and very small numbers with an exponent.
         values.extend(numbers.map(|(key, value)| entry(key, format!("{value:?}"))));
         let setpoint = self.simulation.pid().setpoint().position;
         values.push(entry("setpoint", format!("{setpoint:?}")));
@@ -150,7 +149,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// Warnings about an arm that goes on all the same.
+    /// Warnings about a running arm.
     fn warnings(&self) -> Vec<String> {
         let lags = !self.paused && self.telemetry.lags();
         let late = lags.then(|| {

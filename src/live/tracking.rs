@@ -1,9 +1,9 @@
-//! Goals on the arm: judged at every physics step, in simulation time, where the steps are made.
+//! Goals on the arm. Every physics step is checked, in simulation time.
 //!
-//! A goal is announced with [`LiveArm::track_goal`], which puts an end to the one before, and judged from
-//! [`LiveArm::command_goal`] on. A reset in between takes the goal away, and the command has no effect.
+//! [`LiveArm::track_goal`] announces a goal and ends the previous one. From [`LiveArm::command_goal`] on,
+//! steps are checked. A reset in between ends the goal, and the command has no effect.
 //!
-//! **Invariant:** without a goal the arm steps as if this file did not exist.
+//! **Invariant:** without a goal this file has no effect on the steps.
 
 use std::ops::ControlFlow;
 
@@ -15,20 +15,20 @@ use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    /// The arm at this instant.
+    /// The present state of the arm.
     #[must_use]
     pub fn pose(&self) -> Pose<N> {
         pose(&self.simulation, self.goals.past)
     }
 
-    /// Whether each step is judged.
+    /// Whether each step is checked.
     #[must_use]
     pub fn judges_steps(&self) -> bool {
         let tracked = self.goals.tracked.as_ref();
         tracked.is_some_and(|goal| goal.commanded)
     }
 
-    /// A goal begins, and the one before it ends, both in this instant.
+    /// Begins a goal and ends the previous one, at the same time.
     pub fn track_goal(&mut self, order: &GoalOrder<N>) -> Tracking<N> {
         self.goals.preempt(&self.simulation);
         let before = self.goals.latest;
@@ -45,7 +45,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// The goal's setpoint \[rad\] is held from the next step on, and the goal judged, unless it has ended.
+    /// Holds the goal's setpoint \[rad\] from the next step on, and checks the goal, unless it has ended.
     pub fn command_goal(&mut self, number: u64, positions: [f64; N]) {
         let time = self.simulation.time();
         let tracked = self.goals.tracked.as_mut();
@@ -57,7 +57,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         }
     }
 
-    /// The goal is preempted, unless it has ended already. The answer is how the latest goal ended.
+    /// Preempts the goal, unless it has ended already. Returns how the latest goal ended.
     pub fn end_goal(&mut self, number: u64) -> Option<GoalJudged<N>> {
         let tracked = self.goals.tracked.as_ref();
         if tracked.is_some_and(|goal| goal.number == number) {
@@ -66,9 +66,9 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.goals.latest
     }
 
-    /// Takes up to `steps` steps, and returns how many; fewer if a goal is reached on the way, or if the simulation
-    /// diverges. For a caller that `waits` they end at feedback too, which is returned. A single step while paused may
-    /// be longer than a sixtieth of a second, and each has feedback for every subscriber.
+    /// Takes up to `steps` steps, and returns their number. There are fewer if a goal is reached or the simulation
+    /// diverges. For a caller that `waits` they also end at feedback, which is returned. While paused, a single step
+    /// may be longer than a sixtieth of a second, so each step may have feedback.
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalJudged<N>>) {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
@@ -101,7 +101,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         (taken, progress)
     }
 
-    /// To be called before the simulation is reset: the goal is preempted, and its owner hears of it.
+    /// Call this before the simulation is reset. It preempts the goal and informs its owner.
     pub(super) fn end_goal_for_reset(&mut self) {
         let ended = self.goals.preempt(&self.simulation);
         self.goals.past.end(self.simulation.time());

@@ -1,9 +1,9 @@
-//! Log lines to standard error, written by a thread of their own.
+//! Log lines on standard error, written by a separate thread.
 //!
-//! A parent process that never reads the pipe on our standard error must not stop the arm. A bounded queue therefore
-//! feeds the thread, and lines that find it full are dropped and counted.
+//! A full stderr pipe must not block the arm. So a bounded queue feeds the thread, and lines that do not fit are
+//! dropped and counted.
 //!
-//! **Invariant:** logging never blocks, a broken standard error never fails anything, and every event is one
+//! **Invariant:** logging never blocks, a broken standard error causes no failure, and every event is one
 //! line.
 
 pub mod repeats;
@@ -26,31 +26,31 @@ use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 use self::repeats::{PERIOD, Repeated, Repeats};
 use crate::protocol::wire::text::acts;
 
-/// Lines that may wait for the writer: more than any burst of connections logs at the default level.
+/// Most lines in the queue: more than a burst of connections logs at the default level.
 pub const QUEUE_LINES: usize = 1024;
 
-/// Longest line that is kept \[bytes\]. With [`QUEUE_LINES`] it bounds the memory of a reader that stalls to 4 MiB.
+/// Longest line \[bytes\]. With [`QUEUE_LINES`] it bounds the memory of the queue to 4 MiB.
 pub const LINE_BYTES: usize = 4096;
 
 /// The target of the log's own lines.
 const OWN_TARGET: &str = "pendularm::logging";
 
-/// How long the end of the program waits for the last lines to be written.
+/// Longest time that the end of the program waits for the last lines.
 const FINISH: Duration = Duration::from_millis(100);
 
 enum Entry {
     Line(Vec<u8>),
-    /// Answered once every line before it is written.
+    /// A request that is answered after all earlier lines have been written.
     Written(SyncSender<()>),
 }
 
-/// A warning or an error: where it comes from, and its text.
+/// A warning or an error: its origin and its text.
 pub type Warning = (&'static Metadata<'static>, String);
 
 static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
 
-/// Sends warnings and errors to `listener` too from now on, at every level of the log. `None` ends that. A warning that
-/// finds the channel full is dropped.
+/// Also sends warnings and errors to `listener` from now on, at every level of the log. `None` ends that. If the
+/// channel is full, the warning is dropped.
 pub fn hear_warnings(listener: Option<Sender<Warning>>) {
     *LISTENER.lock().unwrap_or_else(PoisonError::into_inner) = listener;
 }
@@ -64,7 +64,7 @@ fn pass_on(metadata: &'static Metadata<'static>, text: String) {
     }
 }
 
-/// How each line of the log is written.
+/// The format of log lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LogFormat {
     /// For people.
@@ -74,7 +74,7 @@ pub enum LogFormat {
     Json,
 }
 
-/// The way into the log.
+/// The queue of the log.
 #[derive(Clone)]
 pub struct Log {
     level: LevelFilter,
@@ -87,7 +87,7 @@ pub struct Log {
 /// Logs events of `tracing` from now on, down to `level`, to standard error.
 ///
 /// # Errors
-/// If the thread that writes cannot be started, or a log has been started already.
+/// If the writing thread cannot be started, or a log has been started already.
 pub fn start(level: LevelFilter, format: LogFormat) -> io::Result<Log> {
     let (entries, queue) = sync_channel(QUEUE_LINES);
     let log = Log {
@@ -112,7 +112,7 @@ pub fn start(level: LevelFilter, format: LogFormat) -> io::Result<Log> {
     Ok(log)
 }
 
-/// Decides which events are printed, and passes warnings on to their listener, at every level of the log.
+/// Decides which events are printed. Passes warnings to their listener, at every level of the log.
 impl<S: Subscriber> Layer<S> for Log {
     fn max_level_hint(&self) -> Option<LevelFilter> {
         Some(self.level.max(LevelFilter::WARN))
@@ -139,28 +139,28 @@ impl<S: Subscriber> Layer<S> for Log {
 }
 
 impl Log {
-    /// Puts a line into the log as an error, at every level of the log.
+    /// Logs a line as an error, at every level of the log.
     pub fn say(&self, line: &str) {
         self.put(self.own(Level::ERROR, OWN_TARGET, line));
     }
 
-    /// Waits until all lines so far are written, for a moment at most.
+    /// Waits until all earlier lines are written, for a bounded time.
     pub fn finish(&self) {
         let (written, all) = sync_channel(1);
         if self.entries.try_send(Entry::Written(written)).is_ok() {
-            // A reader that is too slow loses the last lines.
+            // A reader that is too slow misses the last lines.
             let _ = all.recv_timeout(FINISH);
         }
     }
 
-    /// A line that does not fit is lost, and counted.
+    /// A line that does not fit is dropped and counted.
     fn put(&self, line: Vec<u8>) {
         if self.entries.try_send(Entry::Line(line)).is_err() {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Passes repeated events on to the listener. Returns their line, if the log's level asks for one.
+    /// Passes repeated events to the listener. Returns their line, if the log's level includes it.
     fn report(&self, repeated: Repeated) -> Option<Vec<u8>> {
         let (metadata, events, text) = (repeated.metadata, repeated.events, repeated.text);
         let text = match events {
@@ -173,10 +173,10 @@ impl Log {
         line
     }
 
-    /// A line that `tracing` does not print, in the form of those that it does.
+    /// A line that does not come from `tracing`, in the same format.
     fn own(&self, level: Level, target: &str, text: &str) -> Vec<u8> {
         let mut time = String::new();
-        // Only a clock beyond all years fails. The line then has no time.
+        // The format fails only for a year out of range. The line then has no time.
         let _ = SystemTime.format_time(&mut Writer::new(&mut time));
         let level = level.as_str();
         self.kept(&match self.format {
@@ -188,11 +188,11 @@ impl Log {
         })
     }
 
-    /// Bounds the length of a line, and escapes characters that act on a terminal. The line may repeat a client's text,
-    /// and a client must not be able to write lines of its own.
+    /// Bounds the length of a line, and escapes control characters. The line may contain a client's text, which must
+    /// not form a line by itself.
     fn kept(&self, line: &str) -> Vec<u8> {
         let mut kept = escape(line.strip_suffix('\n').unwrap_or(line));
-        // Room for the mark, and for a character that is cut with the text.
+        // Space for the mark, and for a character at the cut.
         let mut most = LINE_BYTES - 8;
         while kept.len() > LINE_BYTES && most > 0 {
             kept = match self.format {
@@ -205,7 +205,7 @@ impl Log {
         kept.into_bytes()
     }
 
-    /// Writes line after line. An error of the sink has nowhere to be reported.
+    /// Writes all lines. Errors of standard error cannot be reported.
     fn write_lines(&self, queue: &Receiver<Entry>, mut sink: impl Write) {
         loop {
             let (mut early, mut asked) = (Duration::ZERO, None);
@@ -214,7 +214,7 @@ impl Log {
                     let _ = sink.write_all(&line);
                 }
                 Ok(Entry::Written(written)) => (early, asked) = (PERIOD, Some(written)),
-                // The log itself holds a sender: the queue is empty.
+                // The log itself holds a sender, so this means an empty queue.
                 Err(_) => {}
             }
             for repeated in self.repeats.due(Instant::now() + early) {
@@ -231,7 +231,7 @@ impl Log {
     }
 }
 
-/// Takes one line at a time: `tracing-subscriber` formats an event first, then writes it whole.
+/// Gets one line per call, because `tracing-subscriber` formats an event and then writes it whole.
 impl Write for Log {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         self.put(self.kept(&String::from_utf8_lossy(line)));
@@ -243,7 +243,7 @@ impl Write for Log {
     }
 }
 
-/// JSON itself has no character that acts on a terminal: one of them is part of a text.
+/// The JSON syntax has no control character, so one of them is part of a text.
 fn escape(line: &str) -> String {
     let mut escaped = String::with_capacity(line.len() + 1);
     for character in line.chars() {
@@ -257,7 +257,7 @@ fn escape(line: &str) -> String {
     escaped
 }
 
-/// The first `most` bytes of a text, and a mark that it goes on.
+/// The first `most` bytes of a text, and a mark that it was cut.
 fn cut(text: &str, most: usize) -> String {
     let kept = text.as_bytes().get(..most).unwrap_or(text.as_bytes());
     String::from_utf8_lossy(kept).into_owned() + "..."

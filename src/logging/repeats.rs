@@ -1,8 +1,7 @@
 //! Repeated events, reported once a second.
 //!
-//! A client can cause an event as often as it sends a frame. The first event of a kind is reported at once. Lines that
-//! follow within a second are reported together, with their number, when the second is over. A kind is a place in the
-//! source.
+//! A client can cause an event with every frame. The first event of a kind is reported at once. Further ones within a
+//! second are reported together, with their number, after the second. A kind is a place in the source.
 //!
 //! **Invariant:** no kind is reported more than once a second, every event is counted, and there is at most one entry
 //! for each place in the source.
@@ -18,7 +17,7 @@ use tracing_subscriber::fmt::format::{DefaultFields, FormatFields, Writer};
 /// Time between two reports of a kind.
 pub const PERIOD: Duration = Duration::from_secs(1);
 
-/// The kinds that were reported within the last second: the end of it, and the events since.
+/// The kinds reported within the last second, with the end of the second and the events since.
 #[derive(Default)]
 pub struct Repeats(Mutex<HashMap<Identifier, (Instant, Option<Repeated>)>>);
 
@@ -26,14 +25,14 @@ pub struct Repeats(Mutex<HashMap<Identifier, (Instant, Option<Repeated>)>>);
 pub struct Repeated {
     /// Their place in the source.
     pub metadata: &'static Metadata<'static>,
-    /// The first of them in words.
+    /// The text of the first one.
     pub text: String,
     /// Their number.
     pub events: u64,
 }
 
 impl Repeats {
-    /// Counts an event. Returns the report that is due with it. A report of one event is a report of this one.
+    /// Counts an event. Returns the report that is due with it. A report with one event reports this event.
     pub fn count(&self, event: &Event<'_>, now: Instant) -> Option<Repeated> {
         let metadata = event.metadata();
         let mut kinds = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -47,7 +46,7 @@ impl Repeats {
         take(until, held, now)
     }
 
-    /// The reports that are due at `now`. Kinds without events are forgotten.
+    /// The reports that are due at `now`. Kinds without events are removed.
     pub fn due(&self, now: Instant) -> Vec<Repeated> {
         let mut kinds = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let due = kinds.values_mut();
@@ -58,7 +57,7 @@ impl Repeats {
     }
 }
 
-/// Takes the events that are held, if their second is over, and begins the next one.
+/// Takes the held events, if their second is over, and begins the next second.
 fn take(until: &mut Instant, held: &mut Option<Repeated>, now: Instant) -> Option<Repeated> {
     let repeated = held.take_if(|_| now >= *until)?;
     *until = now + PERIOD;

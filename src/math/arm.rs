@@ -1,8 +1,8 @@
-//! The arm as physics sees it: a planar chain of uniform rods on revolute joints, and its state.
+//! The physical model of the arm: a planar chain of uniform rods on revolute joints, and its state.
 //!
 //! Link `i` is a thin uniform rod: centre of mass at `l_i / 2`, inertia `m_i l_i² / 12` about it. Joint angles are
-//! relative to the previous link (the first to +x), counter-clockwise, and gravity pulls along -y. It uses nothing but
-//! floating point.
+//! relative to the previous link (the first to +x), counter-clockwise, and gravity pulls along -y. All arithmetic is
+//! floating-point.
 //!
 //! **Invariant:** an [`Arm`] that exists is valid: lengths and masses finite and positive, gravity finite and not
 //! negative. Constants that depend on parameters alone are computed here, once.
@@ -20,18 +20,18 @@ pub struct Arm<const N: usize> {
     pub(super) rods: [Rod; N],
 }
 
-/// The constants of one link that the dynamics need, of one arm or of several side by side.
+/// The constants of one link that the dynamics need, for one arm or for several side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rod<T = f64> {
     /// Length \[m\].
     pub(super) length: T,
     /// Mass of all links beyond this one \[kg\].
     pub(super) beyond: T,
-    /// Mass in units of the previous link's; 0 for the first link, which has none before it.
+    /// Mass divided by the mass of the previous link; 0 for the first link.
     pub(super) mass_ratio: T,
     /// `1 / l` \[1/m\].
     pub(super) per_length: T,
-    /// `1 / (m l)` \[1/(kg m)\]; makes an acceleration of an effort.
+    /// `1 / (m l)` \[1/(kg m)\]; converts an effort to an acceleration.
     pub(super) per_mass_length: T,
 }
 
@@ -169,7 +169,7 @@ fn check_positive(field: &'static str, values: &[f64]) -> Result<(), ArmError> {
     Ok(())
 }
 
-/// Positions and velocities of the joints, of one arm or of several side by side.
+/// Positions and velocities of the joints, for one arm or for several side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<const N: usize, T = f64> {
     /// Joint angles \[rad\], never wrapped.
@@ -197,7 +197,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// The state that the increments of a step lead to.
+    /// The state after a step with these increments.
     #[must_use]
     #[allow(
         clippy::indexing_slicing,
@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_reach_is_the_length_of_the_stretched_arm() {
-        // All are powers of two, so that the sum is exact.
+        // All are powers of two, so the sum is exact.
         assert!((Arm::new([1.0, 0.5, 0.25], [1.0; 3], 0.0).unwrap().reach() - 1.75).abs() == 0.0);
     }
 

@@ -1,8 +1,8 @@
 //! Counts as floating-point numbers.
 //!
-//! **Invariant:** the number is the count itself: none is rounded below 2^53.
+//! **Invariant:** the conversion is exact for counts up to 2^53.
 
-/// A count as a double: exact up to 2^53, more than anything here counts.
+/// A count as a double: exact up to 2^53, which no count here reaches.
 #[inline]
 #[must_use]
 #[allow(clippy::cast_precision_loss, reason = "counts are below 2^53")]
@@ -27,10 +27,10 @@ pub fn steps_in(duration: f64, timestep: f64) -> f64 {
     duration / timestep * (1.0 + ROUNDING)
 }
 
-/// How many of the numbers `0..count` there are for which `holds`, which it does up to some number and then no more.
+/// The number of values in `0..count` for which `holds` is true. It is true up to some value, and false from there on.
 #[must_use]
 pub fn partition_point(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    // Mostly for all of them.
+    // In most calls it is true for all of them.
     if count == 0 || holds(count - 1) {
         return count;
     }

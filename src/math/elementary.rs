@@ -1,6 +1,7 @@
-//! Elementary functions that have the same bits on every platform; the standard library's are the platform's.
+//! Elementary functions with the same bits on every platform. Those of the standard library differ between platforms.
 //!
-//! **Invariant:** arguments in radians; results as accurate as a C library's, to a unit in the last place or so.
+//! **Invariant:** angles are in radians. Results are as accurate as those of a C library, to about one unit in
+//! the last place.
 
 /// Sine and cosine.
 pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
@@ -12,7 +13,7 @@ pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// Length of (`x`, `y`), without overflow on the way.
+/// Length of (`x`, `y`), without intermediate overflow.
 pub(crate) fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
 }

@@ -1,5 +1,4 @@
-//! A goal over time: whether the end effector has come near enough and stayed, and when its progress is due to be
-//! reported.
+//! A goal over time: whether the end effector has reached it and stayed, and when feedback is due.
 //!
 //! Both get the simulation time and the end effector's position after every step, while a goal is active.
 //!
@@ -11,10 +10,10 @@ use std::fmt;
 
 use glam::DVec2;
 
-/// `epsilon` where a request gives none \[m\]: 1 % of the reach of the default arm of two links.
+/// Default of `epsilon` \[m\]: 1 % of the reach of the default arm of two links.
 pub const EPSILON: f64 = 0.02;
 
-/// `success_hold` where a request gives none \[s\]: longer than the default arm takes to swing through such an epsilon.
+/// Default of `success_hold` \[s\]: longer than the default arm takes to swing through such an epsilon.
 pub const SUCCESS_HOLD: f64 = 0.5;
 
 /// Feedback messages per second of simulation progress.
@@ -22,10 +21,9 @@ pub const FEEDBACK_RATE: f64 = 60.0;
 
 /// Returns the largest rounding error of a difference of two times \[s\] near `time`.
 ///
-/// A time is `base + k h`. Its error is half a unit in the last place for the product and half for the sum, at both
-/// ends. It is as much again because `h` is only the double nearest to, say, 1 ms. All that is less than four times
-/// `2⁻⁵² time` (3e-12 s after an hour). Without it, half a second would take a step more at some times than at
-/// others.
+/// A time is `base + k h`. The product and the sum each have an error of half a unit in the last place, at both ends.
+/// The same amount is added because `h` is only the double nearest to, say, 1 ms. The total is less than four times
+/// `2⁻⁵² time` (3e-12 s after an hour). Without this allowance, half a second would sometimes take one step more.
 pub(super) fn rounding(time: f64) -> f64 {
     4.0 * f64::EPSILON * time.abs()
 }
@@ -33,7 +31,7 @@ pub(super) fn rounding(time: f64) -> f64 {
 /// When a goal counts as reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria {
-    /// Greatest distance between end effector and target that counts as there \[m\], greater than 0.
+    /// Greatest distance between end effector and target that counts as reached \[m\], greater than 0.
     pub epsilon: f64,
     /// Simulation time that the end effector must stay there without interruption \[s\]; 0 accepts the first
     /// entry.
@@ -54,7 +52,7 @@ impl Default for Criteria {
 pub enum Outcome {
     /// The end effector stayed within `epsilon` for `success_hold`.
     Reached,
-    /// Cancelled, replaced by another goal, or its setpoint taken away by a reset.
+    /// The goal was cancelled, replaced by another goal, or ended by a reset.
     Preempted,
 }
 
@@ -75,16 +73,16 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// A stay without interruption.
+/// A stay within epsilon without interruption.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Dwell {
-    /// Time of the first look of the present stay; none while outside.
+    /// Time of the first check of the present stay; none while outside.
     entered: Option<f64>,
 }
 
 impl Dwell {
-    /// Takes a look at simulation time `time` \[s\]; `true` once the stay has lasted for `hold` \[s\]. One look outside
-    /// starts it over, and so does a clock that runs backwards.
+    /// Checks at simulation time `time` \[s\] whether the stay has lasted for `hold` \[s\]. A check outside restarts
+    /// the stay, and so does a clock that runs backwards.
     pub fn stays(&mut self, time: f64, is_inside: bool, hold: f64) -> bool {
         let entered = self.entered.filter(|&entered| entered <= time);
         self.entered = is_inside.then(|| entered.unwrap_or(time));
@@ -104,7 +102,7 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// A goal for the end effector to be at `target` \[m\], that starts at simulation time `now` \[s\].
+    /// A goal with the end effector at `target` \[m\], which starts at simulation time `now` \[s\].
     #[must_use]
     pub const fn new(target: DVec2, criteria: Criteria, now: f64) -> Self {
         Self {
@@ -115,30 +113,30 @@ impl Goal {
         }
     }
 
-    /// Tells the goal where the end effector is \[m\] after the step that ended at `time` \[s\]; `true` once it is
-    /// reached.
+    /// Checks the position of the end effector \[m\] after the step that ended at `time` \[s\]. Returns `true`
+    /// once the goal is reached.
     ///
-    /// Leaving epsilon, even for one step, starts the stay over. So does a clock that runs backwards, and a position
+    /// Leaving epsilon, even for one step, restarts the stay. So does a clock that runs backwards, and a position
     /// that is not a number counts as outside.
     pub fn judge(&mut self, time: f64, end_effector: DVec2) -> bool {
-        // NaN is not near anything.
+        // NaN counts as outside.
         let is_near = self.distance(end_effector) <= self.criteria.epsilon;
         self.dwell.stays(time, is_near, self.criteria.success_hold)
     }
 
-    /// The place for the end effector \[m\].
+    /// The target position of the end effector \[m\].
     #[must_use]
     pub const fn target(&self) -> DVec2 {
         self.target
     }
 
-    /// When it counts as reached.
+    /// The condition for success.
     #[must_use]
     pub const fn criteria(&self) -> Criteria {
         self.criteria
     }
 
-    /// The end effector's distance from the target \[m\]; orientation has no part in it.
+    /// The end effector's distance from the target \[m\]. Orientation does not count.
     #[must_use]
     pub fn distance(&self, end_effector: DVec2) -> f64 {
         let off = end_effector - self.target;
@@ -155,9 +153,9 @@ impl Goal {
 
 /// The times at which something with a fixed rate of simulation time is due.
 ///
-/// The first question is answered with yes and starts the count, so that even a goal that is over after one step
-/// reports once. After that there is one yes in each period in which the clock moved, never two for one question. Steps
-/// longer than a period give one each, and missed periods are not made up. A clock that runs backwards starts afresh.
+/// The first call returns `true` and starts the count, so even a goal that ends after one step reports once. After that
+/// one call returns `true` in each period in which the clock moved. Steps longer than a period give one report each,
+/// and missed periods are not made up. A clock that runs backwards restarts the count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cadence {
     /// Periods per second.
@@ -165,7 +163,7 @@ pub struct Cadence {
     count: Option<Feedbacks>,
 }
 
-/// Periods are counted from `origin`; the running `period` has been answered for.
+/// Periods are counted from `origin`. The present `period` has been reported.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Feedbacks {
     origin: f64,
@@ -174,13 +172,13 @@ struct Feedbacks {
 }
 
 impl Cadence {
-    /// A cadence of `rate` per second of simulation time, greater than 0.
+    /// A cadence of `rate` reports per second of simulation time. `rate` is greater than 0.
     #[must_use]
     pub const fn new(rate: f64) -> Self {
         Self { rate, count: None }
     }
 
-    /// Whether it is due at simulation time `time` \[s\].
+    /// Whether a report is due at simulation time `time` \[s\].
     pub fn due(&mut self, time: f64) -> bool {
         match &mut self.count {
             Some(count) if count.latest <= time => {

@@ -7,15 +7,15 @@
 //! | Verlet | 2 | 2 | `q' = q + h v + h²/2 a₁`; `v + h/2 (a₁ + a(t + h, q', v + h a₁))` |
 //! | Runge-Kutta 4 | 4 | 4 | classical 1:2:2:1 on the pair `(q, v)` |
 //!
-//! Positions and velocities are an array each, one entry per joint; a particle on a line has one. The live arm and
-//! `/arm_sim/integration_step` are stepped by [`increment`] and nothing else. It uses nothing but floating point.
+//! Positions and velocities are an array each, one entry per joint; a particle on a line has one. Only
+//! [`increment`] steps the live arm and `/arm_sim/integration_step`. All arithmetic is floating-point.
 //!
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope
 //! et al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
 //!
-//! Here are the facts and the steps of each method, over any kind of number.
+//! This file has the facts and the steps of each method, for any number type.
 //!
-//! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
+//! **Invariant:** every evaluation is at the time of its stage: `t`, `t + h/2` or `t + h`.
 
 #![allow(
     clippy::indexing_slicing,
@@ -35,7 +35,7 @@ pub enum Method {
     /// Explicit midpoint, order 2. Weakness: an undamped swing still grows, though only by `(ω h)⁴ / 8` a step.
     Midpoint,
     /// Velocity Verlet that predicts the velocity and corrects it once, order 2. Weakness: the forces of an arm depend
-    /// on velocity, so it keeps no energy as its textbook form does; stiff damping makes it diverge without
+    /// on velocity, so it does not conserve energy as its textbook form does. Stiff damping makes it diverge without
     /// oscillating.
     Verlet,
     /// Classical Runge-Kutta, order 4. Weakness: four evaluations a step, and no larger a stable timestep than the
@@ -94,15 +94,15 @@ impl Method {
         self.facts().evaluations
     }
 
-    /// How far the fastest link of an arm may turn in a step \[rad\]: a method that cannot follow a turn within a step
-    /// feeds energy into the arm. The numbers were measured; `study::motion` says on which arms.
+    /// The largest rotation of the fastest link in one step \[rad\]. With a larger one the method adds energy to the
+    /// arm. The numbers were measured; `study::motion` lists the arms.
     #[must_use]
     pub const fn max_rotation_per_step(self) -> f64 {
         self.facts().max_rotation_per_step
     }
 }
 
-/// All that is known of a method, beside its steps.
+/// The properties of a method.
 struct Facts {
     name: &'static str,
     order: u32,
@@ -116,7 +116,7 @@ impl fmt::Display for Method {
     }
 }
 
-/// A name that is no method's.
+/// A name that no method has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("must be one of {}", Method::ALL.map(Method::name).join(", "))]
 pub struct UnknownMethod;
@@ -138,8 +138,8 @@ pub type Increment<const N: usize, T = f64> = ([T; N], [T; N]);
 /// The increment of one step of length `h` \[s\] from `(q, v)` at time `t` \[s\].
 ///
 /// `acceleration(t, q, v)` \[rad/s²\] is evaluated [`Method::evaluations`] times, always first at the start itself.
-/// Increments, not states, are returned, so that a caller can sum them with compensation ([`two_sum`]). Values that are
-/// not finite are passed on, for the caller to judge.
+/// Increments, not states, are returned, so a caller can sum them with compensation ([`two_sum`]). Values that are not
+/// finite are returned too; the caller checks them.
 #[inline(always)]
 pub fn increment<T: Arithmetic, const N: usize>(
     method: Method,
@@ -225,9 +225,9 @@ fn rk4<T: Arithmetic, const N: usize>(
     )
 }
 
-/// `a + b` rounded, and what rounding left out of it, exactly (Knuth's two-sum, with no branch on which is larger).
+/// `a + b` rounded, and its exact rounding error (Knuth's two-sum, without a branch on which is larger).
 ///
-/// If it is carried into the next addition, a million small steps are as good as one.
+/// If the error is carried into the next addition, a million small steps are as accurate as one.
 #[inline(always)]
 #[must_use]
 pub fn two_sum<T: Arithmetic>(a: T, b: T) -> (T, T) {

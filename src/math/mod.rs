@@ -1,6 +1,6 @@
 //! The physics and the control of the arm: plain values and pure functions that get the time.
 //!
-//! **Invariant:** no clock, no I/O, no JSON, no threads, no actors in here.
+//! **Invariant:** this module uses no clock, no I/O, no JSON, no threads and no actors.
 
 pub mod arm;
 pub mod count;

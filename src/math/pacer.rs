@@ -1,33 +1,34 @@
-//! How many whole steps are due now, so that simulation time runs at wall time.
+//! Computes how many whole steps are due, so that simulation time runs at wall time.
 //!
-//! The pacer gets the time and keeps two numbers: the moment from which it counts (the anchor) and the steps taken
-//! since. `T` seconds after the anchor, `⌊T / timestep⌋` steps must have been taken in all; missing steps are due.
+//! The pacer gets the time and keeps two numbers: the time from which it counts (the anchor) and the steps taken
+//! since. `T` seconds after the anchor, `⌊T / timestep⌋` steps must have been taken. The missing steps are due.
 //!
 //! ```text
 //! anchor ├──step──┼──step──┼──step──┼──step──┼─── now        taken = 2, due = 2
 //! ```
 //!
-//! A machine that falls behind catches up with at most [`CATCH_UP`] and the step in progress. Steps beyond that are
-//! dropped by moving the anchor, so that no burst follows a long stall. It uses plain arithmetic only.
+//! A machine that falls behind catches up at most [`CATCH_UP`] and the step in progress. Steps beyond that are
+//! dropped by moving the anchor, so no burst follows a long stall.
 //!
-//! **Invariant:** the steps due come from one division of the time since the anchor, never from a running sum, so
-//! that 1 ms stays exact for days. No call returns more than `⌊CATCH_UP / timestep⌋ + 1`.
+//! **Invariant:** the steps due come from one division of the time since the anchor, never from a running sum. So
+//! 1 ms stays exact for days. No call returns more than `⌊CATCH_UP / timestep⌋ + 1`.
 
 use std::time::Duration;
 
-/// Wall time that is caught up after a delay: long enough for any ordinary hiccup of a machine, too short for the arm
-/// to be seen racing.
+/// Wall time that is caught up after a delay. It covers ordinary delays of a machine, and is too short for a visible
+/// jump of the arm.
 pub const CATCH_UP: Duration = Duration::from_millis(250);
 
 const NANOSECONDS: f64 = 1e9;
 
-/// Relative slack of the division, without which 60 steps of 1/60 s might take a nanosecond more than a second.
+/// Relative allowance for rounding in the division. Without it, 60 steps of 1/60 s might take a nanosecond more
+/// than a second.
 ///
 /// Three roundings can lower the quotient, by 2^-53 each: the one of the timestep itself, the one to nanoseconds, and
-/// the division's. Four are granted; that brings a step forward by less than a nanosecond for the first ten days.
+/// the division's. Four are allowed, which makes a step due less than a nanosecond too early in the first ten days.
 const SLACK: f64 = 1.0 + 2.0 * f64::EPSILON;
 
-/// Counts whole steps against a clock that its caller reads.
+/// Counts whole steps against a clock that the caller reads.
 ///
 /// ```
 /// use pendularm::math::pacer::Pacer;
@@ -49,8 +50,8 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive makes
-    /// no sense, but does no harm.
+    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive is an
+    /// error of the caller, but does not panic.
     #[must_use]
     pub fn new(now: Duration, timestep: f64) -> Self {
         Self {
@@ -60,14 +61,14 @@ impl Pacer {
         }
     }
 
-    /// Starts over at `now`, after a new timestep, a resume or a reset: nothing is owed, and the unfinished fraction of
-    /// a step is gone.
+    /// Restarts at `now`, after a new timestep, a resume or a reset. No steps are due, and the unfinished fraction of a
+    /// step is discarded.
     pub fn restart(&mut self, now: Duration, timestep: f64) {
         *self = Self::new(now, timestep);
     }
 
-    /// Steps due at `now`. They stay due until they are reported by [`Pacer::took`], except for those that are dropped
-    /// because more than [`CATCH_UP`] and the step in progress was due. No step is due at a `now` before the last one.
+    /// Steps due at `now`. They stay due until [`Pacer::took`] reports them. Steps beyond [`CATCH_UP`] and the step in
+    /// progress are dropped. No step is due at a `now` before the last one.
     pub fn due(&mut self, now: Duration) -> u64 {
         let most = self.whole_steps(CATCH_UP).saturating_add(1);
         let due = self.owed(now);
@@ -80,7 +81,7 @@ impl Pacer {
         self.owed(now).min(most)
     }
 
-    /// Notes that `steps` steps were taken, perhaps fewer than were due.
+    /// Records that `steps` steps were taken, possibly fewer than were due.
     pub fn took(&mut self, steps: u64) {
         self.taken = self.taken.saturating_add(steps);
     }
@@ -90,7 +91,7 @@ impl Pacer {
             .saturating_sub(self.taken)
     }
 
-    /// `⌊elapsed / timestep⌋`; `u64::MAX` where that is too large to count, 0 where it is not a number.
+    /// `⌊elapsed / timestep⌋`; `u64::MAX` if that is too large, 0 if it is NaN.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

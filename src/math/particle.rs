@@ -1,22 +1,22 @@
 //! A particle of unit mass on a line, pushed by a force that depends on time alone: `ẍ = f(t)`, from `t = 0`.
 //!
-//! This is what `/arm_sim/integration_step` computes. It takes the same [`increment`] as the live arm and shares
-//! nothing else with it. Sample `k` is at the time `k dt`, a product and not a running sum, and so are the steps' start
-//! times. Position and velocity are summed with compensation (Kahan 1965, Knuth's branch-free two-sum), so that a
+//! `/arm_sim/integration_step` computes this. It uses the same [`increment`] as the live arm and shares nothing else
+//! with it. Sample `k` is at the time `k dt`, a product and not a running sum. The same holds for the start times of
+//! steps. Position and velocity are summed with compensation (Kahan 1965, Knuth's branch-free two-sum), so that a
 //! million steps lose no more digits than one.
 //!
-//! **Invariant:** steps and work are bounded when a particle is made, and a computation cut into slices gives the same
-//! bits as one made at once.
+//! **Invariant:** steps and work are bounded when a particle is created. A computation in slices gives the same bits
+//! as one without.
 
 use super::count::length_in_f64;
 use super::expression::{Expression, Stack};
 use super::integrator::{Method, increment, two_sum};
 use super::shown::Shown;
 
-/// Most steps of one computation. A million samples are some 60 MB of JSON, about as much as a client can want at once.
+/// Most steps of one computation. A million samples are about 60 MB of JSON.
 pub const MAX_STEPS: u64 = 1_000_000;
 
-/// Most work of one computation, in expression nodes times evaluations: some seconds, up to a minute, of one core.
+/// Most work of one computation, in expression nodes times evaluations: from some seconds to a minute of one core.
 pub const MAX_WORK: u64 = 2_000_000_000;
 
 /// Why a computation is refused. The field names are those of the request.
@@ -36,7 +36,7 @@ pub enum ParticleError {
         /// The value given \[s\].
         dt: f64,
     },
-    /// Nothing to do.
+    /// No steps.
     #[error("steps must be at least 1, got 0")]
     NoSteps,
     /// More steps than [`MAX_STEPS`].
@@ -54,18 +54,18 @@ pub enum ParticleError {
     TooMuchWork {
         /// Nodes of the expression.
         nodes: u64,
-        /// How often it would be evaluated.
+        /// The number of evaluations.
         evaluations: u64,
     },
 }
 
-/// How often `steps` steps evaluate the force. Saturates.
+/// The number of force evaluations in `steps` steps. Saturates.
 #[must_use]
 pub fn evaluations(steps: u64, method: Method) -> u64 {
     steps.saturating_mul(u64::from(method.evaluations()))
 }
 
-/// A computation in progress. It has done a whole number of steps, of which it keeps every result.
+/// A computation in progress. It has done a whole number of steps, and keeps every result.
 #[derive(Debug, Clone)]
 pub struct Particle {
     function: Expression,
@@ -89,7 +89,7 @@ impl Particle {
     /// A particle at `x0` \[m\] with the velocity `xdot0` \[m/s\], about to make `steps` steps of `dt` \[s\] each.
     ///
     /// # Errors
-    /// The first value that is out of bounds, or too much work altogether.
+    /// The first value that is out of bounds, or too much work in total.
     pub fn new(
         function: Expression,
         x0: f64,
@@ -168,8 +168,8 @@ impl Particle {
         self.velocities.push(self.velocity.value);
     }
 
-    /// How many steps cost at most `work` nodes times evaluations, but at least one: a slice that a worker can make
-    /// before it looks after somebody else.
+    /// The number of steps that cost at most `work` nodes times evaluations, but at least one: a slice for a worker
+    /// before it turns to another task.
     #[must_use]
     pub fn steps_within(&self, work: u64) -> usize {
         let step = (self.function.nodes() as u64).saturating_mul(evaluations(1, self.method));
@@ -190,7 +190,7 @@ impl Particle {
         self.steps - self.done()
     }
 
-    /// How often the force has been evaluated.
+    /// The number of force evaluations so far.
     #[must_use]
     pub fn evaluations(&self) -> u64 {
         self.evaluations
@@ -220,11 +220,11 @@ impl Particle {
     }
 }
 
-/// A sum that carries along what rounding took from it.
+/// A sum with its rounding error (compensated summation).
 #[derive(Debug, Clone, Copy)]
 struct CompensatedSum {
     value: f64,
-    /// The rounding error of the value, which the next addition makes good.
+    /// The rounding error of the value, which the next addition corrects.
     lost: f64,
 }
 

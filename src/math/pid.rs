@@ -12,11 +12,11 @@
 //! | `I_max` | anti-windup limit | rad s | [`INTEGRAL_LIMIT`] |
 //! | τ | effort | N m | [`Control`] |
 //!
-//! The derivative acts on the measured velocity, which is known, instead of differencing the error. Nothing else
-//! compensates gravity: with ki = 0 the arm sags until kp e carries its load.
+//! The derivative term uses the measured velocity and no difference of errors. There is no gravity compensation:
+//! with ki = 0 the arm sags until kp e carries its load.
 //!
-//! **Invariant:** the law is a pure function of the state at the start of a step. The integral that it computed
-//! counts only once the caller commits it, so that a step that is not taken leaves nothing behind.
+//! **Invariant:** the law is a pure function of the state at the start of a step. The computed integral counts
+//! only after the caller commits it, so a step that is not taken has no effect.
 
 #![allow(
     clippy::indexing_slicing,
@@ -26,11 +26,11 @@
 use super::arm::State;
 use super::number::{Number, entries};
 
-/// Bound of each joint's integral \[rad s\]. With the default gains it is over a thousand times the effort that gravity
-/// asks for, so it never hinders. Without it a blocked or impossible setpoint would wind up for ever.
+/// Bound of each joint's integral \[rad s\]. With the default gains its effort is over a thousand times the gravity
+/// load, so it does not limit normal motion. Without it a setpoint that cannot be reached would cause unbounded windup.
 pub const INTEGRAL_LIMIT: f64 = 50.0;
 
-/// Gains of every joint, of one arm or of several side by side; each is finite and not negative.
+/// Gains of every joint, for one arm or for several side by side. Each is finite and not negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains<const N: usize, T = f64> {
     /// Proportional gains \[N m/rad\].
@@ -41,8 +41,8 @@ pub struct Gains<const N: usize, T = f64> {
     pub kd: [T; N],
 }
 
-/// Gains for the default 2-link arm. Any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
-/// and 0.02 m within 2 s. Stable in every pose up to a timestep of 4.3 ms.
+/// Gains for the default 2-link arm. They reach any setpoint within ±2π, from rest or from a free swing, to 0.02 rad
+/// and 0.02 m within 2 s. They are stable in every pose up to a timestep of 4.3 ms.
 ///
 /// Other numbers of links have no default: gains must fit the inertia that each joint moves.
 impl Default for Gains<2> {
@@ -55,13 +55,14 @@ impl Default for Gains<2> {
     }
 }
 
-/// Gains for the default 3-link arm: as for two links, within 3.6 s. Stable in every pose up to a timestep of 3.0 ms.
+/// Gains for the default 3-link arm: as for two links, but within 3.6 s. They are stable in every pose up to a
+/// timestep of 3.0 ms.
 ///
-/// Found by a search for the least ringing (`benches/src/bin/default_gains.rs`): once all joints are slower than
-/// 0.01 rad/s the effort should be within 2 % of the gravity load. So it is on 94 of 100 moves, and on 78 of 100 with
-/// links of 2 kg. Where it is not, a joint is slow because it turns back, or the load is a small part of the stretched
-/// arm's. Moves within ±2π keep from diverging at 3 ms; some of 4π at every joint do not. The last joint has little
-/// damping of its own, because `kd dt` there is what limits the timestep.
+/// A search for the least oscillation found them (`benches/src/bin/default_gains.rs`). Its criterion: once all joints
+/// are slower than 0.01 rad/s, the effort is within 2 % of the gravity load. This holds on 94 of 100 moves, and on 78
+/// of 100 with links of 2 kg. In the other moves a joint is slow because it turns back, or the load is small compared
+/// with that of the stretched arm. Moves within ±2π do not diverge at 3 ms; some of 4π at every joint do. The last
+/// joint has little damping, because `kd dt` of that joint limits the timestep.
 impl Default for Gains<3> {
     fn default() -> Self {
         Self {
@@ -77,7 +78,7 @@ impl Default for Gains<3> {
 pub struct Setpoint<const N: usize, T = f64> {
     /// Joint positions q* \[rad\], not wrapped: a setpoint of 2π asks for a whole turn.
     pub position: [T; N],
-    /// Joint velocities q̇* \[rad/s\]. They are part of the setpoint, and do not move its positions.
+    /// Joint velocities q̇* \[rad/s\]. They do not move the setpoint's positions.
     pub velocity: [T; N],
 }
 
@@ -102,16 +103,16 @@ impl<const N: usize> Setpoint<N> {
     }
 }
 
-/// The answer of the control law for one step.
+/// The result of the control law for one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Control<const N: usize, T = f64> {
     /// Effort τ to hold for the step \[N m\].
     pub effort: [T; N],
-    /// The integral that went into it \[rad s\], to be committed if the step is taken.
+    /// The integral in this effort \[rad s\], to be committed if the step is taken.
     pub integral: [T; N],
 }
 
-/// The law for one step of `dt` \[s\] that starts at `state`, with an `integral` as of the step before \[rad s\].
+/// The law for one step of `dt` \[s\] that starts at `state`, with the `integral` of the previous step \[rad s\].
 #[inline(always)]
 pub(super) fn law<T: Number, const N: usize>(
     gains: &Gains<N, T>,
@@ -166,8 +167,8 @@ impl<const N: usize> Pid<N> {
         self.integral = integral;
     }
 
-    /// Turns the controller on or off. From off to on the integral starts at zero; a controller that is on already
-    /// stays as it is.
+    /// Turns the controller on or off. From off to on the integral starts at zero. A controller that is already on
+    /// does not change.
     pub fn enable(&mut self, on: bool) {
         if on && !self.enabled {
             self.integral = [0.0; N];
@@ -175,13 +176,14 @@ impl<const N: usize> Pid<N> {
         self.enabled = on;
     }
 
-    /// Sets the setpoint to the starting pose at rest and the integral to zero. Gains, and whether it is on, stay.
+    /// Sets the setpoint to the starting pose at rest and the integral to zero. Gains and the on/off state do not
+    /// change.
     pub fn reset(&mut self) {
         self.setpoint = Setpoint::default();
         self.integral = [0.0; N];
     }
 
-    /// Changes the gains and keeps the integral, so that their effect shows against what has accumulated.
+    /// Changes the gains and keeps the integral.
     pub fn set_gains(&mut self, gains: Gains<N>) {
         self.gains = gains;
     }
@@ -197,13 +199,13 @@ impl<const N: usize> Pid<N> {
         self.enabled
     }
 
-    /// The gains in force.
+    /// The present gains.
     #[must_use]
     pub fn gains(&self) -> &Gains<N> {
         &self.gains
     }
 
-    /// The setpoint held.
+    /// The present setpoint.
     #[must_use]
     pub fn setpoint(&self) -> &Setpoint<N> {
         &self.setpoint

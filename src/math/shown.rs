@@ -1,4 +1,4 @@
-//! Numbers in sentences for people.
+//! Numbers in messages.
 //!
 //! **Invariant:** a number has at most [`DIGITS`] significant digits, unless it needs more to differ from another.
 
@@ -7,7 +7,7 @@ use std::fmt;
 /// Significant digits of a number in a sentence.
 const DIGITS: usize = 5;
 
-/// A number with few digits: 1e300 is not written out in 301 of them, nor 0.1 + 0.2 in 17.
+/// A number with few digits: 1e300 is not written with 301 digits, nor 0.1 + 0.2 with 17.
 pub(crate) struct Shown(pub(crate) f64);
 
 impl fmt::Display for Shown {
@@ -16,18 +16,18 @@ impl fmt::Display for Shown {
     }
 }
 
-/// A number that a sentence compares with `other`: it has as many digits as it takes to differ.
+/// A number that a message compares with `other`. It has enough digits to differ from it.
 pub(crate) fn shown_against(number: f64, other: f64) -> String {
-    // Seventeen digits tell any two doubles apart.
+    // Seventeen digits distinguish any two doubles.
     let texts = (DIGITS..=17).map(|digits| (rounded(number, digits), rounded(other, digits)));
     let apart = texts.into_iter().find(|(one, other)| one != other);
     apart.map_or_else(|| rounded(number, DIGITS), |(one, _)| one)
 }
 
 fn rounded(number: f64, digits: usize) -> String {
-    // The sum takes the sign of a zero.
+    // Adding 0 removes the sign of a negative zero.
     let rounded = format!("{:.*e}", digits - 1, number + 0.0);
-    // Of the tiniest numbers fewer digits say as much.
+    // Subnormal numbers have fewer significant digits.
     let shortest = format!("{:e}", number + 0.0);
     let text = if shortest.len() < rounded.len() {
         shortest

@@ -1,14 +1,14 @@
-//! A path through points with times: where the joints should be at every moment, and whether they are near enough.
+//! A path through points with times: the desired joint state at every time, and its tolerances.
 //!
-//! Between two points that both have velocities the path is the cubic that has them (Hermite's), so that velocities are
-//! continuous; between all others it is a straight line. With `s = (t - t₀)/h`, `h = t₁ - t₀`:
+//! Between two points that both have velocities, the path is the cubic Hermite polynomial with these velocities.
+//! Otherwise it is a straight line. With `s = (t - t₀)/h`, `h = t₁ - t₀`:
 //!
 //! ```text
 //! q(t) = (2s³ - 3s² + 1) q₀ + (s³ - 2s² + s) h v₀ + (3s² - 2s³) q₁ + (s³ - s²) h v₁
 //! ```
 //!
-//! **Invariant:** a path has at least one point, and its times increase; before the first and behind the last point the
-//! joints stand there, at rest.
+//! **Invariant:** a path has at least one point, and its times increase. Before the first and after the last point the
+//! desired state is that point at rest.
 
 #![allow(
     clippy::indexing_slicing,
@@ -23,7 +23,7 @@ use super::shown::shown_against;
 /// A point of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint<const N: usize> {
-    /// When the joints should be there, from the start \[s\].
+    /// Time of the point from the start \[s\].
     pub time: f64,
     /// Joint positions \[rad\].
     pub position: [f64; N],
@@ -31,19 +31,19 @@ pub struct Waypoint<const N: usize> {
     pub velocity: Option<[f64; N]>,
 }
 
-/// Why points make no path.
+/// Why points form no path.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PathError {
     /// There is no point.
     #[error("points must have at least one entry")]
     NoPoints,
-    /// A time is not behind the one before it, or the first is before the start.
+    /// A time is not greater than the one before it, or the first is before the start.
     #[error("points[{0}].time_from_start must be greater than that of the point before")]
     Order(
         /// The point.
         usize,
     ),
-    /// On the way there from the point before, a position or a velocity would be no finite number.
+    /// Between the previous point and this one, a position or a velocity would not be finite.
     #[error("points[{0}] must be reached from the point before by finite positions and velocities")]
     NotFinite(
         /// The point.
@@ -58,7 +58,7 @@ pub struct JointPath<const N: usize> {
 }
 
 impl<const N: usize> JointPath<N> {
-    /// The path through `points`, which begins at time 0 where the joints are: at `start`.
+    /// The path through `points`, which begins at time 0 at the joints' present position `start`.
     ///
     /// # Errors
     /// If there is no point, the times do not increase, or the numbers between two points overflow.
@@ -95,7 +95,7 @@ impl<const N: usize> JointPath<N> {
         self.points.last().map_or(0.0, |last| last.time)
     }
 
-    /// Positions and velocities that the joints should have `time` after the start \[s\].
+    /// The desired positions and velocities of the joints `time` after the start \[s\].
     #[must_use]
     pub fn at(&self, time: f64) -> Setpoint<N> {
         let behind = self.points.partition_point(|point| point.time <= time);
@@ -118,7 +118,7 @@ fn at_rest<const N: usize>(position: [f64; N]) -> Setpoint<N> {
     }
 }
 
-/// Whether no term of [`between`] overflows: each is at most one of these, some times over.
+/// Whether no term of [`between`] overflows. Each term is at most a small multiple of one of these.
 fn is_finite<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>) -> bool {
     let h = next.time - before.time;
     let (v0, v1) = (before.velocity, next.velocity);
@@ -155,7 +155,7 @@ fn between<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>, time: f64) 
     }
 }
 
-/// How far joints may be off; none where any distance is allowed.
+/// Largest allowed deviations of a joint. `None` allows any deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance<const N: usize> {
     /// \[rad\], at least 0.
@@ -165,20 +165,20 @@ pub struct Tolerance<const N: usize> {
 }
 
 impl<const N: usize> Tolerance<N> {
-    /// Whether any distance and any velocity will do.
+    /// Whether every position and velocity is allowed.
     fn is_any(&self) -> bool {
         let mut limits = self.position.iter().chain(&self.velocity);
         limits.all(Option::is_none)
     }
 
-    /// The first joint that is farther off than it may be.
+    /// The first joint whose deviation exceeds its tolerance.
     #[must_use]
     pub fn exceeded(&self, desired: &Setpoint<N>, actual: &State<N>) -> Option<Excess> {
         let off = |wanted: &[f64; N], is: &[f64; N], limits: &[Option<f64>; N], quantity| {
             (0..N).find_map(|joint| {
                 let limit = limits[joint]?;
                 let error = wanted[joint] - is[joint];
-                // An error that is no number is not within anything.
+                // NaN is within no tolerance.
                 let is_within = error.abs() <= limit;
                 (!is_within).then_some(Excess {
                     joint,
@@ -205,7 +205,7 @@ impl<const N: usize> Tolerance<N> {
     }
 }
 
-/// A joint that is farther off than it may be.
+/// A joint whose deviation exceeds its tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "{quantity} of joint{} is off by {}, more than {}",
@@ -227,32 +227,32 @@ pub struct Excess {
 pub struct Course<const N: usize> {
     /// The path.
     pub path: JointPath<N>,
-    /// How far off the joints may be on the way.
+    /// Tolerance on the way.
     pub on_the_way: Tolerance<N>,
-    /// How far off the joints may be at its end.
+    /// Tolerance at the end.
     pub at_the_end: Tolerance<N>,
-    /// How long after its end the joints may take to get there \[s\]; infinite for no limit.
+    /// Time after the end in which the joints must arrive \[s\]; infinite for no limit.
     pub patience: f64,
-    /// How long they have been there.
+    /// The present stay within the tolerance at the end.
     pub dwell: Dwell,
 }
 
-/// How the joints stand on a course.
+/// The progress of the joints on a course.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
     /// They are on their way.
     Moving,
     /// They have arrived.
     Arrived,
-    /// They have lost the path.
+    /// They have left the tolerance of the path.
     OffPath(Excess),
     /// They have not arrived in time.
     Late(Excess),
 }
 
 impl<const N: usize> Course<N> {
-    /// How joints at `actual` stand, `time` after the start \[s\]. They have arrived once they have stayed within the
-    /// tolerance for [`SUCCESS_HOLD`]; a single look could find them on their way through.
+    /// The progress of joints at `actual`, `time` after the start \[s\]. They have arrived once they have stayed
+    /// within the tolerance for [`SUCCESS_HOLD`], because a joint may also pass through it.
     pub fn judge(&mut self, time: f64, actual: &State<N>) -> Standing {
         let desired = self.path.at(time);
         let duration = self.path.duration();

@@ -1,8 +1,8 @@
-//! Sine and cosine of all joint angles of an arm at once: half of the cost of its dynamics.
+//! Sine and cosine of all joint angles of an arm at once. They are half of the cost of its dynamics.
 //!
 //! Every stage is done for all angles before the next begins, so that the compiler can put two of them into one
-//! register. Nothing branches on the angle, but for arms that have turned more than 30,000 times. The same
-//! operations in the same order on every platform. Results do not depend on the platform's libm.
+//! register. There is no branch on the angle, except for arms that have turned more than 30,000 times. Every
+//! platform executes the same operations in the same order. Results do not depend on the platform's libm.
 //!
 //! The angle is reduced to `r = angle - k π/2`, `|r| <= π/4`, with π/2 in three parts, the first two of 36 bits, so
 //! that their products with `k < 2¹⁷` are exact (Cody and Waite). The rounding error of `r` is kept as `tail`. Then
@@ -12,9 +12,9 @@
 //! with polynomials `S`, `C` of degree 5, minimax in relative error (2⁻⁵⁷ of the sine, 2⁻⁶³ of the cosine; Remez
 //! exchange in 60 digits). The quadrant `k mod 4` exchanges the two and sets their signs.
 //!
-//! Error against 60-digit values: at most 0.90 ulp in 300,000 angles up to the limit. At the doubles next to each of
-//! the multiples of π/2 up to it, at most 0.50 ulp. So it is never more than one floating-point number from the C
-//! library's. The sine of -0 is 0.
+//! The error against 60-digit values is at most 0.90 ulp in 300,000 angles up to the limit. At the doubles next to
+//! multiples of π/2 it is at most 0.50 ulp. So a result differs from the C library's by at most one floating-point
+//! number. The sine of -0 is 0.
 //!
 //! **Invariant:** the same angle gives the same bits in every lane.
 
@@ -26,7 +26,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use super::number::{Number, entries};
 
-/// Largest magnitude of an angle \[rad\] for which the reduction holds: beyond it `k` would need more than 17 bits.
+/// Largest magnitude of an angle \[rad\] for which the reduction is exact. Beyond it `k` would need more than 17 bits.
 const LIMIT: f64 = 2.0e5;
 
 /// Adding this rounds to an integer, which is then in the low bits of the sum: `1.5 * 2^52`.
@@ -59,7 +59,7 @@ const C: [f64; 6] = [
     -1.135_853_652_138_747_7e-11,
 ];
 
-/// Sines and cosines of `angles` \[rad\], in this order. Not a number where an angle is not finite.
+/// Sines and cosines of `angles` \[rad\], in this order. NaN if an angle is not finite.
 #[must_use]
 #[inline(always)]
 pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
@@ -72,8 +72,8 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
 
     let r2 = entries!(any, i => r[i] * r[i]);
     let r4 = entries!(any, i => r2[i] * r2[i]);
-    // Terms of low degree are added up while those of high degree are still multiplied, so that few sums wait for the
-    // last product.
+    // Terms of low degree are added while those of high degree are still multiplied, so few sums wait for the last
+    // product.
     let s = entries!(any, i => upper(S, r2[i], r4[i]));
     let c = entries!(any, i => upper(C, r2[i], r4[i]));
     let r3 = entries!(any, i => r[i] * r2[i]);
@@ -93,7 +93,7 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
         (sin[i], cos[i]) = shifted[i].turned(sine[i], cosine[i]);
     }
     if !T::all_within(angles, LIMIT) {
-        // The entries are taken one by one: else the arrays would be in memory for a call that nearly never comes.
+        // The entries are passed one by one. Otherwise this rare call would force the arrays into memory.
         let replaced = replaced_far(*angles, sin, cos);
         sin = entries!(any, i => replaced.0[i]);
         cos = entries!(any, i => replaced.1[i]);
@@ -107,7 +107,7 @@ fn upper<T: Number>(p: [f64; 6], r2: T, r4: T) -> T {
     (r2 * p[3] + p[2]) + r4 * (r2 * p[5] + p[4])
 }
 
-/// The C library's sine and cosine wherever the angle is beyond the limit or not finite.
+/// The C library's sine and cosine if the angle is beyond the limit or not finite.
 #[cold]
 #[inline(never)]
 fn replaced_far<T: Number, const N: usize>(

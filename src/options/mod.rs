@@ -1,9 +1,9 @@
-//! The command line and the environment, each option once: a field with its help, its variable and its reader.
+//! The command line and the environment. Each option is one field with its help, its variable and its reader.
 //!
-//! An option wins over its variable; an empty variable counts as unset. A command stands before its options, and the
-//! token's is the only variable that it reads.
+//! An option overrides its variable. An empty variable counts as unset. A command precedes its options, and reads
+//! only the token's variable.
 //!
-//! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
+//! **Invariant:** every refusal is one line with the name of the option or variable and the value.
 
 mod values;
 
@@ -39,11 +39,11 @@ use crate::value::{ValueReader, read_links};
 #[cfg(feature = "web")]
 use crate::web::{DEFAULT_REPORT, authority::Authority};
 
-/// Address of the runtime unless an option says otherwise; bound here, it listens on `[::1]` too.
+/// Default address of the runtime. With it, the runtime also listens on `[::1]`.
 pub const DEFAULT_BIND: SocketAddr =
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
 
-/// The version of this build, its commit if that is known, and its features.
+/// The version of this build, its commit if known, and its features.
 const BUILD: &str = if cfg!(feature = "web") {
     concat!(env!("PENDULARM_VERSION"), " (web)")
 } else {
@@ -60,82 +60,82 @@ other failure.";
 /// Longest refusal \[characters\].
 const MAX_REFUSAL: usize = 1000;
 
-/// Everything that is chosen at launch.
+/// All options of the server.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Options {
     /// Number of links of the arm, 2 or 3
     #[arg(long, env = "ARM_SIM_LINKS", value_name = "N", default_value = "2")]
     #[arg(value_parser = ValueReader(read_links))]
     pub links: Links,
-    /// Address and port to listen on, or one of them, loopback unless there is a token; port 0 takes a free one
+    /// Address, port or both to listen on; an address that is not loopback needs a token; port 0 is a free port
     #[arg(long, env = "ARM_SIM_BIND", value_name = "ADDRESS")]
     #[arg(default_value = "127.0.0.1:9095")]
     #[arg(value_parser = ValueReader(read_bind))]
     pub bind: SocketAddr,
-    /// Clients that are served at once, at most 4096; a few of these places are kept for HTTP and WebSocket
+    /// Clients served at once, at most 4096; a few of these places are kept for HTTP and WebSocket
     #[arg(long, env = "ARM_SIM_CLIENTS", value_name = "N")]
     #[arg(default_value_t = DEFAULT_CLIENTS, value_parser = ValueReader(read_clients))]
     pub clients: usize,
-    /// Time between two runs of the control law, in seconds; 0 for every step
+    /// Control period in seconds; 0 for every step
     #[arg(long, env = "ARM_SIM_CONTROL_PERIOD", value_name = "SECONDS")]
     #[arg(default_value = "0", value_parser = ValueReader(read_period))]
     pub control_period: f64,
-    /// Makes the targets of timed trials repeatable; without it the seed is new at every start
+    /// Seed for repeatable targets of timed trials; by default it is new at every start
     #[arg(long, env = "ARM_SIM_SEED", value_name = "N", value_parser = ValueReader(read_seed))]
     pub seed: Option<u64>,
     /// Level of the log on standard error: off, error, warn, info, debug or trace
     #[arg(long, env = "ARM_SIM_LOG", value_name = "LEVEL")]
     #[arg(default_value = "info", value_parser = ValueReader(read_level))]
     pub log: LevelFilter,
-    /// Format of the log: text, or json for one object a line
+    /// Format of the log: text, or json for one object per line
     #[arg(long, env = "ARM_SIM_LOG_FORMAT", value_name = "FORMAT")]
     #[arg(default_value = "text", value_parser = ValueReader(read_log_format))]
     pub log_format: LogFormat,
-    /// Token of at least 16 characters; prefer the variable: others see options
+    /// Secret token of at least 16 characters; prefer the variable, because other users can see options
     #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(read_token))]
     pub token: Option<Token>,
-    /// About runs on record.
+    /// Options of records.
     #[cfg(feature = "record")]
     #[command(flatten)]
     pub record: RecordOptions,
-    /// About the site.
+    /// Options of the site.
     #[cfg(feature = "web")]
     #[command(flatten)]
     pub web: WebOptions,
 }
 
-/// Records, as chosen at launch.
+/// The options of records.
 #[cfg(feature = "record")]
 #[derive(Debug, Clone, PartialEq, Eq, Args)]
 pub struct RecordOptions {
     /// Records the run as MCAP into this file, which must not exist
     #[arg(long = "record", env = "ARM_SIM_RECORD", value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// Existing folder in which clients may have runs recorded, by /recorder/start
+    /// Existing folder for records that clients start by /recorder/start
     #[arg(long = "record-dir", env = "ARM_SIM_RECORD_DIR", value_name = "FOLDER")]
     pub folder: Option<PathBuf>,
 }
 
-/// The options of the site, as chosen at launch.
+/// The options of the site.
 #[cfg(feature = "web")]
 #[derive(Debug, Clone, PartialEq, Eq, Args)]
 pub struct WebOptions {
-    /// Names besides loopback's for browsers, separated by commas; one with a port is allowed at that port only
+    /// Other host names for browsers, separated by commas; a name with a port is allowed only at that port
     #[arg(long = "allow-host", env = "ARM_SIM_ALLOW_HOST", value_name = "HOSTS")]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_host))]
     pub hosts: Vec<Authority>,
-    /// Pages besides this machine's that may open a WebSocket, by origin, separated by commas
+    /// Origins of other machines' pages that may open a WebSocket, separated by commas
     #[arg(long = "allow-origin", env = "ARM_SIM_ALLOW_ORIGIN")]
     #[arg(value_name = "ORIGINS")]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
     pub origins: Vec<Box<str>>,
-    /// Of pages, lets only this runtime's own and those of --allow-origin open a WebSocket; a token does that too
+    /// Allows a WebSocket only to the runtime's own page and to --allow-origin, as with a token
     #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "SWITCH")]
     #[arg(default_value = "false")]
     #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     #[arg(value_parser = ValueReader(read_switch))]
     pub strict_origin: bool,
-    /// Pages of other sites that may show this page and the report in a frame, by origin, separated by commas
+    /// Origins of pages that may show the page and the report in a frame, separated by commas
     #[arg(
         long = "allow-frame",
         env = "ARM_SIM_ALLOW_FRAME",
@@ -143,7 +143,7 @@ pub struct WebOptions {
     )]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame))]
     pub frames: Vec<Box<str>>,
-    /// Folder of the report that is shown at /report/
+    /// Folder of the report at /report/
     #[arg(long, env = "ARM_SIM_REPORT", value_name = "FOLDER", default_value = DEFAULT_REPORT)]
     pub report: PathBuf,
 }
@@ -158,28 +158,28 @@ struct CommandLine {
     command: Option<Parsed>,
 }
 
-/// The request of the command line: one of the commands, or to serve.
+/// The parsed command line: one of the commands, or to serve.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Parsed {
     /// Serves clients, with these options.
     #[command(skip)]
     Serve(Box<Options>),
-    /// Shows this text on standard output, and no more.
+    /// Prints this text on standard output.
     #[command(skip)]
     Show(String),
-    /// Find the cheapest method and timestep for an allowed error, and run them against the truth
+    /// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
     Plan(PlanOptions),
-    /// Measure error against run time and stability, and write a page about it
+    /// Measure error against run time and stability, and write a report
     #[cfg(feature = "report")]
     Report(ReportOptions),
-    /// Take a recorded run's steps again and say where they differ from the record
+    /// Repeat the steps of a recorded run and compare them with the record
     #[cfg(feature = "record")]
     #[command(after_help = "Exit status: 0 if every state is the same bit for bit, 1 if not.")]
     Replay {
-        /// A record that --record or /recorder/start has made
+        /// A record of --record or /recorder/start
         file: PathBuf,
     },
-    /// Asks a running one.
+    /// A command for a running pendularm.
     #[cfg(feature = "cli")]
     #[command(flatten)]
     Ask(CommandSubject),
@@ -195,12 +195,12 @@ Examples:
     },
 }
 
-/// Why the command line or the environment was refused, on one line.
+/// Why the command line or the environment was refused, in one line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct UsageError(String);
 
-/// The first paragraph of the report, on one line; behind it are the usage and hints.
+/// The first paragraph of the error, in one line. Usage and hints follow it.
 impl From<clap::Error> for UsageError {
     fn from(error: clap::Error) -> Self {
         let report = error.to_string();
@@ -209,17 +209,17 @@ impl From<clap::Error> for UsageError {
         let words: Vec<&str> = first.split_whitespace().collect();
         let hint = match error.kind() {
             ErrorKind::ValueValidation | ErrorKind::InvalidValue => "",
-            _ => "; --help shows what there is",
+            _ => "; --help lists all commands and options",
         };
         Self(shortened(&(words.join(" ") + hint), MAX_REFUSAL))
     }
 }
 
 impl Options {
-    /// Reads the arguments, the program's name first, and for each option that is not among them its variable.
+    /// Reads the arguments, with the program's name first. An option that is not among them is read from its variable.
     ///
     /// # Errors
-    /// [`UsageError`] for the first argument, option or variable that is not as it should be.
+    /// [`UsageError`] for the first invalid argument, option or variable.
     pub fn parse<I, T>(arguments: I) -> Result<Parsed, UsageError>
     where
         I: IntoIterator<Item = T>,
@@ -271,8 +271,8 @@ pub fn completions(shell: Shell) -> String {
     String::from_utf8_lossy(&script).into_owned()
 }
 
-/// The command line with the rules for all options: numbers may be negative, and an empty variable is none. The
-/// variables of the program's own options are read only if it `serves`.
+/// The command line with the rules for all options: numbers may be negative, and an empty variable counts as
+/// unset. The variables of the server's options are read only if it `serves`.
 fn prepared(command: Command, serves: bool) -> Command {
     let command = command.mut_args(|arg| {
         let is_empty = |variable| env::var_os(variable).is_some_and(|value| value.is_empty());
@@ -287,7 +287,7 @@ fn prepared(command: Command, serves: bool) -> Command {
             false => arg,
         }
     });
-    // A subject without a verb is refused on one line, as everything else.
+    // A subject without a verb is refused in one line, like every error.
     let command = command.arg_required_else_help(false);
     command.mut_subcommands(|subcommand| prepared(subcommand, true))
 }

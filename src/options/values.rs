@@ -1,6 +1,6 @@
-//! The values of the options, each read from its text.
+//! The readers of the options' values.
 //!
-//! **Invariant:** a refusal says what is needed and shows the value, unless it is a secret.
+//! **Invariant:** a refusal names the valid values and shows the given one, unless it is a secret.
 
 use std::net::{Ipv4Addr, SocketAddr};
 
@@ -59,7 +59,7 @@ pub(super) fn read_token(text: &str) -> Result<Token, String> {
 
 #[cfg(feature = "web")]
 pub(super) fn read_host(text: &str) -> Result<Authority, String> {
-    let needs = "hosts, with or without a port, separated by commas";
+    let needs = "host names, with or without a port, separated by commas";
     needed(Authority::parse(text.trim()), needs, text)
 }
 
@@ -74,11 +74,12 @@ pub(super) fn read_origin(text: &str) -> Result<Box<str>, String> {
         }
         None => origin == "null",
     };
-    let needs = "origins as browsers write them, such as https://example.org, null or file://, separated by commas";
+    let needs = "origins, such as https://example.org, null or file://, separated by commas";
     needed(is_origin.then(|| origin.into()), needs, text)
 }
 
-/// A page that may show ours in a frame. A browser compares its scheme, host and port; a page without a host has none.
+/// The origin of a page that may show this one in a frame. A browser compares scheme, host and port, so it needs a
+/// host.
 #[cfg(feature = "web")]
 pub(super) fn read_frame(text: &str) -> Result<Box<str>, String> {
     let origin = text.trim().to_ascii_lowercase();

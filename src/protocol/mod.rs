@@ -1,7 +1,7 @@
-//! The rosbridge side: bytes and JSON in and out.
+//! The rosbridge protocol: bytes and JSON in and out.
 //!
-//! **Invariant:** no sockets, no clock, no physics in here; functions that depend on time take it as
-//! an argument.
+//! **Invariant:** this module has no sockets, no clock and no physics. Functions that depend on time
+//! take it as an argument.
 
 pub mod catalog;
 pub mod limits;

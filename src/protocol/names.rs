@@ -1,16 +1,16 @@
-//! Names as clients spell them: topics and services with and without the leading slash, types with and without their
-//! middle part.
+//! Spellings of names: topics and services with and without the leading slash, types with and without their middle
+//! part.
 //!
-//! **Invariant:** two spellings of one thing lead to the same [`absolute`] name or the same [`short_type`]; an answer
-//! keeps the spelling of the question.
+//! **Invariant:** two spellings of a name have the same [`absolute`] name or the same [`short_type`]. An answer keeps
+//! the spelling of the request.
 
 use std::borrow::Cow;
 
-/// The beginning of the runtime's own ids, of forwarded calls and of messages in fragments: a client's log so shows
-/// where they come from.
+/// The prefix of the runtime's own ids, of forwarded calls and of fragmented messages. It shows their origin in a
+/// client's log.
 pub const OWN_ID_PREFIX: &str = "pendularm:";
 
-/// The name with its leading slash, by which the registry and the catalog know it.
+/// The name with its leading slash, as in the registry and the catalog.
 #[must_use]
 pub fn absolute(name: &str) -> Cow<'_, str> {
     if name.starts_with('/') {
@@ -20,13 +20,14 @@ pub fn absolute(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// Whether two names mean one topic, service or action.
+/// Whether two names are spellings of the same topic, service or action.
 #[must_use]
 pub fn are_same(one: &str, other: &str) -> bool {
     absolute(one) == absolute(other)
 }
 
-/// The name without its leading slash, as some clients spell it. It stays as it is if it would else name another thing.
+/// The name without its leading slash, as some clients spell it. It does not change if it would otherwise be another
+/// name.
 #[must_use]
 pub fn relative(name: &str) -> &str {
     name.strip_prefix('/')
@@ -49,9 +50,9 @@ pub fn short_type(name: &str) -> String {
     }
 }
 
-/// Whether two names mean one type; a middle part that only one of them has is left out of account.
+/// Whether two names are spellings of the same type. A middle part that only one of them has is ignored.
 ///
-/// A name is compared with every type that there is: of the longer one no more is looked at than the shorter one has.
+/// One name is compared with every known type, so only as many bytes are read as the shorter name has.
 #[must_use]
 pub fn same_type(one: &str, other: &str) -> bool {
     let is_longer = one.len() > other.len();
@@ -63,7 +64,7 @@ pub fn same_type(one: &str, other: &str) -> bool {
     short == long || is_without_middle(short, long)
 }
 
-/// Whether `short` is `long` without its middle part, or parts.
+/// Whether `short` is `long` without its middle part or parts.
 fn is_without_middle(short: &str, long: &str) -> bool {
     let parts = short.split_once('/');
     let middle = parts

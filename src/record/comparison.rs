@@ -1,7 +1,7 @@
-//! Takes the recorded steps again and compares every recorded state, bit for bit.
+//! Repeats the recorded steps and compares every recorded state, bit for bit.
 //!
-//! **Invariant:** where inputs were lost the record begins again with the whole simulation. Nothing is compared across
-//! such a gap, and gaps are counted. A record can't have more steps than the time that it covers has room for.
+//! **Invariant:** after a gap in the inputs the record has the whole simulation again. No comparison crosses a gap,
+//! and gaps are counted. The number of steps is bounded by the recorded time.
 
 use std::fmt;
 use std::io::Read;
@@ -16,58 +16,58 @@ use super::writer::VERSION;
 use crate::math::simulation::Simulation;
 use crate::protocol::wire::text::excerpt;
 
-/// Steps between two messages of a record, at most. A tick has a tenth of that on the fastest machine, so that a record
-/// whose file was slow for a while is not refused.
+/// Most steps between two messages of a record. On the fastest machine a tick has a tenth of that, so a record with a
+/// slow file is not refused.
 pub const MAX_LEAP: u64 = 10_000_000;
-/// The least time that a step takes, in nanoseconds: no machine was seen to take one in less than three times that.
+/// Lower bound on the time of a step, in nanoseconds. On every measured machine a step takes at least three times that.
 const SHORTEST_STEP: u64 = 10;
-/// Steps for which a record needs no time, so that a coarse clock does no harm.
+/// Steps that are always allowed, so a coarse clock has no effect.
 pub const AT_ONCE: u64 = 100_000;
 
-/// Longest version that is told, in characters.
+/// Longest reported version, in characters.
 const MAX_VERSION: usize = 64;
 
 /// The outcome of a replay.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReplayVerdict {
-    /// How many links the arm has.
+    /// The number of links.
     pub links: usize,
-    /// Steps that were taken again.
+    /// Repeated steps.
     pub steps: u64,
-    /// States that were compared.
+    /// Compared states.
     pub states: u64,
-    /// Inputs that took effect again.
+    /// Applied inputs.
     pub inputs: u64,
-    /// Gaps in the inputs, because the queue was full. The record began again after each.
+    /// Gaps in the inputs, because the queue was full. The record restarts after each.
     pub losses: u64,
-    /// The last step whose state was the same, or at which the record began.
+    /// The last step with an equal state, or the first step of the record.
     pub agreed_to: u64,
-    /// The first difference; the replay ends there.
+    /// The first difference, at which the replay ends.
     pub difference: Option<Difference>,
     /// How the file ended, if it was read to its end.
     pub ending: Option<RecordEnding>,
-    /// The version that wrote the record, if it is not this one.
+    /// The version that wrote the record, if it is another one.
     pub other_version: Option<String>,
 }
 
-/// The first place at which the steps differ from the record.
+/// The first step that differs from the record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
-    /// Steps since the record's first; resets do not set it back.
+    /// Steps since the record's first. A reset does not restart the count.
     pub step: u64,
-    /// Simulation time there \[s\].
+    /// Its simulation time \[s\].
     pub time: f64,
-    /// The values that differ.
+    /// The different values.
     pub what: String,
 }
 
-/// Why there is nothing to compare.
+/// Why a record cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The file.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A text that is no input.
+    /// A text that is not a valid input.
     #[error("input before step {step}: {why}")]
     Input {
         /// Steps before it.
@@ -75,8 +75,8 @@ pub enum ReplayError {
         /// The fault.
         why: NoteError,
     },
-    /// A message that lacks a field.
-    #[error("{}: a message is not as this version writes it", excerpt(.0))]
+    /// A message with a missing field.
+    #[error("{}: a message has other fields than in this version", excerpt(.0))]
     Shape(
         /// The channel's topic.
         String,
@@ -84,10 +84,10 @@ pub enum ReplayError {
     /// The file ends before a state of the arm.
     #[error("the record was cut before its first state")]
     FramePart,
-    /// There is no input, or no state behind one.
+    /// There is no input, or no state after one.
     #[error("nothing to compare: it has no states of an arm")]
     NoStates,
-    /// More steps than the arm can have taken.
+    /// More steps than possible in the recorded time.
     #[error(
         "{}, message {sequence}: step {step} is {due} steps after the one before, \
          and no arm takes more than {most} there",
@@ -100,17 +100,17 @@ pub enum ReplayError {
         sequence: u32,
         /// The step.
         step: u64,
-        /// Steps since the message before.
+        /// Steps since the previous message.
         due: u64,
-        /// The most steps that there was time for.
+        /// The most steps possible in this time.
         most: u64,
     },
-    /// Steps that run backwards.
+    /// A step number smaller than the one before.
     #[error("step {step} comes after step {after}")]
     Order {
         /// The step.
         step: u64,
-        /// The step of the message before.
+        /// The step of the previous message.
         after: u64,
     },
 }
@@ -153,7 +153,7 @@ impl fmt::Display for ReplayVerdict {
 /// Replays a record.
 ///
 /// # Errors
-/// If the file can't be read, or holds nothing to compare.
+/// If the file cannot be read, or has nothing to compare.
 pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
     let first = first_input(&mut recording)?;
@@ -164,7 +164,7 @@ pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     }
 }
 
-/// Why there is no state in a record that ends so.
+/// The error for a record without states, by its end.
 fn no_states(ending: Option<RecordEnding>) -> ReplayError {
     match ending {
         Some(RecordEnding::FramePart) => ReplayError::FramePart,
@@ -215,11 +215,11 @@ fn play<const N: usize>(
 }
 
 struct Replay<const N: usize> {
-    /// The simulation, and the steps it has taken as the record counts them; none before the record begins.
+    /// The simulation and its number of steps in the record's count; `None` before the record begins.
     arm: Option<(Simulation<N>, u64)>,
-    /// When the simulation was recorded as a whole, in nanoseconds since 1970.
+    /// The time of the last whole simulation, in nanoseconds since 1970.
     began: u64,
-    /// Steps taken again since then.
+    /// Repeated steps since then.
     taken: u64,
     verdict: ReplayVerdict,
 }
@@ -254,7 +254,10 @@ impl<const N: usize> Replay<N> {
         match note {
             Note::Input(input) => simulation.apply(input),
             Note::Diverged if simulation.step() => {
-                self.differs(step, "the step from here on was not finite, and is");
+                self.differs(
+                    step,
+                    "the next step was not finite in the record, but is finite now",
+                );
             }
             Note::Diverged | Note::Begin(_) => {}
         }
@@ -297,7 +300,7 @@ impl<const N: usize> Replay<N> {
         Ok(())
     }
 
-    /// Takes the steps up to that one; false if there is nothing to compare there.
+    /// Takes the steps up to that one. Returns `false` if nothing can be compared there.
     fn advance(&mut self, step: u64, passage: &RecordedMessage) -> Result<bool, ReplayError> {
         let Some((simulation, at)) = &mut self.arm else {
             return Ok(false);
@@ -322,7 +325,10 @@ impl<const N: usize> Replay<N> {
         self.verdict.steps += taken;
         if taken < due {
             let at = *at;
-            self.differs(at, "the step from here on was finite, and is not");
+            self.differs(
+                at,
+                "the next step was finite in the record, but is not finite now",
+            );
             return Ok(false);
         }
         Ok(true)
@@ -335,7 +341,7 @@ impl<const N: usize> Replay<N> {
     }
 }
 
-/// The fields of a message on the channel of inputs, and of one on that of states.
+/// The fields of a message of inputs, and of a message of states.
 #[derive(Deserialize)]
 struct InputMessage {
     step: u64,

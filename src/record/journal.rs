@@ -1,7 +1,6 @@
-//! Inputs to the arm as text: one JSON value each, which is read back bit for bit.
+//! Inputs to the arm as text: one JSON value each. Its numbers are read back bit for bit.
 //!
-//! **Invariant:** finite numbers that are written and read again are the same, and a note that does not fit the arm is
-//! refused.
+//! **Invariant:** finite numbers are read back unchanged. A note that does not fit the arm is refused.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,36 +10,36 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, Checkpoint, ControlPeriod, Held};
 use crate::protocol::wire::text::{excerpt, shortened};
 
-/// Longest words of the parser's about a text \[characters\]: it repeats names of the file.
+/// Longest message of the parser \[characters\]. It may quote the file.
 const MAX_WORDS: usize = 200;
 
-/// Something on which the arm's steps depend.
+/// An input of the arm's steps.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note<const N: usize> {
-    /// The whole simulation: the record begins here, or begins again where some of it was lost.
+    /// The whole simulation, at the start of the record and after a gap.
     Begin(Box<Checkpoint<N>>),
-    /// A change from outside.
+    /// An external change.
     Input(ArmInput<N>),
     /// The next step was not finite and was not taken.
     Diverged,
 }
 
-/// Why a text is no note.
+/// Why a text is not a note.
 #[derive(Debug, thiserror::Error)]
 pub enum NoteError {
-    /// Another text.
+    /// Not the JSON of a note.
     #[error("not an input: {}", shortened(&.0.to_string(), MAX_WORDS))]
     Text(#[from] serde_json::Error),
     /// A field, and the rule for it.
     #[error("{0} must {1}")]
     Field(&'static str, &'static str),
     /// No method of that name.
-    #[error("no method {:?}", excerpt(.0))]
+    #[error("unknown method {:?}", excerpt(.0))]
     Method(
         /// The name.
         String,
     ),
-    /// There can't be such an arm.
+    /// The arm is not valid.
     #[error(transparent)]
     Arm(#[from] ArmError),
 }
@@ -149,7 +148,7 @@ pub fn write_note<const N: usize>(note: &Note<N>) -> String {
     serde_json::to_string(&written).unwrap_or_default()
 }
 
-/// How many links the arm has in a note that begins a record; `None` for any other note.
+/// The number of links in a note with the whole simulation; `None` for any other note.
 #[must_use]
 pub fn links(note: &str) -> Option<usize> {
     match serde_json::from_str(note) {
@@ -161,7 +160,7 @@ pub fn links(note: &str) -> Option<usize> {
 /// Reads a note.
 ///
 /// # Errors
-/// If it is none, or none for an arm of `N` links.
+/// If it is not a note, or not for an arm of `N` links.
 pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
     let input = match serde_json::from_str(note)? {
         Written::Begin(checkpoint) => return Ok(Note::Begin(Box::new(checkpoint.read()?))),
@@ -197,7 +196,7 @@ fn method(name: String) -> Result<Method, NoteError> {
     found.ok_or(NoteError::Method(name))
 }
 
-/// A number of steps: exact as a `float64`, which a run at any speed stays below for years.
+/// A number of steps, which must be exact as a `float64`. A run takes years to exceed that.
 fn counted(field: &'static str, steps: u64) -> Result<u64, NoteError> {
     const MOST: u64 = 1 << 53;
     let why = NoteError::Field(field, "be at most 2^53");

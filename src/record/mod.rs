@@ -1,10 +1,10 @@
-//! Runs on record: an MCAP file with every topic in the format of ROS 2, with calls and answers, and with the inputs
-//! that make the run repeatable.
+//! Records of runs: an MCAP file with every topic in the format of ROS 2, with calls and answers, and with the
+//! inputs for a replay.
 //!
-//! It is pure: entries in, bytes out, and back. The [recorder](crate::actors::recorder) makes the entries and takes the
-//! bytes.
+//! It is pure: it converts entries to bytes and back. The [recorder](crate::actors::recorder) creates the entries and
+//! writes the bytes.
 //!
-//! **Invariant:** a file that was cut anywhere is readable up to its last whole chunk.
+//! **Invariant:** a truncated file is readable up to its last whole chunk.
 
 mod comparison;
 mod journal;
@@ -21,7 +21,7 @@ pub use self::schema::{CALLS, INPUTS, STATES};
 pub use self::writer::{CHUNK_BYTES, McapWriter, RecordError, RunSettings};
 use crate::protocol::catalog::{Service, Topic};
 
-/// Something to be recorded.
+/// An entry of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordEntry {
     /// Its time, in nanoseconds since 1970.
@@ -30,7 +30,7 @@ pub struct RecordEntry {
     pub content: Content,
 }
 
-/// The kinds of what is recorded.
+/// The kinds of entries.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// A message of the runtime.
@@ -67,9 +67,9 @@ pub enum Content {
         /// The whole `service_response` frame.
         frame: Bytes,
     },
-    /// Something on which the arm's steps depend: a [note](write_note).
+    /// An input of the arm's steps: a [note](write_note).
     Input {
-        /// Steps taken before it took effect; resets do not set the count back.
+        /// The number of steps before it took effect. A reset does not restart the count.
         step: u64,
         /// The note.
         note: String,
@@ -88,7 +88,7 @@ pub enum Content {
 }
 
 impl Content {
-    /// Bytes that it takes while it waits to be written.
+    /// Its memory in bytes while it waits to be written.
     #[must_use]
     pub fn allocated(&self) -> usize {
         let text = match self {

@@ -1,7 +1,7 @@
-//! Reads a record back, message by message, as far as the file goes.
+//! Reads a record, message by message, up to the end of the file.
 //!
-//! **Invariant:** nothing is read of a damaged chunk. A message is read by our definition of its type; one that was
-//! recorded by another definition is left out.
+//! **Invariant:** nothing is read from a damaged chunk. A message is read by this version's definition of its type.
+//! A message with another definition is skipped.
 
 use std::collections::HashMap;
 use std::io::{self, Chain, Cursor, Read};
@@ -19,10 +19,10 @@ use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::cdr_reader::{self, CdrError};
 use crate::protocol::wire::text::{excerpt, shortened};
 
-/// Longest chunk that is read: longer ones are never written.
+/// Longest chunk that is read. Longer ones are never written.
 pub(super) const MAX_CHUNK: usize = 16 * 1024 * 1024;
 
-/// Bytes at the beginning of a file, in which the version is looked for.
+/// Bytes at the beginning of a file that are searched for the version.
 const HEAD: usize = 4096;
 
 /// A message of the record.
@@ -34,29 +34,29 @@ pub struct RecordedMessage {
     pub topic: String,
     /// Its number on that channel, from 1.
     pub sequence: u32,
-    /// The message; none if its type is not as we know it.
+    /// The message; `None` if its type has another definition.
     pub msg: Option<Value>,
 }
 
 /// How a file ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordEnding {
-    /// It ends as it should.
+    /// The file is complete.
     Whole,
-    /// It was cut, or the program that wrote it was killed.
+    /// The file was truncated, or the program that wrote it was killed.
     FramePart,
 }
 
-/// Why a file can't be read on.
+/// Why a file cannot be read further.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The system can't read it.
+    /// The system cannot read it.
     #[error(transparent)]
     File(io::Error),
-    /// It is no MCAP file, or damaged.
+    /// It is not an MCAP file, or is damaged.
     #[error("not a record: {}", shortened(&.0.to_string(), 200))]
     Mcap(McapError),
-    /// A message that its definition does not fit.
+    /// A message that does not match its definition.
     #[error("{}: {why}", excerpt(topic))]
     Message {
         /// The channel's topic.
@@ -75,20 +75,20 @@ impl From<McapError> for ReadError {
     }
 }
 
-/// A record that is being read.
+/// A reader of a record.
 pub struct Recording<R> {
     reader: MessageReader<Chain<Cursor<Vec<u8>>, R>>,
     version: Option<String>,
-    /// The type of each schema id, if it is as we know it.
+    /// The type of each schema id, if its definition is known.
     known: HashMap<u16, Option<Type>>,
     ending: Option<RecordEnding>,
 }
 
 impl<R: Read> Recording<R> {
-    /// Begins to read.
+    /// A reader of this file.
     pub fn new(mut file: R) -> Self {
         let mut head = Vec::new();
-        // A file that cannot be read says so again at the first message.
+        // The first message reports an error of the file again.
         let _ = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
@@ -101,7 +101,7 @@ impl<R: Read> Recording<R> {
         }
     }
 
-    /// The next message; none at the end.
+    /// The next message; `None` at the end.
     ///
     /// # Errors
     /// If the file is damaged before its end.
@@ -139,20 +139,20 @@ impl<R: Read> Recording<R> {
         }))
     }
 
-    /// The version of the program that wrote the file, with its commit if that was known.
+    /// The version of the program that wrote the file, with its commit if known.
     #[must_use]
     pub fn version(&self) -> Option<&str> {
         self.version.as_deref()
     }
 
-    /// How the file ended; none while it has not.
+    /// How the file ended; `None` before its end.
     #[must_use]
     pub fn ending(&self) -> Option<RecordEnding> {
         self.ending
     }
 }
 
-/// The version in the metadata that a record begins with.
+/// The version in the metadata at the start of a record.
 fn version(mut head: &[u8]) -> Option<String> {
     let options = LinearReaderOptions::default().with_record_length_limit(HEAD);
     let mut reader = LinearReader::new_with_options(options);
@@ -177,7 +177,7 @@ fn version(mut head: &[u8]) -> Option<String> {
     }
 }
 
-/// The type of that name, if it is defined as we define it.
+/// The type of that name, if its definition is the same as here.
 pub(super) fn known_type(name: &str, definition: &[u8]) -> Option<Type> {
     let own = [INPUT, STATE, CALL];
     let own = own.into_iter().find(|one| one.name == name);

@@ -1,6 +1,6 @@
-//! The record's own channels and the types on them. They are no topics: nobody subscribes to them.
+//! The record's own channels and their types. They are not topics, and have no subscribers.
 //!
-//! **Invariant:** a number is written as its 64 bits: in CDR, or as the shortest text that is read back as the same.
+//! **Invariant:** a number keeps its 64 bits: in CDR, or as the shortest text that is read back as the same number.
 
 use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types::Type;
@@ -21,14 +21,14 @@ const fn field(name: &'static str, kind: &'static str, unit: &'static str) -> Fi
     }
 }
 
-/// An input, and the number of steps before it.
+/// An input with the number of steps before it.
 pub(super) const INPUT: Type = Type {
     name: "pendularm_interfaces/msg/RecordedInput",
     fields: &[field("step", "uint64", ""), field("input", "string", "")],
     constants: &[],
 };
 
-/// The arm's state after that many steps.
+/// The arm's state after a number of steps.
 pub(super) const STATE: Type = Type {
     name: "pendularm_interfaces/msg/RecordedState",
     fields: &[
@@ -40,7 +40,7 @@ pub(super) const STATE: Type = Type {
     constants: &[],
 };
 
-/// A call, or the answer to one: then `content` is its `values`.
+/// A call, or an answer. In an answer `content` is `values`.
 pub(super) const CALL: Type = Type {
     name: "pendularm_interfaces/msg/RecordedCall",
     fields: &[

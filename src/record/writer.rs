@@ -1,6 +1,6 @@
-//! Writes a record: entries in, MCAP out, in chunks that are whole whenever they are written.
+//! Writes a record: entries to MCAP, in whole chunks.
 //!
-//! **Invariant:** each channel's messages are numbered from 1 in the order in which they are written.
+//! **Invariant:** the messages of each channel are numbered from 1 in the order of writing.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Write};
@@ -20,36 +20,36 @@ use crate::protocol::ros::cdr;
 use crate::protocol::ros::rosapi::DISTRO;
 use crate::protocol::ros::tree::MessageTree;
 
-/// Length of a chunk, from which on it is written without waiting for the next second.
+/// Length at which a chunk is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
 
-/// This program's version, with its commit if that is known.
+/// This program's version, with its commit if known.
 pub(super) const VERSION: &str = env!("PENDULARM_VERSION");
 /// The metadata record with facts about the run, and its member for the version.
 pub(super) const FACTS: &str = env!("CARGO_PKG_NAME");
 pub(super) const VERSION_KEY: &str = "version";
-/// Channel metadata in which rosbag2 looks for the quality of service.
+/// The channel metadata in which rosbag2 stores the quality of service.
 const QOS_KEY: &str = "offered_qos_profiles";
 
 /// Facts about the run besides its inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunSettings {
-    /// How many links the arm has.
+    /// The number of links.
     pub links: usize,
     /// The seed of the targets of timed trials.
     pub seed: u64,
 }
 
-/// Why something was not recorded.
+/// Why an entry was not recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The file takes no more.
+    /// The file cannot be written.
     #[error("the file cannot be written: {0}")]
     File(#[from] io::Error),
     /// The MCAP library refuses.
     #[error("the file cannot be written: {0}")]
     Mcap(McapError),
-    /// A frame of ours that cannot be read back.
+    /// A frame of the runtime that cannot be read back.
     #[error("a frame cannot be read: {0}")]
     Frame(#[from] serde_json::Error),
 }
@@ -93,17 +93,17 @@ struct ResponseFrame<'a> {
 }
 
 impl<W: Write> McapWriter<W> {
-    /// Begins a file.
+    /// Starts a file.
     ///
     /// # Errors
-    /// If it can't be written.
+    /// If it cannot be written.
     pub fn new(file: W, settings: &RunSettings) -> Result<Self, RecordError> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(format!("{FACTS} {VERSION}"))
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is kept until it is whole, so that the file is always the beginning of a good one.
+            // A chunk is kept in memory until it is whole, so the file is always the beginning of a valid one.
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let facts = [
@@ -111,7 +111,7 @@ impl<W: Write> McapWriter<W> {
             ("links", settings.links.to_string()),
             ("seed", settings.seed.to_string()),
         ];
-        // Without metadata of its own rosbag2 reads the quality of service in such a record as newer than it is.
+        // Without this metadata rosbag2 would read the quality of service in the newer format.
         let of_rosbag2 = [
             ("ROS_DISTRO", DISTRO.to_owned()),
             ("serialized_metadata", String::new()),
@@ -137,7 +137,7 @@ impl<W: Write> McapWriter<W> {
     /// Writes an entry.
     ///
     /// # Errors
-    /// If the file takes no more, or the entry is none.
+    /// If the file cannot be written, or the entry is not valid.
     pub fn write(&mut self, entry: &RecordEntry) -> Result<(), RecordError> {
         let at = entry.log_time;
         match &entry.content {
@@ -179,15 +179,15 @@ impl<W: Write> McapWriter<W> {
     /// Writes everything so far to the file.
     ///
     /// # Errors
-    /// If the file takes no more.
+    /// If the file cannot be written.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         Ok(self.writer.flush()?)
     }
 
-    /// Ends the file, with an index of what is in it.
+    /// Ends the file with an index.
     ///
     /// # Errors
-    /// If the file takes no more.
+    /// If the file cannot be written.
     pub fn finish(mut self) -> Result<W, RecordError> {
         self.writer.finish()?;
         let mut file = self.writer.into_inner().into_inner();
@@ -269,7 +269,7 @@ impl<W: Write> McapWriter<W> {
     }
 }
 
-/// The quality of service that the runtime offers on a topic, as rosbag2 writes it up to version 8 of its metadata. The
+/// The quality of service of a topic, in the format of rosbag2 up to version 8 of its metadata. The
 /// numbers are those of `rmw`: keep last, reliable, transient local or volatile, automatic. The times are infinite.
 fn qos_profiles(is_latched: bool) -> String {
     let (depth, durability) = if is_latched { (1, 1) } else { (10, 2) };
@@ -281,7 +281,7 @@ fn qos_profiles(is_latched: bool) -> String {
     )
 }
 
-/// A call or an answer, as it is recorded.
+/// A recorded call or answer.
 struct Said<'a> {
     id: &'a str,
     is_answer: bool,

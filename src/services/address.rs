@@ -1,6 +1,6 @@
-//! The way back of an answer, and how a response is written for it.
+//! The destination of an answer, and the form of its response.
 //!
-//! **Invariant:** a response repeats service and `id` as the caller spelled them.
+//! **Invariant:** a response has the service's name and the `id` as the caller spelled them.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::wire::payload::Payload;
 
-/// Destination of a response, and what it has to say of the call.
+/// Destination of a response, with the call's name and id.
 pub struct Address {
     service: Service,
     name: Box<str>,
@@ -54,8 +54,8 @@ impl Address {
         self.id.as_ref()
     }
 
-    /// The response with `values`; `result` is true if `status` is empty. Otherwise callers who want the text there get
-    /// that in place of `values`.
+    /// The response with `values`; `result` is true if `status` is empty. Otherwise callers that selected the text get
+    /// it in place of `values`.
     #[must_use]
     pub fn response(&self, values: &impl Serialize, status: &str) -> Bytes {
         let is_good = status.is_empty();
@@ -71,7 +71,7 @@ impl Address {
         messages::failure(&self.name, self.id.as_ref(), why, self.error_form)
     }
 
-    /// The response with values, or with the reason why there are none.
+    /// The response with values, or with the reason for none.
     #[must_use]
     pub fn outcome<T: Serialize, E: ToString>(&self, outcome: Result<T, E>) -> Bytes {
         match outcome {

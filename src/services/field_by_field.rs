@@ -1,21 +1,22 @@
-//! Requests whose fields are taken one by one, and the answer to one that sets something.
+//! Requests whose fields are checked one by one, and the answers of services that set values.
 //!
-//! **Invariant:** a bad field never keeps a good one from the arm; the echoed values are those after the request.
+//! **Invariant:** an invalid field never prevents a valid one from taking effect. The echoed values are those
+//! after the request.
 
 use super::{Ask, Callable};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 
-/// A question that carries the fields that were given and valid, and what was rejected.
+/// A request with its valid fields and its rejections.
 pub trait FieldByField: Ask {
-    /// The question with the fields that are valid, and with nothing rejected yet.
+    /// The request with the valid fields and no rejections yet.
     fn of(fields: &mut Fields<'_>) -> Self;
 
     /// Its rejections.
     fn rejected(&mut self) -> &mut Rejections;
 
-    /// The question that these fields make.
+    /// The request with these fields.
     #[must_use]
     fn request(mut fields: Fields<'_>) -> Self
     where
@@ -33,11 +34,11 @@ impl<A: FieldByField> Callable for A {
     }
 }
 
-/// The answer to a request whose fields are taken one by one.
+/// The answer to a request whose fields are checked one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Echo<T> {
-    /// The values as they are now.
+    /// The present values.
     pub values: T,
-    /// Fields of the request that were not taken.
+    /// The rejected fields of the request.
     pub rejected: Rejections,
 }

@@ -1,7 +1,7 @@
 //! Inverse kinematics and goals: `/ik/solve`, `/ik_action/send_goal` and `/ik_action/cancel_goal`.
 //!
-//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action. Its messages
-//! show the target and the setpoint that it was accepted with.
+//! **Invariant:** a goal of the service and a goal of the action are read in the same way. Its messages have
+//! the target and the setpoint with which it was accepted.
 
 use bytes::Bytes;
 
@@ -32,7 +32,7 @@ pub enum SolveError {
     /// Out of the arm's reach.
     #[error(transparent)]
     Unreachable(#[from] Unreachable),
-    /// The arm has ended.
+    /// The arm's actor has ended.
     #[error("{} does not answer", Node::ArmSim.name())]
     NoArm,
 }
@@ -55,9 +55,9 @@ impl<const N: usize> Answered for Solve<N> {
     }
 }
 
-/// Reads `x`, `y` and `phi`; none if one of them, or a field read before, is rejected.
+/// Reads `x`, `y` and `phi`; `None` if one of them, or a field read before, is rejected.
 ///
-/// Two links leave no orientation to choose: a value under `phi` is not looked at.
+/// With two links `phi` is ignored, because the orientation is not free.
 fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
     let x = fields.number("x", Bound::Finite);
     let y = fields.number("y", Bound::Finite);
@@ -73,7 +73,7 @@ fn read_target<const N: usize>(fields: &mut Fields<'_>) -> Option<Target> {
     })
 }
 
-/// A target as messages show it.
+/// A target in the form of the messages.
 #[must_use]
 pub fn target_message(target: &Target) -> TargetMessage {
     TargetMessage {
@@ -90,7 +90,7 @@ pub fn target_message(target: &Target) -> TargetMessage {
 pub struct GoalRequest {
     /// The target.
     pub target: Target,
-    /// When it counts as reached.
+    /// The condition for success.
     pub criteria: Criteria,
 }
 
@@ -98,7 +98,7 @@ impl GoalRequest {
     /// Reads a goal for an arm of `N` links.
     ///
     /// # Errors
-    /// All that is wrong with it, by name.
+    /// All rejected fields, by name.
     pub fn read<const N: usize>(
         service: Service,
         arguments: &Arguments,
@@ -120,7 +120,7 @@ impl GoalRequest {
         }
     }
 
-    /// Writes the response: the id of the goal that was accepted.
+    /// Writes the response: the id of the accepted goal.
     #[must_use]
     pub fn write(answer: &Result<String, GoalRejected>, to: &Address) -> Bytes {
         let values = answer.as_ref().map(|goal_id| GoalValues { goal_id });
@@ -128,7 +128,7 @@ impl GoalRequest {
     }
 }
 
-/// Why a goal was not accepted; nothing has changed.
+/// Why a goal was not accepted. Nothing has changed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GoalRejected {
     /// There is no solution.
@@ -145,7 +145,7 @@ pub enum GoalRejected {
 /// The fields of a cancellation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CancelRequest {
-    /// The goal that is meant, if one is named.
+    /// The id of the goal, if the request has one.
     pub goal_id: Option<String>,
 }
 
@@ -153,7 +153,7 @@ impl CancelRequest {
     /// Reads a cancellation.
     ///
     /// # Errors
-    /// All that is wrong with it, by name.
+    /// All rejected fields, by name.
     pub fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
@@ -174,13 +174,13 @@ impl CancelRequest {
 /// The error for a client that cancels a goal which it has not sent, or which has ended.
 pub const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
 
-/// Why nothing was cancelled.
+/// Why no goal was cancelled.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CancelRejected {
-    /// There is nothing to cancel.
+    /// No goal is active.
     #[error("no goal is active")]
     NotActive,
-    /// Another goal was meant.
+    /// The id is that of another goal.
     #[error("goal_id is not that of the active goal, {active}")]
     OtherGoal {
         /// The active goal.
@@ -189,26 +189,26 @@ pub enum CancelRejected {
     /// The client has not sent the active goal under this id.
     #[error("{NOT_ACTIVE}")]
     NotSent,
-    /// The arm has ended.
+    /// The arm's actor has ended.
     #[error("{} does not answer", Node::ArmSim.name())]
     NoAnswer,
 }
 
-/// A goal that was accepted.
+/// An accepted goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AcceptedGoal<const N: usize> {
-    /// Its number: goals are counted from 1.
+    /// Its number, counted from 1.
     pub number: u64,
     /// Its id for clients.
     pub id: String,
     /// The target.
     pub target: Target,
-    /// The setpoint that was sent \[rad\].
+    /// The published setpoint \[rad\].
     pub positions: [f64; N],
 }
 
 impl<const N: usize> AcceptedGoal<N> {
-    /// The goal of this number.
+    /// The goal with this number.
     #[must_use]
     pub fn new(number: u64, target: Target, positions: [f64; N]) -> Self {
         Self {
@@ -219,7 +219,7 @@ impl<const N: usize> AcceptedGoal<N> {
         }
     }
 
-    /// The message about its progress: the distance left \[m\], and the simulation time since its start \[s\].
+    /// Its feedback message, from the remaining distance \[m\] and the simulation time since its start \[s\].
     #[must_use]
     pub fn feedback(&self, distance: f64, elapsed: f64) -> IkFeedback {
         IkFeedback {
@@ -231,7 +231,7 @@ impl<const N: usize> AcceptedGoal<N> {
         }
     }
 
-    /// The message about its end.
+    /// Its result message.
     #[must_use]
     pub fn result(&self, distance: f64, outcome: Option<Outcome>) -> IkResult {
         IkResult {

@@ -1,7 +1,7 @@
-//! The services: their questions, how a request is read, and how its answer is written. Both the runtime and the
-//! page without a server read and write by these functions.
+//! The services: the typed requests, their readers, and the writers of their answers. Both the runtime and the
+//! page without a server use these functions.
 //!
-//! **Invariant:** plain values: nothing here knows an actor, a socket or a clock.
+//! **Invariant:** these are plain values, without actors, sockets or clocks.
 
 mod address;
 pub mod arm;
@@ -17,39 +17,39 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 
-/// Why a call finds nobody that answers it.
+/// Why no node or client serves a call.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NoService {
-    /// No service of the runtime's has that name, and no client provides it.
+    /// The runtime has no service of that name, and no client provides it.
     #[error("no provider for service {0}")]
     NoProvider(String),
-    /// The service is listed and has no node here.
+    /// The service is in the catalog, but no node serves it here.
     #[error("{0} is not served by this runtime")]
     NotServed(String),
 }
 
 /// A question that a node answers.
 pub trait Ask: Send + 'static {
-    /// The answer. A question that may be refused has a `Result` here.
+    /// The answer. It is a `Result` if the request may be refused.
     type Answer: Send + 'static;
 }
 
-/// A question that clients can ask by calling a service.
+/// A question that clients can send as a service call.
 pub trait Callable: Ask + Sized {
     /// Reads it.
     ///
     /// # Errors
-    /// If it does not get as far as the node; all that is wrong with it, by name.
+    /// If it is rejected before it reaches the node: all rejected fields, by name.
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections>;
 }
 
-/// A question whose answer is short: the registry writes the response.
+/// A question with a short answer. The registry writes the response.
 pub trait Answered: Callable {
     /// Writes the response.
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
 }
 
-/// A question whose answer may be long: the thread that computes it writes the response, a piece at a time.
+/// A question whose answer may be long. The thread that computes it writes the response, a piece at a time.
 pub trait Streamed: Callable {
     /// Begins to write the response.
     fn begin(answer: Self::Answer, to: &Address) -> Box<dyn ResponseWriter>;
@@ -57,7 +57,7 @@ pub trait Streamed: Callable {
 
 /// A response that is being written.
 pub trait ResponseWriter: Send {
-    /// Writes some more of it; the whole response, once that was the last.
+    /// Writes the next part. Returns the whole response after the last part.
     fn advance(&mut self) -> Option<Bytes>;
 }
 

@@ -1,7 +1,6 @@
 //! Timed trials: `/ik_trial/start`, `/ik_trial/skip` and `/ik_trial/stop`.
 //!
-//! **Invariant:** settings change only with a start that has no bad field; one that is refused still echoes those in
-//! force.
+//! **Invariant:** settings change only with a valid start. A refused start echoes the present ones.
 
 use std::time::Duration;
 
@@ -19,10 +18,10 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 /// Time between two messages of `/ik_trial/status` while nothing changes.
 pub const STATUS_PERIOD: Duration = Duration::from_millis(100);
 
-/// Starts a trial afresh, unless something was rejected.
+/// Starts a new trial, unless a field was rejected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StartTrial {
-    /// Settings that are to be others from now on.
+    /// Changed settings.
     pub changes: Changes,
     /// Fields that were not valid.
     pub rejected: Rejections,
@@ -32,10 +31,10 @@ impl Ask for StartTrial {
     type Answer = Terms;
 }
 
-/// The terms of trials, and whether one has been started.
+/// The settings of trials, and whether one has been started.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terms {
-    /// The settings in force.
+    /// The present settings.
     pub settings: Settings,
     /// Whether a trial has been started.
     pub outcome: Result<(), NotStarted>,
@@ -44,7 +43,7 @@ pub struct Terms {
 /// Why no trial was started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NotStarted {
-    /// Fields were not valid.
+    /// Fields were rejected.
     #[error("{0}")]
     Rejected(Rejections),
     /// The trial's own reason.
@@ -52,7 +51,7 @@ pub enum NotStarted {
     Refused(#[from] Rejection),
 }
 
-/// Abandons the present target for a new one.
+/// Replaces the present target by a new one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SkipTarget;
 
@@ -121,7 +120,7 @@ impl Answered for StopTrial {
     }
 }
 
-/// The status as its message shows it.
+/// The status in the form of its message.
 #[must_use]
 pub fn status_message(status: &Status) -> TrialStatus {
     TrialStatus {

@@ -1,11 +1,10 @@
 //! The rules of admission: `Host`, `Origin` and the token.
 //!
-//! A page from anywhere can make its visitor's browser send requests to this port. It cannot choose two headers. `Host`
-//! tells under which name the browser looked for us, which is not ours where a hostile name server points a foreign
-//! name here. `Origin` tells whose page opens a WebSocket. Programs send what they like there, and could use the raw
-//! port as well.
+//! Any web page can make its visitor's browser send requests to this port, but it cannot choose two headers. `Host` is
+//! the name that the browser looked up. It is a foreign name if a hostile name server points one here. `Origin` is the
+//! origin of the page that opens a WebSocket. Programs can send any headers, and could use raw TCP as well.
 //!
-//! **Invariant:** a request that no rule allows is refused, with a text that names the rule or the option.
+//! **Invariant:** a request that no rule allows is refused. The text names the rule or the option.
 
 use std::net::SocketAddr;
 
@@ -18,19 +17,19 @@ use super::response::{HttpResponse, set, text};
 use crate::protocol::op::token::Token;
 use crate::protocol::wire::text::shortened;
 
-/// Characters of a header that a refusal repeats.
+/// Most characters of a header in a refusal.
 const MAX_SHOWN: usize = 80;
 
 /// The rules.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Access {
-    /// The token that has to be shown, if there is one.
+    /// The required token, if there is one.
     pub token: Option<Token>,
-    /// Names that `Host` may have besides loopback's; without a port, at every port.
+    /// Names allowed in `Host` besides loopback's. A name without a port is allowed at every port.
     pub hosts: Vec<Authority>,
-    /// Pages that may open a WebSocket besides loopback's, as `Origin` writes them, in lower case.
+    /// Origins that may open a WebSocket besides loopback's, in lower case.
     pub origins: Vec<Box<str>>,
-    /// Only our own pages may, and those named; so it is with a token, too.
+    /// Only the runtime's own pages and the named ones may open a WebSocket. The same applies with a token.
     pub strict_origin: bool,
 }
 
@@ -43,22 +42,22 @@ pub enum AccessError {
     /// Another method.
     #[error("only GET and HEAD are answered here")]
     Method,
-    /// Where a body ends depends on the reader, so nobody could hide a request in it.
-    #[error("a request has no body here")]
+    /// A request with a body. Readers may disagree about its end, so a second request could be hidden in it.
+    #[error("a request must not have a body here")]
     Body,
-    /// The request does not say which host it looks for.
+    /// The request has no `Host` header, or several.
     #[error("the request must have one Host header")]
     NoHost,
-    /// A name that is not ours.
+    /// A foreign name.
     #[error(
         "this runtime does not answer to the host {host:?}: it could be another site's name that points here. Ask for \
          http://localhost:{port}/, or start the runtime with --allow-host and that name (without a port, to allow \
          every port)"
     )]
     Host {
-        /// The host that the request names.
+        /// The host in the request.
         host: String,
-        /// Our port.
+        /// The runtime's port.
         port: u16,
     },
     /// A page that may not open a WebSocket.
@@ -68,11 +67,11 @@ pub enum AccessError {
     )]
     Origin(String),
     /// The token is missing.
-    #[error("this runtime asks for its token: add ?token=... to the address, once")]
+    #[error("this runtime requires a token: add ?token=... to the address once")]
     NoToken,
     /// Another token.
     #[error(
-        "the token is not this runtime's: add ?token=... with the right one to the address, once"
+        "the token is not this runtime's: add ?token=... with the right one to the address once"
     )]
     WrongToken,
 }
@@ -97,7 +96,7 @@ impl AccessError {
 }
 
 impl Access {
-    /// The host that the request looks for, if it is ours; `local` is the address that the client has connected to.
+    /// The host of the request, if it is this runtime. `local` is the address that the client has connected to.
     ///
     /// # Errors
     /// [`AccessError::NoHost`] and [`AccessError::Host`].
@@ -105,7 +104,7 @@ impl Access {
         let text = request.one("host").ok_or(AccessError::NoHost)?;
         let bound = Host::Address(local.ip().to_canonical());
         let is_named = |asked: &Authority| self.hosts.iter().any(|one| one.allows(asked));
-        // No name server can point the first two elsewhere. Their port may be that of a proxy or of a tunnel.
+        // Name servers have no effect on the first two. Their port may be that of a proxy or of a tunnel.
         let authority = Authority::parse(&text)
             .filter(|asked| asked.host.is_loopback() || asked.host == bound || is_named(asked));
         authority.ok_or_else(|| AccessError::Host {
@@ -114,8 +113,8 @@ impl Access {
         })
     }
 
-    /// Whether the page that opens a WebSocket may do so; `own` is the host that the request looks for. Without an
-    /// `Origin` it is not a browser that asks.
+    /// Whether the page may open a WebSocket. `own` is the host of the request. A request without `Origin` is not
+    /// from a browser.
     ///
     /// # Errors
     /// [`AccessError::Origin`].
@@ -131,7 +130,7 @@ impl Access {
             .is_some_and(|page| page.host == own.host && page.http_port() == own.http_port());
         let is_local = over_http.is_some_and(|page| page.host.is_loopback());
         let is_named = self.origins.iter().any(|named| **named == lower);
-        // A browser sends the token's cookie along from every port of its host.
+        // A browser sends the token's cookie from pages at every port of the host.
         let is_strict = self.strict_origin || self.token.is_some();
         if is_own || is_named || (is_local && !is_strict) {
             return Ok(());
@@ -139,8 +138,8 @@ impl Access {
         Err(AccessError::Origin(shortened(&text, MAX_SHOWN)))
     }
 
-    /// Whether the request shows the token, in its query or its cookie. True if it did so in the query: a cookie is
-    /// due.
+    /// Checks the token in the query or the cookie of the request. Returns `true` if it is in the query: the answer
+    /// then sets a cookie.
     ///
     /// # Errors
     /// [`AccessError::NoToken`] and [`AccessError::WrongToken`].
@@ -157,19 +156,20 @@ impl Access {
         }
     }
 
-    /// The header line that lets a browser show the token from now on: not to scripts, not from other sites.
+    /// The header line that sets the token's cookie. Scripts cannot read it, and requests from other sites
+    /// do not send it.
     #[must_use]
     pub fn cookie(&self, local: SocketAddr) -> Option<String> {
         let token = self.token.as_ref()?;
         let name = cookie_name(local.port());
-        // A cookie has no place for some characters of a token.
+        // Some characters of a token are not allowed in a cookie.
         let bytes = token.reveal().bytes();
         let value: String = bytes.map(|byte| format!("%{byte:02X}")).collect();
         Some(format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict"))
     }
 }
 
-/// Browsers keep cookies by host, not by port: the name tells two runtimes on one machine apart.
+/// Browsers store cookies by host, not by port, so the name distinguishes two runtimes on one machine.
 fn cookie_name(port: u16) -> String {
     format!("pendularm_{port}")
 }

@@ -1,16 +1,16 @@
-//! Hosts with ports, as the `Host` and `Origin` headers write them.
+//! Hosts with ports, as in the `Host` and `Origin` headers.
 //!
-//! **Invariant:** two texts that mean the same place read as the same value: case, the brackets of IPv6 and a port that
-//! is left out do not tell them apart.
+//! **Invariant:** two spellings of the same host are equal values. Case, the brackets of IPv6 and a default port make
+//! no difference.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv6Addr};
 
 /// Longest name of a host that DNS allows, in bytes.
 const MAX_NAME: usize = 253;
-/// The port that `http` means where none is written.
+/// The default port of `http`.
 const HTTP_PORT: u16 = 80;
-/// The same for `https`, which a proxy in front may speak.
+/// The default port of `https`, which a proxy may use.
 const HTTPS_PORT: u16 = 443;
 
 /// A host: a name, or an address.
@@ -38,13 +38,13 @@ impl Host {
         is_name.then(|| Self::Name(text.to_ascii_lowercase().into()))
     }
 
-    /// The host's text without a full stop behind it: with one, it is the same name.
+    /// The host's text without a final full stop, which does not change the name.
     fn bare(&self) -> String {
         let text = self.to_string();
         text.strip_suffix('.').unwrap_or(&text).to_owned()
     }
 
-    /// Whether this machine alone has that name, independent of any name server.
+    /// Whether the name means this machine, independent of any name server.
     #[must_use]
     pub fn is_loopback(&self) -> bool {
         match self {
@@ -64,7 +64,7 @@ impl fmt::Display for Host {
     }
 }
 
-/// A host and perhaps a port: `arm.example:9095`, `127.0.0.1`, `[::1]:9095`.
+/// A host with an optional port: `arm.example:9095`, `127.0.0.1`, `[::1]:9095`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Authority {
     /// The host.
@@ -78,9 +78,9 @@ impl Authority {
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let (host, port) = match text.rsplit_once(':') {
-            // The last colon of `[::1]` is no port's.
+            // The last colon of `[::1]` does not begin a port.
             Some((host, port)) if !port.ends_with(']') => {
-                // `parse` alone takes a plus sign too.
+                // `parse` also accepts a plus sign.
                 let is_number = port.bytes().all(|byte| byte.is_ascii_digit());
                 (host, Some(port.parse().ok().filter(|_| is_number)?))
             }
@@ -90,7 +90,7 @@ impl Authority {
         Some(Self { host, port })
     }
 
-    /// Whether an operator who has named this has allowed `asked`: without a port, every port is allowed.
+    /// Whether this entry of an option allows `asked`. Without a port it allows every port.
     #[must_use]
     pub fn allows(&self, asked: &Self) -> bool {
         let is_default = |port| asked.port.is_none() && [HTTP_PORT, HTTPS_PORT].contains(&port);
@@ -98,7 +98,7 @@ impl Authority {
         self.host.bare() == asked.host.bare() && self.port.is_none_or(has_port)
     }
 
-    /// The port that is meant over `http`.
+    /// The port, or the default one of `http`.
     #[must_use]
     pub fn http_port(&self) -> u16 {
         self.port.unwrap_or(HTTP_PORT)

@@ -1,17 +1,17 @@
-//! The head of a request, and the parts of it that the site reads.
+//! The head of a request, with the parts that the site reads.
 //!
-//! **Invariant:** a header that may be there once counts as missing where it is there twice.
+//! **Invariant:** a header that may occur once counts as missing if it occurs twice.
 
 use std::borrow::Cow;
 
 use hyper::http::request::Parts;
 
-/// Longest head in bytes, the blank line included: a browser's has under 2 KiB.
+/// Longest head in bytes, including the blank line. A browser's has less than 2 KiB.
 pub const MAX_HEAD: usize = 16 * 1024;
-/// Header lines in one head.
+/// Most header lines in one head.
 pub const MAX_HEADERS: usize = 64;
 
-/// The head of a request that was read.
+/// A parsed head of a request.
 #[derive(Debug)]
 pub struct RequestHead(pub Parts);
 
@@ -68,7 +68,7 @@ fn value_of(name: &str, pairs: &str, separator: char) -> Option<String> {
     decode(value)
 }
 
-/// Undoes `%` and two digits; `None` where that makes no text.
+/// Decodes `%` with two digits; `None` if the result is not valid text.
 #[must_use]
 pub fn decode(text: &str) -> Option<String> {
     let mut parts = text.split('%');

@@ -3,15 +3,15 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`head`] | the head of a request |
-//! | [`authority`], [`access`] | who may ask: `Host`, `Origin`, the token |
-//! | [`page`], [`report`] | what there is to see |
+//! | [`authority`], [`access`] | admission: `Host`, `Origin`, the token |
+//! | [`page`], [`report`] | the served files |
 //! | [`upgrade`] | the WebSocket handshake |
 //! | [`response`] | answers, with the headers that keep a browser strict |
 //! | [`serve`] | the requests of one connection, and their answers |
 //! | [`stream`] | the connection's stream, with its deadlines |
 //!
-//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. The connection over an upgraded
-//! stream is the same as over a plain one.
+//! It uses `protocol` and `tokio`'s streams, but no actor and no physics. A connection over an upgraded stream
+//! works like one over a plain stream.
 //!
 //! **Invariant:** a connection that has begun with a request is never read as JSON, unless it becomes a WebSocket.
 
@@ -36,7 +36,7 @@ use self::access::Access;
 /// Folder of the report, unless another is named.
 pub const DEFAULT_REPORT: &str = "report";
 
-/// The files that are served over HTTP, and the rules for whom.
+/// The files served over HTTP, and the rules of admission.
 #[derive(Debug)]
 pub struct Site {
     /// The rules of admission.
@@ -45,7 +45,7 @@ pub struct Site {
     pub report: PathBuf,
     /// Origins whose pages may show the page and the report in a frame, separated by spaces.
     frames: String,
-    /// A permit travels with the file that was read.
+    /// The permit stays with the file.
     files: Arc<Semaphore>,
 }
 
@@ -67,7 +67,7 @@ impl Site {
         }
     }
 
-    /// Looks at the report's folder on another thread, once there is a permit. `None` if that panicked, or if the
+    /// Reads the report's folder on another thread, once there is a permit. `None` after a panic, or if the
     /// runtime is ending.
     async fn look<T: Send + 'static>(
         &self,

@@ -1,6 +1,7 @@
 //! The page: the files of `page/`, in the binary, under their own names.
 //!
-//! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
+//! **Invariant:** every file of that folder is in the table, and no other file is served as part of the
+//! page.
 
 use bytes::Bytes;
 
@@ -31,7 +32,7 @@ pub const ASSETS: &[Asset] = assets! {
     "transport.js" "views.js"
 };
 
-/// The file at `path`, if that is one of the page's.
+/// The file at `path`, if it is part of the page.
 #[must_use]
 pub fn find(path: &str) -> Option<Asset> {
     let wanted = match path.strip_prefix('/')? {
@@ -42,7 +43,7 @@ pub fn find(path: &str) -> Option<Asset> {
     ASSETS.iter().find(|(name, _)| *name == wanted).copied()
 }
 
-/// The answer with a file of the page. The document shows the way to the report if there is one in the folder.
+/// The answer with a file of the page. The document has a link to the report if the folder has one.
 pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpResponse {
     let mut body = Bytes::from_static(bytes);
     if name == DOCUMENT {
@@ -54,14 +55,14 @@ pub async fn answer((name, bytes): Asset, own: &Authority, site: &Site) -> HttpR
                 .into();
         }
     }
-    // All others are scripts, which a report may not have.
+    // All others are scripts, which are not allowed in a report.
     let kind = report::media_type(name).unwrap_or("text/javascript; charset=utf-8");
     file(kind, &policy(own), body)
 }
 
-/// The policy under which the page may run its own scripts and styles, draw, and speak to `own`, where it came from.
-/// `'self'` covers the WebSocket in newer browsers only, so that is spelled out. No text can become markup or a script:
-/// of trusted types there are none.
+/// The policy of the page: it may run its own scripts and styles, draw, and connect to `own`, its origin. `'self'`
+/// includes the WebSocket only in newer browsers, so its address is listed. No text can become markup or a script,
+/// because there are no trusted types.
 fn policy(own: &Authority) -> String {
     format!(
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self' ws://{own}; \

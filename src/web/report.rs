@@ -1,7 +1,7 @@
-//! The last report: files of one folder, by plain names.
+//! The last report: files of one folder, with simple names.
 //!
-//! **Invariant:** a served file lies in the folder, also where a link points elsewhere, and is of a listed kind.
-//! At most [`FILES`] are in memory, each of at most [`MAX_FILE`] bytes.
+//! **Invariant:** a served file is in the folder, and links to other places are not followed. Its type is in the
+//! table. At most [`FILES`] files are in memory, each of at most [`MAX_FILE`] bytes.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -11,16 +11,16 @@ use super::head::decode;
 
 /// Path under which it is served.
 pub const PREFIX: &str = "/report/";
-/// The file that is served for a folder.
+/// The file served for a folder.
 pub(super) const INDEX: &str = "index.html";
-/// Deepest file below the folder, in names.
+/// Most names in a path below the folder.
 const MAX_DEPTH: usize = 8;
 
-/// The policy of the report, which may show its own inline styles and figures. It runs no script and makes no request.
+/// The policy of the report, which may use its own inline styles and figures, but no script and no request.
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; base-uri 'none'; \
      form-action 'none'; frame-ancestors 'none'";
 
-/// Kinds of files by the ends of their names.
+/// Media types by file extension.
 const KINDS: [(&str, &str); 8] = [
     ("html", "text/html; charset=utf-8"),
     ("css", "text/css; charset=utf-8"),
@@ -32,12 +32,12 @@ const KINDS: [(&str, &str); 8] = [
     ("txt", "text/plain; charset=utf-8"),
 ];
 
-/// Files that are read or sent at once: a disk or a client that takes long keeps no others.
+/// Most files that are read or sent at once.
 pub const FILES: usize = 4;
-/// Longest file that is sent \[bytes\]: the longest of a full report has 1.5 MB.
+/// Longest file that is sent \[bytes\]. The longest file of a full report has 1.5 MB.
 pub const MAX_FILE: u64 = 4 * 1024 * 1024;
 
-/// A file of the report, by its path on the web.
+/// A file of the report, by its URL path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     path: PathBuf,
@@ -53,8 +53,8 @@ pub(super) fn media_type(name: &str) -> Option<&'static str> {
 }
 
 impl FileName {
-    /// The file that `rest`, what follows [`PREFIX`], names: letters, digits, `-`, `_` and `.` between slashes, no name
-    /// beginning with a dot, a known ending. A folder's is its index.
+    /// The file at `rest`, the path after [`PREFIX`]: letters, digits, `-`, `_` and `.` between slashes, no name that
+    /// begins with a dot, and a known extension. A folder stands for its index.
     #[must_use]
     pub fn parse(rest: &str) -> Option<Self> {
         let mut whole = decode(rest)?;
@@ -74,16 +74,16 @@ impl FileName {
         Some(Self { path, kind })
     }
 
-    /// Reads the file in `folder`; `None` if `folder` has no such file. It may block for as long as the disk takes.
+    /// Reads the file in `folder`; `None` if `folder` has no such file. It may block on the disk.
     ///
     /// # Errors
     ///
-    /// The system's, or that the file is too long.
+    /// The system's error, or that the file is too long.
     pub fn read(&self, folder: &Path) -> io::Result<Option<Vec<u8>>> {
         let find = || {
             let folder = folder.canonicalize().ok()?;
             let path = folder.join(&self.path).canonicalize().ok()?;
-            // Opening what is no file, such as a pipe, could wait for ever.
+            // Opening a pipe or a device could block.
             (path.starts_with(&folder) && path.is_file()).then_some(path)
         };
         let Some(path) = find() else {

@@ -1,7 +1,6 @@
 //! Answers over HTTP, each with the headers that keep a browser strict.
 //!
-//! **Invariant:** no byte of a request becomes part of a header. A text that repeats a part of a request is labelled as
-//! plain text.
+//! **Invariant:** no byte of a request becomes part of a header. A text that quotes a request is served as plain text.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -23,12 +22,12 @@ pub type HttpResponse = Response<AnswerBody>;
 const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 const OPENER_POLICY: HeaderName = HeaderName::from_static("cross-origin-opener-policy");
 
-/// The policy of a text in a browser, which may do nothing.
+/// The policy of a text in a browser: nothing is allowed.
 const NOTHING: &str = "default-src 'none'; frame-ancestors 'none'";
-/// Bytes that are handed to the library at a time.
+/// Bytes passed to the library at a time.
 const PIECE: usize = 64 * 1024;
 
-/// A file, with its policy in a browser. No browser keeps it: the next time it may be another.
+/// A file, with its policy in a browser. Browsers do not cache it, because it may change.
 #[must_use]
 pub fn file(kind: &'static str, policy: &str, body: impl Into<AnswerBody>) -> HttpResponse {
     let mut response = Response::new(body.into());
@@ -47,7 +46,7 @@ pub fn file(kind: &'static str, policy: &str, body: impl Into<AnswerBody>) -> Ht
     response
 }
 
-/// A sentence to the client.
+/// An answer with one sentence.
 #[must_use]
 pub fn text(status: StatusCode, sentence: &str) -> HttpResponse {
     let body = Bytes::from(format!("{sentence}\n"));
@@ -65,19 +64,19 @@ pub(super) fn permit_frames(response: &mut HttpResponse, origins: &str) {
     };
     let permitted = format!("frame-ancestors {origins}");
     let policy = policy.replace("frame-ancestors 'none'", &permitted);
-    // This header can only refuse all other pages. Browsers that know `frame-ancestors` do not read it.
+    // This header can only forbid all other pages. Browsers that support `frame-ancestors` ignore it.
     headers.remove(X_FRAME_OPTIONS);
     set(response, CONTENT_SECURITY_POLICY, &policy);
 }
 
-/// Sets a header, whose value is ours.
+/// Sets a header with a value of the runtime.
 pub(super) fn set(response: &mut HttpResponse, name: HeaderName, value: &str) {
     if let Ok(value) = HeaderValue::from_str(value) {
         response.headers_mut().insert(name, value);
     }
 }
 
-/// The bytes of a sentence to a client whose request was not read to its end. The connection is closed behind it.
+/// The bytes of a one-sentence answer to a client whose request was not read to its end. The connection is then closed.
 #[must_use]
 pub fn refusal(status: StatusCode, sentence: &str) -> Vec<u8> {
     let response = text(status, sentence);

@@ -1,7 +1,7 @@
-//! The requests of one connection, and their answers: the library reads heads, and this chooses the answers.
+//! The requests of one connection and their answers. The library reads heads; this module chooses the answers.
 //!
-//! **Invariant:** reading a head and writing an answer are bounded in bytes and in time. How many connections there are
-//! at once is bounded by the caller.
+//! **Invariant:** reading a head and writing an answer are bounded in bytes and in time. The caller bounds the number
+//! of connections.
 
 use std::cell::Cell;
 use std::future::poll_fn;
@@ -27,24 +27,24 @@ use super::response::{AnswerBody, HttpResponse, file, permit_frames, refusal, se
 use super::stream::{Deadline, HttpStream};
 use super::{Site, page, report, upgrade};
 
-/// Time of the end of a connection, and how many further bytes of the client are read there.
+/// Time for the end of a connection, and most further bytes of the client that are read there.
 const DISCARD_TIME: Duration = Duration::from_secs(1);
 const DISCARD_BYTES: u64 = 1024 * 1024;
 
-/// Decides about requests, beside the rules of the site.
+/// Decides about requests, in addition to the rules of the site.
 pub trait Gate {
-    /// Admits the client. It is asked before each request is answered. The sentence says why it may not in.
+    /// Admits the client. It is called before each answer. An error holds the reason for a refusal.
     fn admit(&self) -> impl Future<Output = Result<(), String>>;
 
-    /// Waits as long as the answer to a wrong token has to.
+    /// Waits for the delay of an answer to a wrong token.
     fn delay(&self) -> impl Future<Output = ()>;
 }
 
-/// Answers the requests that come on `stream`, of which `first` has been read already. The first head has time until
-/// `due`. `local` is the address that the client has connected to. `cut_off` ends the connection with a sentence, if it
-/// gives one and no request has come.
+/// Answers the requests on `stream`, whose bytes `first` have been read already. The first head must be complete by
+/// `due`. `local` is the address that the client has connected to. `cut_off` ends the connection. If it returns a
+/// sentence and there is no request yet, this is sent.
 ///
-/// Returns the stream and the bytes behind the handshake, if it is a WebSocket now; else it has ended.
+/// Returns the stream and the bytes after the handshake, if it is a WebSocket now. Otherwise it has ended.
 pub async fn serve<S, G>(
     stream: S,
     first: BytesMut,
@@ -84,7 +84,7 @@ where
         biased;
         served = poll_fn(|cx| {
             let served = ready!(connection.poll_without_shutdown(cx));
-            // The library returns once the last answer is in its buffer. Polled again, it goes on writing.
+            // The library returns once the last answer is in its buffer. It continues to write when polled again.
             let may_write = served.as_ref().map_or_else(hyper::Error::is_parse, |()| true);
             if may_write && !deadline.is_flushed.get() {
                 return Poll::Pending;
@@ -104,7 +104,7 @@ where
             return Some((stream, [parts.read_buf, first].concat().into()));
         }
         Ok(Err(error)) if !is_asked && error.is_parse() => refusal_of_head(&error),
-        // A bad head behind an answered one was refused by the library.
+        // The library has refused a bad head after an answered one.
         Ok(_) => Vec::new(),
         Err(_) if is_asked => return None,
         Err(None) => {
@@ -113,13 +113,13 @@ where
         }
         Err(Some(why)) => {
             let message = refusal(StatusCode::SERVICE_UNAVAILABLE, &why?);
-            // It is closed at once, whether it takes that or not.
+            // The stream is closed at once, even if the client does not read the sentence.
             let _ = timeout(Duration::ZERO, stream.write_all(&message)).await;
             return None;
         }
     };
-    // Some of the client's further bytes are read: closing a socket with unread input resets it, and the last answer
-    // would be lost.
+    // Some of the client's further bytes are read, because closing a socket with unread input resets it and loses
+    // the last answer.
     let end = async {
         stream.write_all(&message).await?;
         stream.shutdown().await?;
@@ -147,12 +147,12 @@ struct Responder<'a, G> {
     local: SocketAddr,
     gate: &'a G,
     deadline: &'a Deadline,
-    /// Whether the last answer has made a WebSocket of it.
+    /// Whether the connection is a WebSocket after the last answer.
     is_socket: Cell<bool>,
 }
 
 impl<G: Gate> Responder<'_, G> {
-    /// The answer to a request. Where there is none, the connection ends.
+    /// The answer to a request. Without one the connection ends.
     async fn answer(&self, request: Request<Incoming>) -> io::Result<HttpResponse> {
         self.deadline.begin_answer();
         let (parts, body) = request.into_parts();
@@ -177,7 +177,7 @@ impl<G: Gate> Responder<'_, G> {
                 Err(why) => text(StatusCode::SERVICE_UNAVAILABLE, &why),
             },
             Err(why) => {
-                // A browser shows nobody the answer to a WebSocket handshake.
+                // A browser does not show the answer to a WebSocket handshake, so it is logged.
                 if matches!(why, AccessError::Origin(_)) {
                     tracing::warn!(%why, "request refused");
                 } else {
@@ -198,7 +198,7 @@ impl<G: Gate> Responder<'_, G> {
         Ok(response)
     }
 
-    /// Whether a request may be served. Returns the host that it looks for, and a cookie that is due.
+    /// Checks whether a request may be served. Returns its host, and the cookie to set.
     fn check(&self, request: &RequestHead) -> Result<(Authority, Option<String>), AccessError> {
         let access = &self.site.access;
         if !request.path().starts_with('/') || request.0.uri.authority().is_some() {
@@ -216,7 +216,7 @@ impl<G: Gate> Responder<'_, G> {
         Ok((own, cookie))
     }
 
-    /// Finds the WebSocket, the page, the file or the sentence that stands at a path.
+    /// Finds the WebSocket, the page, the file or the sentence for a path.
     async fn resource(&self, request: &RequestHead, own: &Authority) -> HttpResponse {
         let path = request.path();
         if upgrade::is_wanted(request) {
@@ -244,7 +244,7 @@ impl<G: Gate> Responder<'_, G> {
     }
 }
 
-/// The answer with the file of the report that `rest`, the path behind its prefix, names, or why there is none.
+/// The answer with the file of the report at `rest`, the path after the prefix, or the reason for none.
 async fn open_report(rest: &str, site: &Site) -> HttpResponse {
     let Some(name) = report::FileName::parse(rest) else {
         return text(StatusCode::NOT_FOUND, NO_SUCH_FILE);

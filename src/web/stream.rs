@@ -1,6 +1,6 @@
-//! The stream of a connection that speaks HTTP, with its deadline.
+//! The stream of an HTTP connection, with its deadline.
 //!
-//! **Invariant:** a connection has a deadline at every time: the client has to send its head, or to take its answer.
+//! **Invariant:** a connection always has a deadline: for the client's next head, or for reading the answer.
 
 use std::cell::Cell;
 use std::future::poll_fn;
@@ -15,10 +15,10 @@ use hyper::rt::ReadBufCursor;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, sleep_until};
 
-/// How long an answer may take, from its request to the last byte that the client takes.
+/// Longest time of an answer, from its request until the client has read the last byte.
 pub const ANSWER_TIME: Duration = Duration::from_secs(30);
-/// How long a client may take from an answer to the head of its next request. A browser that loads the page needs
-/// milliseconds, and every connection takes a place.
+/// Longest time from an answer to the head of the next request. A browser that loads the page needs milliseconds,
+/// and every connection uses a place.
 pub const IDLE_TIME: Duration = Duration::from_secs(2);
 /// Bytes that are read at a time.
 const CHUNK: usize = 4096;
@@ -26,16 +26,16 @@ const CHUNK: usize = 4096;
 /// The deadline of a connection: for the next head, or for the end of an answer.
 pub(super) struct Deadline {
     due: Cell<Instant>,
-    /// Whether an answer is being made or taken.
+    /// Whether an answer is being prepared or sent.
     is_answering: Cell<bool>,
-    /// Whether a request has come.
+    /// Whether a request has arrived.
     pub(super) is_asked: Cell<bool>,
-    /// Whether the stream has taken all the bytes that the library has to write.
+    /// Whether the stream has written all bytes of the library.
     pub(super) is_flushed: Cell<bool>,
 }
 
 impl Deadline {
-    /// The first head has to come until `due`.
+    /// A deadline with the first head at `due`.
     pub(super) const fn new(due: Instant) -> Self {
         Self {
             due: Cell::new(due),
@@ -45,21 +45,21 @@ impl Deadline {
         }
     }
 
-    /// A request has come.
+    /// A request has arrived.
     pub(super) fn begin_answer(&self) {
         self.is_asked.set(true);
         self.is_answering.set(true);
         self.due.set(Instant::now() + ANSWER_TIME);
     }
 
-    /// The next request is read, which the library does once an answer has been taken.
+    /// The next request is read. The library does this after an answer has been sent.
     fn end_answer(&self) {
         if self.is_answering.take() {
             self.due.set(Instant::now() + IDLE_TIME);
         }
     }
 
-    /// Ends when the deadline has passed. It has to be polled whenever that may have moved.
+    /// Ends when the deadline has passed. It must be polled whenever the deadline may have changed.
     pub(super) async fn pass(&self) {
         let mut sleep = pin!(sleep_until(Instant::now()));
         poll_fn(|cx| {
@@ -110,7 +110,8 @@ impl<S: AsyncWrite + Unpin> hyper::rt::Write for HttpStream<S> {
     ) -> Poll<io::Result<usize>> {
         let this = self.get_mut();
         if !this.deadline.is_asked.get() {
-            // Without a request this is the library's own answer to a head that it cannot read. Ours says why.
+            // Without a request this is the library's answer to a head that it cannot read. It is discarded,
+            // because the answer here has the reason.
             return Poll::Ready(Ok(bytes.len()));
         }
         this.deadline.is_flushed.set(false);

@@ -1,6 +1,6 @@
-//! The WebSocket handshake (RFC 6455, section 4.2), apart from who may open one.
+//! The WebSocket handshake (RFC 6455, section 4.2), without the rules of admission.
 //!
-//! **Invariant:** nothing is agreed to but the protocol itself: no extension, no subprotocol.
+//! **Invariant:** only the protocol itself is accepted: no extension and no subprotocol.
 
 use bytes::Bytes;
 use hyper::header::{SEC_WEBSOCKET_VERSION, UPGRADE};
@@ -11,19 +11,19 @@ use tokio_tungstenite::tungstenite::handshake::server::create_response;
 use super::head::RequestHead;
 use super::response::{HttpResponse, set, text};
 
-/// Whether the request wants to become a WebSocket, rightly or not.
+/// Whether the request asks for a WebSocket, valid or not.
 #[must_use]
 pub fn is_wanted(request: &RequestHead) -> bool {
     request.has_word("upgrade", "websocket") || request.0.headers.contains_key("sec-websocket-key")
 }
 
-/// The answer to a handshake. With the status 101 the stream is a WebSocket behind it.
+/// The answer to a handshake. After the status 101 the stream is a WebSocket.
 #[must_use]
 pub fn accept(request: &RequestHead) -> HttpResponse {
     match create_response(&Request::from_parts(request.0.clone(), ())) {
         Ok(answer) => answer.map(|()| Bytes::new().into()),
         Err(Error::Protocol(ProtocolError::MissingSecWebSocketVersionHeader)) => {
-            let sentence = "this runtime speaks version 13 of the WebSocket protocol";
+            let sentence = "this runtime supports only version 13 of the WebSocket protocol";
             let mut answer = text(StatusCode::UPGRADE_REQUIRED, sentence);
             set(&mut answer, SEC_WEBSOCKET_VERSION, "13");
             set(&mut answer, UPGRADE, "websocket");

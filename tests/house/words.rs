@@ -1,6 +1,6 @@
 //! Sentences in documents and comments: their length, and their subjects.
 //!
-//! **Invariant:** code, tables, headings and quoted code are no sentences; each other sentence of the tree is counted.
+//! **Invariant:** code, tables and headings are not sentences. Every other sentence of the tree is counted.
 
 use std::fs;
 
@@ -125,7 +125,7 @@ fn fault(sentence: &str) -> Option<String> {
     let lower = sentence.to_lowercase();
     let clauses = lower.split([':', ';']).enumerate();
     for (place, clause) in clauses {
-        // Within a name such as `math::arm` no clause begins.
+        // A colon within a name such as `math::arm` begins no clause.
         let is_clause = place == 0 || clause.starts_with(' ');
         let clause = clause.trim_start_matches(|one: char| !one.is_alphanumeric());
         let subject = SUBJECTS.iter().find(|subject| {

@@ -369,7 +369,7 @@ fn the_operators_record_is_not_ended_by_a_client() {
     let refused = client.call("/recorder/stop", json!({}));
     assert_eq!(
         refused["status"],
-        "operators.mcap was begun by the operator with --record, and ends with the program"
+        "operators.mcap was started by the operator with --record, and ends with the program"
     );
     client.ask("/arm_sim/pause", json!({"data": true}));
     end(runtime);

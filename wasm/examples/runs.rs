@@ -1,4 +1,4 @@
-//! Prints the runs that a test compares with those of the WebAssembly module, to the bit.
+//! Prints the runs that a test compares bit by bit with those of the WebAssembly module.
 
 use std::io::Write as _;
 

@@ -1,8 +1,8 @@
 //! The arm in a page, without a server: rosbridge frames in, rosbridge frames out.
 //!
-//! A [`Kernel`] is what the runtime's actors are to one client, in one thread and without a socket. Requests are read,
-//! done and written by the runtime's own functions: `pendularm::services` and `pendularm::live`. `module.rs` makes a
-//! WebAssembly module of it.
+//! A [`Kernel`] replaces the runtime's actors for one client, in one thread and without a socket. The runtime's own
+//! functions read, execute and answer requests: `pendularm::services` and `pendularm::live`. `module.rs` exports it as
+//! a WebAssembly module.
 //!
 //! **Invariant:** a frame has the same answer here as from the runtime.
 

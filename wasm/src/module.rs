@@ -1,9 +1,9 @@
 //! The WebAssembly module: a page writes a frame into memory, and reads frames there.
 //!
-//! **Invariant:** there is one kernel, and one thread that calls.
+//! **Invariant:** there is one kernel, and one calling thread.
 #![allow(
     unsafe_code,
-    reason = "an export needs its name kept; the functions themselves are safe"
+    reason = "an export must keep its name; the functions themselves are safe"
 )]
 
 use std::cell::RefCell;
@@ -45,14 +45,14 @@ fn clock() -> Duration {
     Duration::try_from_secs_f64(milliseconds() / 1000.0).unwrap_or_default()
 }
 
-/// Keeps what is to be read, and returns its length.
+/// Stores bytes for the page, and returns their length.
 fn give(bytes: Vec<u8>) -> usize {
     let length = bytes.len();
     OUTPUT.set(bytes);
     length
 }
 
-/// Begins anew with an arm of `links` links.
+/// Restarts with an arm of `links` links.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(links: usize, seed: f64) {
     let seed = seed.to_bits();
@@ -63,7 +63,7 @@ pub extern "C" fn start(links: usize, seed: f64) {
     }));
 }
 
-/// Makes room for a frame of `length` bytes, and returns its address.
+/// Allocates a buffer for a frame of `length` bytes, and returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(length: usize) -> *mut u8 {
     INPUT.with_borrow_mut(|input| {
@@ -73,7 +73,7 @@ pub extern "C" fn input(length: usize) -> *mut u8 {
     })
 }
 
-/// Takes the frame that was written there.
+/// Takes the frame in that buffer.
 #[unsafe(no_mangle)]
 pub extern "C" fn receive() {
     let frame = INPUT.take();
@@ -82,32 +82,32 @@ pub extern "C" fn receive() {
     }
 }
 
-/// Publishes what is due.
+/// Publishes due messages.
 #[unsafe(no_mangle)]
 pub extern "C" fn tick() {
     with_kernel!(kernel => kernel.tick());
 }
 
-/// Computes for so long \[ms\]. True if a computation still waits.
+/// Computes for at most this time \[ms\]. Returns whether a computation still waits.
 #[unsafe(no_mangle)]
 pub extern "C" fn compute(budget: u32) -> bool {
     let budget = Duration::from_millis(budget.into());
     with_kernel!(kernel => kernel.compute(budget))
 }
 
-/// Collects the frames for the page. Returns how many bytes they have.
+/// Collects the frames for the page. Returns their number of bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn collect() -> usize {
     give(with_kernel!(kernel => kernel.take_frames()))
 }
 
-/// Makes the runs that are compared with the native ones. Returns how many bytes their text has.
+/// Makes the runs that are compared with the native ones. Returns the number of bytes of their text.
 #[unsafe(no_mangle)]
 pub extern "C" fn compare() -> usize {
     give(runs::text().into_bytes())
 }
 
-/// Where the bytes are that were collected last.
+/// The address of the last collected bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const u8 {
     OUTPUT.with_borrow(|output| output.as_ptr())

@@ -1,6 +1,6 @@
-//! Runs whose states are the same to the bit wherever they are made: a test compares those of the module with native ones.
+//! Runs whose states are bit-identical on every machine. A test compares those of the module with native ones.
 //!
-//! **Invariant:** nothing of a run depends on the machine.
+//! **Invariant:** a run does not depend on the machine.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use pendularm::math::simulation::Simulation;
 
 use crate::Kernel;
 
-/// Questions to the study and to inverse kinematics, whose answers are compared too: the service, and its arguments.
+/// Calls of the study and of inverse kinematics whose answers are also compared: the service and its arguments.
 const QUESTIONS: [(&str, &str); 8] = [
     ("/study/stability", "{}"),
     (
@@ -36,8 +36,8 @@ const QUESTIONS: [(&str, &str); 8] = [
 /// Steps of a run.
 pub const STEPS: u64 = 20_000;
 
-/// First one line for each run, by each method, with both numbers of links, without and with the
-/// controller: its name, and the bits of its last state, effort and time. Then one for each answer.
+/// The text has one line for each run: each method, both numbers of links, without and with the controller. A line has
+/// the name and the bits of the last state, effort and time. After these there is one line for each answer.
 #[must_use]
 pub fn text() -> String {
     let mut text = String::new();
@@ -52,7 +52,7 @@ pub fn text() -> String {
     text
 }
 
-/// The answers to all questions, of an arm whose time stands still.
+/// The answers to all calls, for an arm whose time does not advance.
 fn answers<const N: usize>(text: &mut String)
 where
     Arm<N>: Default,

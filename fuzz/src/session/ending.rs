@@ -1,14 +1,14 @@
-//! The end of a session: everybody reads, and nothing that is owed is lost.
+//! The end of a session: all clients read, and no expected message is lost.
 
 use super::*;
 
 impl Session {
-    /// Everybody reads, every call is answered, everybody leaves.
+    /// All clients read, every call is answered, and all clients disconnect.
     pub(super) async fn end(&mut self) {
         for player in &self.players {
             player.client.pause(false);
         }
-        // A client that has not been reading for long finds here that it was given up; from then on it is owed nothing.
+        // A client that has not read for long is disconnected by now. Nothing is expected for it any more.
         self.pass(Duration::from_millis(5)).await;
         self.stage.release_all();
         let mut waited = Duration::ZERO;
@@ -31,7 +31,7 @@ impl Session {
         for player in &self.players {
             player.client.finish();
         }
-        // A client that leaves is owed the rest, and answers need not come.
+        // A client that disconnects gets the rest, but its answers may be missing.
         let limit = STALL_LIMIT + RESPONSES_TIME + 2 * LINGER + Duration::from_secs(5);
         let mut waited = Duration::ZERO;
         while waited < limit && !self.has_emptied() {
@@ -47,8 +47,8 @@ impl Session {
         assert!(self.has_emptied(), "left when all have left: {left:?}");
     }
 
-    /// Lets the remaining clients tell and ask one another something, and nothing of that may be lost: all of them
-    /// read, and have done their part.
+    /// Lets the remaining clients send messages and calls to each other, none of which may be lost, because all of
+    /// them read.
     pub(super) async fn exchange(&mut self) {
         let left: Vec<u8> = (0..CLIENTS as u8)
             .filter(|client| self.player(*client).is_owed())
@@ -92,7 +92,7 @@ impl Session {
                 self.player(client).client.send(&frame, 0);
             }
         }
-        // A client waits for its answer before its next frame is looked at, so they come one after the other.
+        // A client's next frame is read after its answer, so they arrive one after the other.
         for _ in 0..2 * CLIENTS {
             self.pass(Duration::from_millis(5)).await;
             for &client in &left {
@@ -124,7 +124,7 @@ impl Session {
         }
     }
 
-    /// How long to wait before looking again.
+    /// Time before the next check.
     pub(super) fn patience(&self, milliseconds: u64, waited: Duration) -> Duration {
         let soon = waited.is_zero() || self.cast == Cast::Arm;
         Duration::from_millis(if soon { 10 } else { milliseconds })

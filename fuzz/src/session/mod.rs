@@ -1,14 +1,14 @@
-//! Clients that do as a script says, and what must hold of all that they hear.
+//! Clients that follow a script, and checks of everything that they receive.
 //!
 //! - Every frame is one line of strict JSON (or CBOR, where that was asked for) with an `op` that the runtime sends.
 //! - A call gets exactly one response with its `id`, as long as its client stays, reads, and breaks no rule; never two.
 //! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent, as they were sent.
 //! - A provider hears what its caller asked, and the caller what its provider answered.
-//! - In the end, when nobody is in anybody's way, every message and every call between those who are left arrives.
-//! - A connection ends when its client has ended, and nothing else ends it but the rules that say so.
-//! - When all have left, nothing is counted as held for anybody.
+//! - In the end, without other load, every message and every call between the remaining clients arrives.
+//! - A connection ends only when its client has ended, or by a rule of the protocol.
+//! - When all clients have disconnected, no memory is counted for any of them.
 //!
-//! All of it holds too where all clients together have little room.
+//! All of this also holds if all clients together have little memory.
 
 mod ending;
 mod frames;
@@ -47,7 +47,7 @@ const CLIENTS: usize = 3;
 /// timesteps computes for five milliseconds of the processor's in every one.
 const ARM_TIME: u16 = 200;
 const ARM_WAIT: u16 = 48;
-/// Longest that a caller lets a provider take; all is answered by then.
+/// Longest timeout of a call. Every call is answered by then.
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(66);
 /// Every id of a call begins so; garbage must not, or it would be a call.
 const ID: &str = "call-";
@@ -65,7 +65,8 @@ pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     });
 }
 
-/// Plays a script with the runtime's own nodes. In less time: an arm of tiny timesteps computes for as long as it may.
+/// Plays a script with the runtime's own nodes, in less virtual time, because an arm with tiny timesteps uses its
+/// whole budget.
 pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run_apart(async {
         let stage = Stage::with_arm(Admission::default(), memory(is_scarce)).await;
@@ -119,7 +120,7 @@ struct Player {
     latest: HashMap<(String, u64), u64>,
     /// Fragments of a message, by its id.
     pieces: HashMap<String, Vec<String>>,
-    /// It has broken a rule, or left: the runtime owes it nothing and may end it.
+    /// It has broken a rule or disconnected, so nothing is expected for it, and the runtime may end it.
     is_excused: bool,
     has_ended: bool,
     /// How long it has not been reading, in a row.

@@ -1,8 +1,8 @@
-//! Scripts: all that clients do, as the fuzzer draws it.
+//! Scripts: the actions of clients, drawn by the fuzzer.
 
 use super::*;
 
-/// One thing that happens.
+/// One action.
 #[derive(Debug, Arbitrary)]
 pub enum Step<'a> {
     /// A client sends a frame.
@@ -11,7 +11,7 @@ pub enum Step<'a> {
         style: u8,
         deed: Deed<'a>,
     },
-    /// A client sends a frame in pieces of so many bytes.
+    /// A client sends a frame in pieces of this length.
     InPieces {
         client: u8,
         style: u8,
@@ -20,19 +20,19 @@ pub enum Step<'a> {
     },
     /// A client sends anything, up to the end of a line or message.
     Garbage { client: u8, bytes: &'a [u8] },
-    /// A client sends bytes that need be no message at all.
+    /// A client sends any bytes.
     Noise { client: u8, bytes: &'a [u8] },
     /// This many milliseconds pass.
     Wait(u16),
-    /// A client stops or goes on reading.
+    /// A client stops or continues reading.
     Pause { client: u8, paused: bool },
-    /// A client ends, and reads on.
+    /// A client ends sending, and continues to read.
     HalfClose { client: u8 },
-    /// A client is gone, and another in its place.
+    /// A client disconnects, and another one connects.
     Replace { client: u8, room: u8, piece: u8 },
-    /// The runtime's node treats calls otherwise.
+    /// The runtime's node changes its treatment of calls.
     Behave(u8),
-    /// It answers a call that it has kept.
+    /// It answers a held call.
     Release,
     /// It publishes.
     Publish { topic: u8 },

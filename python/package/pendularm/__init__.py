@@ -1,9 +1,9 @@
 """The arm of pendularm: one (`Simulation`), many at once (`Batch`), its equation of motion (`dynamics`) and its study.
 
-All units are SI, angles are in rad, counter-clockwise, each relative to the link before. Names are those of the
-services of the live runtime, which `pendularm` on the command line, or `python -m pendularm`, starts.
+All units are SI. Angles are in rad, counter-clockwise, each relative to the previous link. Names are those of the
+services of the live runtime. The command `pendularm`, or `python -m pendularm`, starts this runtime.
 
-A value that cannot be is a `ValueError` that names its field.
+A wrong value raises a `ValueError` that names its field.
 """
 
 from importlib.metadata import version as _version

@@ -7,21 +7,22 @@ from pathlib import Path
 
 
 def program() -> Path:
-    """The program that the wheel installed beside Python's own.
+    """The path of the program that the wheel installed.
 
-    Raises `FileNotFoundError` where this package was installed from something else than a wheel of `make wheel`.
+    Raises `FileNotFoundError` if this package was not installed from a wheel of `make wheel`.
     """
-    # With `pip install --target` it is beside the package, and the record names a place where it is not.
+    # With `pip install --target` the program is beside the package, and the wheel's record has another
+    # path.
     beside = Path(__file__).resolve().parent.parent / "bin" / "pendularm"
     recorded = [Path(str(file.locate())) for file in files("pendularm") or [] if file.parent.name == "bin"]
     for path in [beside, *recorded]:
         if path.name == "pendularm" and path.is_file():
             return path.resolve()
-    raise FileNotFoundError("this installation of pendularm has no program: only wheels made by `make wheel` bring it")
+    raise FileNotFoundError("this installation of pendularm has no program: install a wheel from `make wheel`")
 
 
 def main() -> None:
-    """Becomes the program, so that signals reach it and its exit status is that of this process."""
+    """Replaces this process by the program, so signals and the exit status are those of the program."""
     path = str(program())
     os.execv(path, [path, *sys.argv[1:]])
 

@@ -1,4 +1,4 @@
-"""What a function does, in words that are the same in every process of one version of Python."""
+"""A text of a function's code that is the same in every process of one version of Python."""
 
 import hashlib
 from collections.abc import Callable
@@ -11,10 +11,10 @@ __all__ = ["fingerprint"]
 
 
 def fingerprint(name: str, function: Callable[..., Any]) -> str:
-    """A hash of the function's code, with its defaults and what it holds of the functions around it.
+    """A hash of the function's code, with its defaults and its closure.
 
-    Functions and values that it finds by their names, as globals, are not looked at. Raises `ValueError`, by `name`,
-    for a callable that is no plain function, and for one that holds something whose value cannot be told.
+    Global functions and values are not included. Raises `ValueError`, by `name`, for a callable that is not a plain
+    function, and for one whose closure has a value without a stable text.
     """
     if not isinstance(function, FunctionType):
         raise ValueError(
@@ -24,7 +24,7 @@ def fingerprint(name: str, function: Callable[..., Any]) -> str:
 
 
 def _told(name: str, value: Any, around: tuple[int, ...]) -> str:
-    """A value in words; `around` are those that hold it."""
+    """A value as a text. `around` are the values that contain it."""
     if id(value) in around:
         return f"around {around.index(id(value))}"
     around = (*around, id(value))

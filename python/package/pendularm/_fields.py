@@ -1,4 +1,4 @@
-"""Reading what is handed in, under the name of its field: what cannot be is a `ValueError` that says so."""
+"""Readers of arguments by field name. A wrong value raises a `ValueError` that names the field."""
 
 import operator
 import os
@@ -14,11 +14,11 @@ __all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "read_see
 Floats = NDArray[np.float64]
 
 MOST_LISTED = 10_000_000
-"""Entries of a sequence that is no NumPy array."""
+"""Most entries of a sequence that is not a NumPy array."""
 
 
 def shown(value: Any) -> str:
-    """A value as an error shows it; Python writes out no whole number of thousands of digits."""
+    """A value as shown in an error. Python does not print integers with thousands of digits."""
     try:
         return f"{value!r:.60}"
     except ValueError:
@@ -35,7 +35,7 @@ def whole_number(name: str, value: Any) -> int:
 
 
 def read_seeds(name: str, value: Any, arms: int) -> list[int | None]:
-    """One seed for each arm; of a single one the first arm has it, and those of the others follow."""
+    """One seed for each arm. A single seed is for the first arm, and the others get the following ones."""
 
     def seed(part: str, one: Any) -> int:
         found = whole_number(part, one)
@@ -61,7 +61,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def is_masked(value: Any, depth: int = 2) -> bool:
-    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in lists, so deep."""
+    """Whether some of the numbers are masked. NumPy reads masked numbers also inside lists, down to this depth."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
     parts: Iterable[Any] = ()
@@ -73,7 +73,7 @@ def is_masked(value: Any, depth: int = 2) -> bool:
 
 
 def is_too_long(value: Any, depth: int = 2) -> bool:
-    """Whether NumPy would allocate more than `MOST_LISTED` entries for it, all of a range for example."""
+    """Whether NumPy would allocate more than `MOST_LISTED` entries for it, for example for a range."""
     if hasattr(value, "__array__") or not hasattr(value, "__len__"):
         return False
     try:
@@ -96,12 +96,12 @@ def number(name: str, value: Any) -> float:
 
 
 def numbers(value: Any) -> Floats:
-    """The value as doubles; texts, `None`, complex numbers and endless sequences are none."""
+    """The value as doubles. Texts, `None`, complex numbers and endless sequences are refused."""
     if is_too_long(value):
         raise ValueError
     array = np.asarray(value)
     if array.dtype.kind == "O":
-        # NumPy would read texts, make a NaN of None, and drop imaginary parts.
+        # NumPy would read texts, convert None to NaN, and drop imaginary parts.
         if any(one is None or isinstance(one, str | bytes | np.complexfloating) for one in array.flat):
             raise TypeError
         return array.astype(np.float64)

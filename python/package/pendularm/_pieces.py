@@ -1,4 +1,4 @@
-"""The pieces of a sweep: how they are handed out, shown while they are done, and kept in a folder."""
+"""The pieces of a sweep: submission to workers, progress, and storage in a folder."""
 
 import json
 import os
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 __all__ = ["Folder", "Numbers", "hand_out"]
 
 Numbers = dict[str, NDArray[Any]]
-"""Those of a piece by the metrics' names, each (arms,)."""
+"""The results of a piece by the metrics' names, each (arms,)."""
 
 IN_FLIGHT = 256
-"""Pieces that are handed to an executor before the first of them is done."""
+"""Pieces submitted to an executor before the first one is done."""
 
 
 def hand_out(
@@ -34,8 +34,8 @@ def hand_out(
     kept: "Folder | None",
     progress: bool,
 ) -> None:
-    """Has the pieces done that begin at `starts`, each a `solve` of the question from a setting to another, and takes
-    in each as it comes."""
+    """Submits the pieces that begin at `starts`, each a `solve` of the sweep over a range of settings, and collects
+    each result on arrival."""
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
     with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:
@@ -46,7 +46,7 @@ def hand_out(
                 if not under_way:
                     return
                 ended = wait(under_way, return_when=FIRST_COMPLETED).done
-                # Failed ones come last, so that all that is finished is kept.
+                # Failed ones come last, so all finished ones are kept.
                 for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
                     start = under_way.pop(future)
                     done[start] = future.result()
@@ -59,16 +59,16 @@ def hand_out(
 
 
 def _in_notebook() -> bool:
-    """Whether a kernel of Jupyter runs this, whose output is no terminal and is looked at all the same."""
+    """Whether this runs in a Jupyter kernel, whose output is visible although it is not a terminal."""
     interactive = sys.modules.get("IPython")
     return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
 
 
 class _Bar:
-    """A progress bar where tqdm is installed and somebody is watching."""
+    """A progress bar, if tqdm is installed and the output is visible."""
 
     def __init__(self, total: int, already: int, wanted: bool) -> None:
-        # `None`: only on a terminal.
+        # `None` means only on a terminal.
         hidden = None
         try:
             from tqdm import tqdm
@@ -77,7 +77,7 @@ class _Bar:
                 from tqdm import notebook
 
                 hidden = False
-                # Without ipywidgets the bar is of text. `tqdm.auto` would warn.
+                # Without ipywidgets the bar is a text, because `tqdm.auto` would warn.
                 if notebook.IProgress is not None:
                     tqdm = notebook.tqdm
         except ImportError:
@@ -97,23 +97,24 @@ class _Bar:
 
 
 def _publish(part: Path, file: Path) -> None:
-    """Puts a file there that is written whole, unless there is one already, which stays."""
+    """Writes a whole file, unless it exists already."""
     try:
         os.link(part, file)
     except FileExistsError:
         pass
     except OSError:
-        # Without hard links, another process may see the file half written, and then says that it cannot be read.
+        # Without hard links, another process may read the file half written, and then reports that it cannot be
+        # read.
         with suppress(FileExistsError), file.open("xb") as new:
             new.write(part.read_bytes())
 
 
 class Folder:
-    """The finished pieces of one sweep, each in a file of its own that is there whole or not at all."""
+    """The finished pieces of one sweep, each in its own file, which is complete or missing."""
 
     def __init__(self, path: Path, told: Mapping[str, Any], total: int, piece: int, name: str | None) -> None:
-        """The question as it is `told`, of so many settings in all and in a piece, whose one metric has that name, if
-        it is known."""
+        """The pieces of the sweep with the description `told`: the number of settings in all and per piece, and the
+        name of its one metric, if known."""
         self._path = path
         self._total = total
         self._piece = piece
@@ -122,16 +123,18 @@ class Folder:
             path.mkdir(parents=True, exist_ok=True)
         except (FileExistsError, NotADirectoryError):
             raise ValueError(f"folder {path} must be a folder") from None
-        # Through JSON, so that it can be compared with what is read.
+        # Converted through JSON, so it can be compared with the file.
         told = json.loads(json.dumps({**told, "piece": piece}))
         file = path / "sweep.json"
-        # Looked for first: another process may be at the same sweep, whose pieces come after its sweep.json.
+        # Pieces are listed first, because another process may run the same sweep and writes its sweep.json
+        # before its pieces.
         pieces = any(path.glob("[0-9]*.npz"))
         if not file.exists():
             if pieces:
                 raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
             self._write("sweep.json", lambda part: part.write_text(json.dumps(told)), _publish)
-        # Read also where it was just written: another sweep may have come first.
+        # The file is read even if it was just written, because another sweep may have written it
+        # first.
         try:
             kept = dict(json.loads(file.read_bytes()))
         except (TypeError, ValueError):
@@ -141,7 +144,8 @@ class Folder:
             raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
 
     def _write(self, name: str, write: Callable[[Path], Any], put: Callable[[Path, Path], Any] = Path.replace) -> None:
-        # Others may write the same at once, from hosts or containers that number their processes alike.
+        # Other processes may write the same file at once, from hosts or containers with the same
+        # process numbers.
         part = self._path / f"part-{secrets.token_hex(8)}-{name}"
         try:
             write(part)
@@ -150,20 +154,21 @@ class Folder:
             part.unlink(missing_ok=True)
 
     def keep(self, start: int, values: Numbers) -> None:
-        # The names come first, as an array of their own: NumPy and zip files alter some, or take them for others.
+        # The names are stored first, as a separate array, because NumPy and zip files change or confuse some
+        # names.
         self._write(f"{start:012}.npz", lambda part: np.savez(part, json.dumps(list(values)), *values.values()))
 
     def read(self, starts: Iterable[int]) -> dict[int, Numbers]:
         found = {}
         for start in starts:
             try:
-                # In memory, since NumPy leaves a file open that it cannot read.
+                # Read in memory, because NumPy does not close a file that it cannot read.
                 kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
                 with np.load(kept, allow_pickle=False) as file:
                     names, *arrays = (file[f"arr_{place}"] for place in range(len(file.files)))
                 values = dict(zip(json.loads(str(names)), arrays, strict=True))
             except Exception:
-                # A piece that is not there or damaged, in whatever way, is done again.
+                # A missing or damaged piece is computed again.
                 continue
             arms = min(self._piece, self._total - start)
             known = self._name is None or list(values) == [self._name]

@@ -23,12 +23,12 @@ SIZE = 480
 """Width and height of a frame [pixels]."""
 
 MOST_SHOWN = 16
-"""Arms in a window."""
+"""Most arms in a window."""
 
 TRAIL = 40
-"""Positions of the end effector that a picture shows: 2 s."""
+"""Positions of the end effector in a picture: 2 s."""
 
-# Lines are smooth because a picture is drawn larger and then scaled down.
+# A picture is drawn larger and scaled down, so lines are smooth.
 SUPERSAMPLING = 2
 
 BACKGROUND = (255, 255, 255)
@@ -64,7 +64,8 @@ class Renderer:
         self.updates = 0
 
     def update(self, begun: NDArray[np.bool_]) -> None:
-        """Adds the present to the trails, without the past of arms whose episode has begun, and to the window."""
+        """Adds the present positions to the trails and updates the window. Arms with a new episode start a new
+        trail."""
         if self.mode is None:
             return
         self.trail[:, begun[: self.shown]] = np.nan
@@ -74,7 +75,7 @@ class Renderer:
             self._show()
 
     def frames(self) -> tuple[Frame, ...] | None:
-        """A frame (height, width, 3) for each arm, if that is the mode. A window is up to date already."""
+        """A frame (height, width, 3) for each arm, in the array mode. A window is already up to date."""
         if self.mode is None:
             gymnasium.logger.warn('render does nothing: make the environment with render_mode="rgb_array" or "human"')
         if self.mode != "rgb_array":
@@ -116,7 +117,7 @@ class Renderer:
         pygame.display.flip()
 
     def _draw(self, pygame: Any, arm: int, size: int) -> Any:
-        """A surface of so many pixels a side, with one arm."""
+        """A square surface with this side in pixels and one arm."""
         full = SUPERSAMPLING * size
         if self.canvas is None:
             self.canvas = pygame.Surface((full, full), 0, 32)

@@ -1,4 +1,4 @@
-"""The settings of a sweep: their names, their values as arrays, and arms that have them."""
+"""The settings of a sweep: their names, their values as arrays, and arms with these values."""
 
 import re
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from ._fields import flag, is_masked, numbers, shown
 from ._native import Batch
 
 TRIED_AT_ONCE = 16_384
-"""Values of a setting that one `Batch` tries before the sweep begins."""
+"""Values of a setting that one `Batch` checks before the sweep begins."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
 STATES = ("setpoint", "q0", "qdot0")
@@ -18,9 +18,9 @@ SETTINGS = (*PER_JOINT, "gravity", "timestep", "method", "control_period", "cont
 
 
 def column(name: str, values: list[Any], links: int) -> Any:
-    """Values of a setting, a row for each."""
+    """Values of a setting, one row each."""
     if name not in SETTINGS:
-        raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
+        raise ValueError(f"there is no setting {name!r}; the settings are {', '.join(SETTINGS)}")
     if name == "method":
         if not all(isinstance(value, str) for value in values):
             raise ValueError(f"every method must be a name, got {shown(values)}")
@@ -39,7 +39,7 @@ def column(name: str, values: list[Any], links: int) -> Any:
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
         raise ValueError(f"every {name} must be a number{each}, got {shown(values)}") from None
-    # The other ones are refused by these names where they are tried.
+    # Other faults are refused by the same names when the values are tried.
     if name in STATES and not np.isfinite(array).all():
         row, joint = np.argwhere(~np.isfinite(array))[0]
         raise ValueError(f"{name}[{row}][{joint}] must be finite, got {array[row, joint]}")
@@ -47,7 +47,7 @@ def column(name: str, values: list[Any], links: int) -> Any:
 
 
 def begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
-    """Arms with these settings, a row for each arm."""
+    """Arms with these settings, one row per arm."""
     batch = Batch(arms, links, threads=1)
 
     def of(*names: str) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
 
 
 def try_values(name: str, values: Any, links: int) -> None:
-    """Gives the values to arms, some at once, so that a bad one is refused by its name and place."""
+    """Sets the values on arms, several at once, so a bad one is refused with its name and index."""
     for start in range(0, len(values), TRIED_AT_ONCE):
         some = values[start : start + TRIED_AT_ONCE]
         try:

@@ -1,4 +1,4 @@
-"""Tasks of the environments: how arms start, what is observed of them, and what they are rewarded for."""
+"""Tasks of the environments: starts, observations and rewards."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -21,7 +21,8 @@ STEP = 0.05
 """Simulation time [s] of a step of an environment."""
 
 TIMESTEP = 0.005
-"""Default timestep of the method [s]: with Runge-Kutta 4 the energy of a free arm changes by less than 0.1 % an episode."""
+"""Default timestep of the method [s]. With Runge-Kutta 4 the energy of a free arm changes by less than 0.1 % per
+episode."""
 
 MOST_SUBSTEPS = 10_000
 
@@ -38,16 +39,16 @@ def _substeps(timestep: float) -> int:
 
 
 class Task:
-    """Arms that all have the same to do: how they start, what is seen of them, and what they are rewarded for."""
+    """Arms with the same task: starts, observations and rewards."""
 
     strength: ClassVar[float]
-    """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
+    """Efforts of an action of 1, relative to those that hold the stretched arm."""
     most_steps: ClassVar[int]
-    """Steps after which an episode is truncated, unless told otherwise."""
+    """Default number of steps after which an episode is truncated."""
 
     def __init__(self, arms: int, links: int, threads: int | None, method: str, timestep: float) -> None:
         if not isinstance(method, str):
-            raise ValueError(f"method must be the name of one, got {shown(method)}")
+            raise ValueError(f"method must be the name of a method, got {shown(method)}")
         self.substeps = _substeps(number("timestep", timestep))
         self.batch = Batch(arms, links, threads=threads)
         self.batch.set_integrator(method, STEP / self.substeps)
@@ -64,19 +65,19 @@ class Task:
         return []
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
-        """Puts arms where they start, each from its own stream."""
+        """Sets the starts of arms, each from its own random stream."""
         raise NotImplementedError
 
     def further(self) -> list[Floats]:
-        """Observations beside the joints, a row per arm."""
+        """Observations besides the joints, one row per arm."""
         return []
 
     def reward(self) -> Floats:
-        """From 0 to 1, one per arm: an end that comes early is never a gain."""
+        """Rewards from 0 to 1, one per arm. They are not negative, so an early end never pays."""
         raise NotImplementedError
 
     def go_on(self, actions: Action) -> None:
-        """Takes a step with every arm under its row of `actions`, (arms, links)."""
+        """Takes a step with every arm with its row of `actions`, (arms, links)."""
         self.batch.step(self.substeps, np.clip(actions, -1.0, 1.0) * self.efforts)
 
     def observe(self) -> Observation:
@@ -85,7 +86,7 @@ class Task:
         return np.concatenate(seen, axis=1, dtype=np.float32, casting="same_kind")
 
     def goals(self) -> Floats:
-        """Points at which the end effector has the highest reward, a row per arm."""
+        """The point with the highest reward of the end effector, one row per arm."""
         raise NotImplementedError
 
     def lost(self) -> NDArray[np.bool_]:
@@ -117,7 +118,7 @@ class Reach(Task):
     def __init__(self, arms: int, *settings: Any) -> None:
         super().__init__(arms, *settings)
         self.targets = np.zeros((arms, 2))
-        # Target less end effector, looked at twice a step.
+        # Target minus end effector, computed twice per step.
         self.away = np.zeros((arms, 2))
 
     def further_bounds(self) -> list[float]:
@@ -126,7 +127,7 @@ class Reach(Task):
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
         drawn = np.array([one.uniform(0.0, 1.0, self.links + 2) for one in random])
-        # Uniform over the disc, but for the outer twentieth of its radius.
+        # Uniform over the disc, except the outer twentieth of its radius.
         distance = 0.95 * self.reach * np.sqrt(drawn[:, 0])
         bearing = 2 * np.pi * drawn[:, 1]
         self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)

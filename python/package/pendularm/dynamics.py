@@ -1,7 +1,7 @@
 """The equation of motion, ``M(q) qdd + C(q, qd) qd + G(q) = effort``: the functions that step the live arm.
 
-Each takes an arm and one state, (links,), or many, (n, links); a single row, (links,) or (1, links), goes with every
-row of the others. What is not finite is refused. The interpreter's lock is released for many.
+Each takes an arm and one state, (links,), or many, (n, links). A single row, (links,) or (1, links), is combined with
+every row of the others. Values that are not finite are refused. The interpreter's lock is released for many states.
 """
 
 from ._native import (

@@ -1,11 +1,11 @@
 """Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many
 arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
 
-The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has
-a random stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number.
-They truncate themselves, and reset an arm in the call after its end, whose action is ignored
-(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh. An environment can be neither deeply copied nor
-pickled, and a process that is forked while another thread steps it must not use it.
+The vector environments use a `Batch`. Each of their arms is bit-identical to the single environment, and has its own
+random stream. Under the seed `s`, arm `i` is the single environment under `s + i`, for any number of arms. They
+truncate episodes themselves. An arm is reset in the call after its end, and its action in that call is ignored
+(`AutoresetMode.NEXT_STEP`). All returned arrays are fresh. An environment can be neither deeply copied nor pickled,
+and a process that is forked while another thread steps it must not use it.
 """
 
 import sys
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
-    """Actions of the space's shape; which numbers they are is left to who clips them."""
+    """Checks the shape of actions. The caller clips their values."""
     if is_masked(actions):
         raise ValueError(f"{name} must have no masked numbers, got {shown(actions)}")
     array = np.asarray(actions)
@@ -43,7 +43,7 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
 
 
 def _named(refusal: ValueError, theirs: str, ours: str) -> ValueError:
-    """The batch's refusal of a field, by the name that the caller knows."""
+    """Renames the field in a refusal of the batch to the caller's name."""
     return ValueError(str(refusal).replace(theirs, ours, 1))
 
 
@@ -122,7 +122,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             self._task = self.task_of(num_envs, links, threads, method, timestep)
         except ValueError as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
-        # The largest number is no limit in practice.
+        # The largest number means no limit in practice.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
         self._picture = Renderer(render_mode, self._task)
         self.num_envs = num_envs
@@ -147,7 +147,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         return tuple(seed for _, seed in self._drawn())
 
     def _drawn(self) -> list[tuple[np.random.Generator, int]]:
-        """The streams with their seeds, which chance has where nobody has given any."""
+        """The streams with their seeds, which are random by default."""
         if not self._streams:
             self._streams = [seeding.np_random() for _ in range(self.num_envs)]
         return self._streams
@@ -182,7 +182,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self, actions: Action
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         _need_reset("step", self._has_begun)
-        # Arms that have ended are stepped with the others, by no effort, and begin anew wherever that leads.
+        # Ended arms are stepped with the others without effort, and are then reset.
         again = self._ended
         actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
         try:
@@ -217,7 +217,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
 
 
 def _arguments_and_rendering(target: str) -> str:
-    """The end of both tasks' documentation; `target` says what is drawn as one."""
+    """The end of both tasks' documentation. `target` names the drawn target."""
     return f"""## Arguments
     `links`, 2 or 3. `method`, one of euler, midpoint, verlet and rk4, and its `timestep` in s, a whole part of 0.05 s:
     by default rk4 with 0.005 s. `render_mode`, None, human or rgb_array. The vector environment also has `threads`, as

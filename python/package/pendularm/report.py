@@ -1,4 +1,4 @@
-"""The numbers of a report that ``pendularm report`` has made."""
+"""The tables of a report of ``pendularm report``."""
 
 import csv
 import os
@@ -16,11 +16,12 @@ Column = NDArray[np.float64] | NDArray[np.str_]
 
 
 def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str, Column]]:
-    """Reads every table of the report in `folder`, by the stem of its file, as columns by their names.
+    """Reads every table of the report in `folder`: a mapping from the stem of the file to its columns by name.
 
-    A column is of doubles, the same bits as were measured, with NaN where there is none; or of text.
-    `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report, and `ValueError`,
-    with the file's name, for a table that cannot be read, ends amid a line, or has a row of too few or too many cells.
+    A column has doubles with the measured bits, and NaN for a missing one; or it has texts. `pandas.DataFrame`
+    accepts a table directly. Raises `FileNotFoundError` if there is no report. Raises `ValueError`, with the file's
+    name, for a table that cannot be read, that ends in the middle of a line, or that has a row with too few or too
+    many cells.
     """
     files = sorted(path("folder", folder).glob("*.csv"))
     if not files:
@@ -31,17 +32,17 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
 
 def _table(file: Path) -> dict[str, Column]:
     try:
-        # Some programs put a byte order mark in front, which is no part of a name.
+        # Some programs add a byte order mark at the start, which does not belong to a name.
         text = file.read_bytes().decode("utf-8-sig")
         if "\0" in text:
-            # Python 3.10 says this, and later ones take it.
+            # Python 3.10 reports this, and later versions accept it.
             raise csv.Error("line contains NUL")
         rows = list(csv.reader(StringIO(text, newline=""), strict=True))
     except (UnicodeDecodeError, csv.Error) as why:
         raise ValueError(f"{file} cannot be read: {why}") from None
     if not rows or not rows[0]:
         raise ValueError(f"{file} has no head")
-    # A number that was cut short may still be one.
+    # A truncated number may still be a valid number.
     if not text.endswith("\n"):
         raise ValueError(f"{file} ends amid a line")
     head, *cells = rows

@@ -1,7 +1,6 @@
-"""The effect of method and timestep on the arm, predicted and measured: the answers of the services ``/study/*``.
+"""The effect of method and timestep on the arm, predicted and measured, with the members of the services ``/study/*``.
 
-Long computations release the interpreter's lock, and Ctrl-C ends them. An answer with arrays is equal to
-itself alone.
+Long computations release the interpreter's lock, and Ctrl-C ends them. An answer with arrays is equal only to itself.
 """
 
 from collections.abc import Mapping
@@ -35,19 +34,20 @@ class Critical:
     growth_per_step: float
     """Factor by which it grows in a step."""
     frequency: float
-    """How often it swings [Hz]; half of the steps per second where it flips at every step."""
+    """Its frequency [Hz]; half of the steps per second if it changes its sign at every step."""
     joint: int
-    """The joint that it moves furthest, from 0."""
+    """The joint with the largest motion, from 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """The largest stable timesteps and control period of a control loop [s]. `None`: nothing limits; 0: unstable at every timestep."""
+    """The largest stable timesteps and control period of a control loop [s]. `None` means no limit, 0 unstable at
+    every timestep."""
 
     control_period_limit: float | None
     """The longest stable control period at `equilibrium`, of an arm that moves exactly between two runs of the law."""
     timestep_limit: float | None
-    """The longest stable timestep at `equilibrium`, at the control period that was asked about."""
+    """The longest stable timestep at `equilibrium`, at the requested control period."""
     timestep_limit_held: float | None
     """At `equilibrium`, with the effort held over the step, as the live arm does."""
     timestep_limit_continuous: float | None
@@ -57,13 +57,13 @@ class Stability:
     equilibrium_kind: str
     """`setpoint`, `sagging`, `hanging`, `saddle` or `unstable`."""
     minimum_over_poses_held: float | None
-    """The smallest over all poses, effort held; 0 where a joint integrates and the loop runs away in some pose."""
+    """The smallest over all poses, effort held; 0 if a joint has an integral and the loop diverges in some pose."""
     minimum_over_poses_continuous: float | None
     """The smallest over all poses, control in every stage."""
     minimum_over_poses_bound: float | None
-    """A timestep up to which every pose is stable; `None` where nothing useful is known."""
+    """A timestep up to which every pose is stable; `None` if no useful bound is known."""
     bound_is_proven: bool
-    """Whether that bound is proven; otherwise an estimate of gravity's part is inside."""
+    """Whether that bound is proven. Otherwise it depends on an estimate of gravity's effect."""
     certified: bool
     """Whether the bound is within 1 % of `minimum_over_poses_held`."""
     worst_pose: Floats | None
@@ -71,13 +71,14 @@ class Stability:
     critical: Critical | None
     """The motion that grows there first."""
     timestep_limit_motion: float | None
-    """The largest timestep at which the coming motion does not overflow; `None` where nothing moves."""
+    """The largest timestep at which the coming motion does not overflow; `None` if nothing moves."""
     motion_speed: float
     """The speed of the fastest link in that motion [rad/s]."""
     advised_timestep: float | None
-    """0.8 of the smaller of that and the minimum over poses; where that is 0 it is for this setpoint alone."""
+    """0.8 of the smaller of that and the minimum over poses. If the minimum is 0, the advice is only for this
+    setpoint."""
     advised_duration: float | None
-    """How long a free arm keeps its energy to a factor of two at that timestep [s]; `None` under control."""
+    """Time in which a free arm's energy stays within a factor of two at that timestep [s]; `None` under control."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +96,12 @@ class Rollout:
     energy: Floats
     """Kinetic plus potential [J], (samples,)."""
     evaluations: int
-    """How often the run evaluated the dynamics."""
+    """Number of evaluations of the dynamics in the run."""
     wall_time: float
-    """How long the run took by itself [s]."""
+    """Run time of the run alone [s]."""
     error: float | None
-    """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known so well."""
+    """Largest distance of a joint from the reference [rad]; `None` without a reference, or if the uncertainty is too
+    large."""
     error_uncertainty: float | None
     """Largest distance of two references from each other [rad]."""
     sampling_error: float | None
@@ -107,26 +109,26 @@ class Rollout:
     sampling_error_uncertainty: float | None
     """Largest distance of two runs of that loop from each other [rad]."""
     divergence: tuple[int, float] | None
-    """Step and time [s] at which the run left the finite numbers, if it did; the samples end before."""
+    """Step and time [s] of a divergence, if there was one. The samples end before it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The cheapest method and timestep within an allowed error, and what the other methods would cost."""
+    """The cheapest method and timestep within an allowed error, and the cost of the other methods."""
 
     integrator: str
     timestep: float
     """[s]."""
     control_period: float | None
-    """The timestep too [s], unless another was asked for; `None` for an arm left to itself."""
+    """The timestep [s], unless another period was requested; `None` for a free arm."""
     evaluations_per_second: float
     """Evaluations of the dynamics per simulated second."""
     error: float
-    """How far the end effector was off at most [m]."""
+    """Largest error of the end effector [m]."""
     error_uncertainty: float
-    """How far the truth may be off [m]."""
+    """Uncertainty of the reference [m]."""
     methods: list[str]
-    """All that are within the error, the cheapest first; the next three go with it."""
+    """All methods within the error, the cheapest first. The next three members have the same order."""
     timesteps: Floats
     evaluations: NDArray[np.uint64]
     errors: Floats
@@ -134,7 +136,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class SuggestedGains:
-    """Gains that are stable in every pose and settle in time, and how they fared."""
+    """Gains that are stable in every pose and settle in time, with their results."""
 
     kp: Floats
     """[N m/rad], (links,)."""
@@ -143,13 +145,13 @@ class SuggestedGains:
     kd: Floats
     """[N m s/rad], (links,)."""
     timestep_limit: float | None
-    """The smallest stable timestep over all poses [s]; `None` where nothing limits."""
+    """The smallest timestep limit over all poses [s]; `None` if nothing limits."""
     certified: bool
-    """Whether a lower bound comes within 1 % of it."""
+    """Whether a lower bound is within 1 % of it."""
     margin: float | None
-    """How many timesteps it is."""
+    """This limit divided by the timestep."""
     settled_after: float
-    """How long the slowest of ten moves took to settle [s]."""
+    """Settling time of the slowest of ten moves [s]."""
 
 
 def suggest_gains(
@@ -162,8 +164,8 @@ def suggest_gains(
 ) -> SuggestedGains:
     """Finds gains for an arm and a timestep [s], as ``/study/gains`` does.
 
-    The smallest stable timestep over all poses is to be `margin` timesteps, 1 at least, and ten moves are to settle
-    within `settling_time` [s]. Raises `ValueError` where there are none.
+    `margin`, at least 1, is the required ratio of the smallest timestep limit over all poses to the timestep. Ten
+    moves must settle within `settling_time` [s]. Raises `ValueError` if there are no such gains.
     """
     return SuggestedGains(
         **_native.suggest_gains(
@@ -184,9 +186,9 @@ def stability(
 ) -> Stability:
     """Predicts the largest timestep at which a control loop is stable, as ``/study/stability`` does.
 
-    `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about
-    an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
-    from which the motion is ahead. The law runs once per `control_period` [s], 0 for every step.
+    `gains` are `kp`, `ki` and `kd`, (links,) each. Missing ones are the default gains, and zeros examine a free arm.
+    `setpoint` [rad] is the starting pose by default. `q` [rad] and `qd` [rad/s] are the state at the start of the
+    coming motion. The law runs once per `control_period` [s], 0 for every step.
     """
     found = _native.stability(
         arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd, control_period=control_period
@@ -211,11 +213,11 @@ def rollout(
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
-    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s], a timestep at least and
-    rounded to the nearest number of timesteps, and gives `samples`, start and end among them, or every step if there
-    are fewer. Without `gains` nothing controls the arm, and no `setpoint` may be given; a member that is left out of
-    them is zeros. With `reference` the run is compared with the true motion under the same held control law,
-    and with the loop whose law acts at every instant. The law runs once per `control_period` [s], 0 for every step.
+    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros by default). `duration` [s] is rounded to the nearest number of
+    timesteps, at least one. The result has `samples`, including start and end, or every step if there are fewer.
+    Without `gains` the arm is free, and a `setpoint` is refused. A missing member of `gains` is zeros. With
+    `reference` the run is compared with the true motion under the same held control law, and with the loop whose law
+    acts at every instant. The law runs once per `control_period` [s], 0 for every step.
     """
     return Rollout(
         **_native.rollout(
@@ -248,10 +250,10 @@ def plan(
     """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan``
     does.
 
-    Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s],
-    and no `setpoint` may be given; with them it moves to `setpoint` [rad] (4 s unless given), and holding the effort
-    counts as error, unless the `control_period` [s] is given. A member that is left out of them is zeros. Raises `ValueError` where the motion cannot be known so
-    well for so long.
+    Without `gains` the arm is free for `duration` [s] (10 by default) from `q0` [rad] and `qdot0` [rad/s], and a
+    `setpoint` is refused. With `gains` it moves to `setpoint` [rad] (4 s by default), and holding the effort counts
+    as error, unless the `control_period` [s] is given. A missing member of `gains` is zeros. Raises `ValueError` if
+    the motion cannot be known that well for that long.
     """
     return Plan(
         **_native.plan(

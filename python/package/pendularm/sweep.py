@@ -1,7 +1,7 @@
-"""Many settings of one question: on this machine's cores, or on a cluster by way of an executor.
+"""One metric for many settings: on this machine's cores, or on a cluster through an executor.
 
-A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the
-results.
+A sweep is divided into pieces, each a `Batch`. The results do not depend on the number of workers or the size of a
+piece.
 """
 
 import errno
@@ -29,28 +29,28 @@ from ._settings import begin, column, try_values
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
 TIMESTEP = 0.001
-"""[s], unless another is given."""
+"""Default timestep [s]."""
 
 SETTLED = 0.02
 """Largest distance of a joint from its setpoint at which an arm counts as settled [rad]."""
 
 MOST_SETTINGS = 10_000_000
-"""Combinations of one sweep: their results are kept in memory, some 100 MB a metric."""
+"""Most combinations of one sweep. Their results are kept in memory, about 100 MB per metric."""
 
 MOST_SAMPLES = 100_000
-"""Samples of a run, as many as a rollout has."""
+"""Most samples of a run, as in a rollout."""
 
 MOST_STEPS = 10_000_000
-"""Steps of a run, as many as a rollout has."""
+"""Most steps of a run, as in a rollout."""
 
 AT_ONCE = 1_000_000
-"""Steps of all arms together between two looks at whether the sweep was stopped: some tens of milliseconds."""
+"""Steps of all arms together between two checks whether the sweep was stopped: some tens of milliseconds."""
 
 MOST_ROWS = 10_000_000
-"""Samples times settings of a piece: some 1 GB where it is done."""
+"""Most samples times settings of a piece: about 1 GB on the worker."""
 
 MOST_ARMS = 1_000_000
-"""Arms of a `Batch`, and so settings of a piece."""
+"""Most settings of a piece, which are the arms of a `Batch`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Run:
     times: Floats
     """[s], (samples, arms): the nearest whole step of each arm."""
     positions: Floats
-    """[rad], (samples, arms, links); of an arm that diverged, its last finite ones go on."""
+    """[rad], (samples, arms, links). A diverged arm keeps its last finite positions."""
     velocities: Floats
     """[rad/s], (samples, arms, links)."""
     efforts: Floats
@@ -74,11 +74,11 @@ class Run:
 
 
 Metric = Callable[[Run], NDArray[Any] | Mapping[str, NDArray[Any]]]
-"""One number per arm, or several by their names; it must not mix the arms."""
+"""One number per arm, or several by name. It must not mix the arms."""
 
 
 class Executor(Protocol):
-    """Anything that hands out futures as `concurrent.futures` does."""
+    """An object that returns futures as in `concurrent.futures`."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
@@ -96,13 +96,13 @@ class Sweep:
 
 
 def final_error(run: Run) -> Floats:
-    """Largest distance of a joint from its setpoint at the end [rad]; infinite where the arm diverged."""
+    """Largest distance of a joint from its setpoint at the end [rad]; infinite if the arm diverged."""
     away: Floats = np.abs(run.positions[-1] - run.setpoint).max(axis=1)
     return np.where(run.diverged, np.inf, away)
 
 
 def settling_time(run: Run) -> Floats:
-    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where it is not so at the end."""
+    """Time after which every joint stays within 0.02 rad of its setpoint [s]; infinite if one does not at the end."""
     away: NDArray[np.bool_] = np.any(np.abs(run.positions - run.setpoint) > SETTLED, axis=2)
     still = np.cumsum(away[::-1], axis=0)[::-1] == 0
     first = np.argmax(still, axis=0)
@@ -117,7 +117,7 @@ def largest_effort(run: Run) -> Floats:
 
 
 def energy_drift(run: Run) -> Floats:
-    """Largest distance of the energy from that at the start, at the samples [J]; infinite where the arm diverged."""
+    """Largest distance of the energy at the samples from that at the start [J]; infinite if the arm diverged."""
     drift: Floats = np.abs(run.energy - run.energy[0]).max(axis=0)
     return np.where(run.diverged, np.inf, drift)
 
@@ -141,30 +141,31 @@ def sweep(
     progress: bool = True,
     **settings: Any,
 ) -> Sweep:
-    """Runs an arm for every combination of the settings in `grid`, and answers what `metric` makes of each run.
+    """Runs an arm for every combination of the settings in `grid`, and returns the `metric` of each run.
 
     Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
     `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s],
-    `method`, `control_period` [s] and `control_delay`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
-    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s], a timestep at least
-    and rounded to the nearest number of timesteps, and has `samples`, start and end among them.
+    `method`, `control_period` [s] and `control_delay`. `grid` has a sequence for each setting that varies. Others are
+    keyword arguments, and a missing one has the value of a fresh runtime. Without `servo` the controller is off.
+    Every run lasts `duration` [s], rounded to the nearest number of timesteps, at least one. It has `samples`,
+    including start and end.
 
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
-    a `Run`, which an executor has to be able to send.
+    a `Run`, which an executor must be able to send.
 
-    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
-    hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
-    there are cores, fewer where the system has no more of them. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
-    function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
-    ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another
-    sweep.
+    Pieces of `piece` settings (1024 by default, fewer with many samples) are submitted to `executor`, an object that
+    returns futures as in `concurrent.futures` (for example Dask's `Client.get_executor()`). Without one, they run on
+    as many threads as there are cores, or fewer if the system refuses some. Every finished piece is stored in
+    `folder`, and a stopped sweep continues there. The folder identifies a function by its code, without global names,
+    so it must be a plain function. Ctrl-C ends a sweep on threads soon. Raises `ValueError` for an invalid setting,
+    and if the folder has another sweep.
     """
     if not isinstance(grid, Mapping):
         raise ValueError(f"grid must be a mapping from settings to their values, got {shown(grid)}")
     axes = {}
     for name, values in grid.items():
         try:
-            # The parts of a text are characters, or numbers.
+            # The parts of a text would be characters or numbers.
             if isinstance(values, str | bytes | bytearray):
                 raise TypeError
             axes[name] = list(islice(values, MOST_SETTINGS + 1))
@@ -196,7 +197,7 @@ def sweep(
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
     if executor is not None and not callable(getattr(executor, "submit", None)):
-        raise ValueError(f"executor must have submit, as those of concurrent.futures have, got {shown(executor)}")
+        raise ValueError(f"executor must have submit, as in concurrent.futures, got {shown(executor)}")
     folder = None if folder is None else path("folder", folder)
     progress = flag("progress", progress)
     question = _Question(
@@ -223,19 +224,19 @@ def sweep(
             try:
                 hand_out(question, total, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
             finally:
-                # A caller that leaves early, by Ctrl-C say, does not wait for the pieces that are
-                # under way.
+                # A caller that stops early, for example by Ctrl-C, does not wait for running
+                # pieces.
                 stopped.set()
     for start in starts:
         if done[start].keys() != done[0].keys():
             names = " and ".join(", ".join(one) for one in (done[0], done[start]))
-            raise ValueError(f"metric must answer the same names for all arms, got {names}")
+            raise ValueError(f"metric must return the same names for all arms, got {names}")
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
 
 
 class _Threads(ThreadPoolExecutor):
-    """Threads, fewer than asked for where the system has no more of them."""
+    """Threads, or fewer than requested if the system refuses some."""
 
     def _adjust_thread_count(self) -> None:
         try:
@@ -252,7 +253,7 @@ def _cores() -> int:
 
 @dataclass(frozen=True)
 class _Question:
-    """The question to every setting; it goes to the workers."""
+    """The task for every setting, which is sent to the workers."""
 
     axes: dict[str, Any]
     fixed: dict[str, Any]
@@ -267,7 +268,7 @@ class _Question:
         return tuple(len(values) for values in self.axes.values())
 
     def check(self) -> None:
-        """Tries every value once, so that a bad one is refused here and by its own name."""
+        """Tries every value once, so a bad one is refused here by its name."""
         settings = {**self.axes, **self.fixed}
         for name, values in settings.items():
             try_values(name, values, self.links)
@@ -280,14 +281,14 @@ class _Question:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
     def to_keep(self) -> dict[str, Any]:
-        """The question as the folder keeps it."""
+        """The description of the sweep in the folder."""
         metric = self.metric
         if not isinstance(metric, str):
             code = fingerprint("metric", metric)
             metric = f"{metric.__module__}.{metric.__qualname__} {code}"
         return {
             "version": version("pendularm"),
-            # In a list, whose order counts: the axes of the results are in that of the grid.
+            # A list, because the order counts: the axes of the results have the order of the grid.
             "grid": [[name, values.tolist()] for name, values in self.axes.items()],
             "settings": {name: values.tolist() for name, values in self.fixed.items()},
             "metric": metric,
@@ -299,12 +300,12 @@ class _Question:
 
 
 def _steps_in(duration: float, timestep: Any) -> Any:
-    """As `steps_in` of the library in Rust: rounded, half a step upwards, it is the number of steps of a run."""
+    """As `steps_in` of the Rust library: rounded, with half a step upwards, it is the number of steps of a run."""
     return duration / timestep * (1 + 4 * sys.float_info.epsilon)
 
 
 def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:
-    """Takes so many steps with each arm, in several goes if they are many."""
+    """Takes this number of steps with each arm, in several parts if they are many."""
     at_once = max(1, AT_ONCE // len(batch))
     while True:
         if stopped is not None and stopped.is_set():
@@ -316,7 +317,7 @@ def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | 
 
 
 def _solve(question: _Question, start: int, stop: int, stopped: threading.Event | None = None) -> Numbers:
-    """One piece, wherever it is done; one that is done in this process is over soon after it was `stopped`."""
+    """Computes one piece on any worker. In this process it ends soon after `stopped` is set."""
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
@@ -343,13 +344,13 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     found = metric(run)
     named = found if isinstance(found, Mapping) else {name: found}
     if hidden := [key for key, one in named.items() if is_masked(one)]:
-        raise ValueError(f"metric must answer no masked numbers, got {hidden[0]} of them")
+        raise ValueError(f"metric must return no masked numbers, got {hidden[0]} of them")
     values = {key: np.asarray(one) for key, one in named.items()}
     for key, one in values.items():
         if not isinstance(key, str):
             raise ValueError(f"metric must name its numbers by text, got {key!r}")
         if one.dtype.hasobject:
-            raise ValueError(f"metric must answer numbers or text, got {key} of objects")
+            raise ValueError(f"metric must return numbers or text, got {key} of objects")
         if one.shape != (arms,):
-            raise ValueError(f"metric must answer one number for each of {arms} arms, got {key} of shape {one.shape}")
+            raise ValueError(f"metric must return one number for each of {arms} arms, got {key} of shape {one.shape}")
     return values

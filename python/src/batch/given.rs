@@ -1,6 +1,6 @@
-//! Reading what a batch is given: numbers, steps, methods, and which arms are meant.
+//! Readers of a batch's arguments: numbers, steps, methods, and the selected arms.
 //!
-//! **Invariant:** as in `fields`, a refusal names its field.
+//! **Invariant:** a refusal names its field, as in `fields`.
 
 use numpy::{PyArray1, PyArrayMethods};
 use pendularm::math::integrator::Method;
@@ -12,7 +12,7 @@ use crate::arrays::{Numbers, Rows, collected, laid_out, room};
 use crate::fields::{self, Bound, Object, entries, is_masked, is_too_long, refused, shown};
 
 impl Batch {
-    /// A row for each arm, or one for all, where something was handed in.
+    /// A row per arm, or one for all, if there is an argument.
     pub(super) fn rows<'a>(
         &self,
         given: Option<&'a Numbers<'_>>,
@@ -23,7 +23,7 @@ impl Batch {
             .transpose()
     }
 
-    /// A number for each arm, or one for all, where something was handed in.
+    /// A number per arm, or one for all, if there is an argument.
     pub(super) fn column<'a>(
         &self,
         given: Option<&'a Numbers<'_>>,
@@ -35,7 +35,7 @@ impl Batch {
     }
 }
 
-/// Numbers, where something was handed in.
+/// Numbers, if there is an argument.
 pub(super) fn read<'py>(
     field: &str,
     value: Option<&Object<'py>>,
@@ -50,7 +50,7 @@ pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> 
             "steps must be a whole number, or one for each of {arms} arms"
         ))
     };
-    // Bytes are a sequence of numbers to Python.
+    // For Python, bytes are a sequence of numbers.
     let is_text = steps.is_instance_of::<PyBytes>() || steps.is_instance_of::<PyByteArray>();
     if is_text || is_masked(steps)? {
         return Err(expected());
@@ -83,7 +83,7 @@ pub(super) fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Met
     Ok(each)
 }
 
-/// One truth for all arms, or one for each.
+/// One boolean for all arms, or one for each.
 pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResult<Vec<bool>> {
     let expected = || {
         refused(format_args!(
@@ -103,7 +103,7 @@ pub(super) fn read_flags(field: &str, flag: &Object<'_>, arms: usize) -> PyResul
     Ok(each)
 }
 
-/// The value for an arm, of one for all or one for each.
+/// The value for an arm, from one for all or one for each.
 pub(super) fn of_arm<T: Copy>(values: &[T], arm: usize) -> Option<T> {
     match values {
         [alike] => Some(*alike),
@@ -111,7 +111,7 @@ pub(super) fn of_arm<T: Copy>(values: &[T], arm: usize) -> Option<T> {
     }
 }
 
-/// The lanes that `arms` names: all, those that a mask has, or those of these numbers.
+/// The lanes selected by `arms`: all, those of a mask, or those with these indices.
 pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<usize>> {
     let Some(arms) = arms else {
         return collected(count, 0..count);
@@ -136,7 +136,7 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
         .call_method1("asarray", (arms,))
         .map_err(|_| expected())?;
     if array.getattr("dtype")?.getattr("kind")?.eq("O")? {
-        // Truths among objects would be taken for the indices 0 and 1.
+        // Booleans among objects would be read as the indices 0 and 1.
         let listed = array.call_method0("tolist")?;
         array = numpy
             .call_method1("asarray", (listed,))

@@ -1,7 +1,6 @@
-//! Many arms side by side, each a lane: simulations that share the processor's registers, and threads.
+//! Many arms side by side, one per lane: simulations that share SIMD registers and threads.
 //!
-//! **Invariant:** no lane knows of another, so that a lane has the bits of a single arm, however many threads share
-//! the work.
+//! **Invariant:** lanes are independent, so a lane is bit-identical to a single arm, for any number of threads.
 
 use pyo3::prelude::PyResult;
 use rayon::prelude::*;
@@ -15,14 +14,13 @@ use pendularm::math::simulation::{Simulation, batch};
 
 use crate::arrays::{Rows, collected};
 
-/// Fewest lane-steps that are worth another thread: some tens of microseconds.
+/// Fewest lane-steps per additional thread: some tens of microseconds.
 const WORTH_A_THREAD: u64 = 3000;
 
-/// Lanes that are handed to a thread together: at least what fills the registers that take steps in turn, and no more
-/// than leaves the other threads something.
+/// Lanes per task of a thread: at least enough to fill the registers, and few enough that all threads have work.
 const TOGETHER: (usize, usize) = (32, 1024);
 
-/// The arrays that show the lanes, one row each.
+/// The arrays of the lanes' values, one row each.
 pub(crate) struct Shown<'a> {
     pub(crate) position: &'a mut [f64],
     pub(crate) velocity: &'a mut [f64],
@@ -32,7 +30,7 @@ pub(crate) struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// Brings the rows up to date with lanes that begin with theirs.
+    /// Updates the rows from the lanes.
     pub(crate) fn show<const N: usize>(self, lanes: &[Simulation<N>]) {
         let rows = self
             .position
@@ -54,7 +52,7 @@ impl Shown<'_> {
     }
 }
 
-/// Steps that are to be taken, lane by lane or in all alike.
+/// The number of steps, per lane or for all.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Steps<'a> {
     Alike(u64),
@@ -69,7 +67,7 @@ impl Steps<'_> {
         }
     }
 
-    /// The most that any lane takes.
+    /// The largest number of steps of a lane.
     pub(crate) fn most(&self) -> u64 {
         match self {
             Self::Alike(steps) => *steps,
@@ -78,20 +76,20 @@ impl Steps<'_> {
     }
 }
 
-/// A piece of the steps that the lanes are to take.
+/// A part of the lanes' steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub(crate) steps: Steps<'a>,
-    /// Effort that is added in all these steps, in place of what disturbs a lane.
+    /// Effort that is added in all these steps, in place of a lane's disturbance.
     pub(crate) effort: Option<&'a Rows<'a>>,
-    /// Steps that have been taken, and how many more are taken now.
+    /// The number of steps already taken, and of those taken now.
     pub(crate) done: u64,
     pub(crate) length: u64,
     /// Whether threads may share the lanes.
     pub(crate) is_shared: bool,
 }
 
-/// Takes a piece of the steps, and shows where that leads.
+/// Takes a part of the steps, and updates the arrays.
 pub(crate) fn advance<const N: usize>(
     lanes: &mut [Simulation<N>],
     shown: Shown<'_>,
@@ -129,7 +127,7 @@ pub(crate) fn advance<const N: usize>(
 }
 
 impl Piece<'_> {
-    /// Takes it with the lanes from the first one on.
+    /// Takes it with the lanes of this slice.
     fn take<const N: usize>(&self, first: usize, lanes: &mut [Simulation<N>], shown: Shown<'_>) {
         if self.done == 0
             && let Some(effort) = self.effort
@@ -150,11 +148,11 @@ impl Piece<'_> {
     }
 }
 
-/// Ends the effort of steps that were broken off.
+/// Ends the effort of interrupted steps.
 pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: Steps<'_>) {
     for (index, lane) in lanes.iter_mut().enumerate() {
         if steps.of(index) > 0 {
-            // Negative zero changes no number that it is added to.
+            // Adding negative zero changes no number.
             lane.disturb([-0.0; N], lane.timestep());
         }
     }
@@ -175,7 +173,7 @@ pub(crate) fn end_effectors<const N: usize>(lanes: &[Simulation<N>]) -> PyResult
     collected(2 * lanes.len(), numbers)
 }
 
-/// Arms in the starting pose, as a fresh runtime has one.
+/// Arms in the starting pose, as in a fresh runtime.
 pub(crate) fn fresh<const N: usize>(arms: usize) -> PyResult<Vec<Simulation<N>>>
 where
     Gains<N>: Default,

@@ -1,9 +1,10 @@
 //! Many arms at once, with NumPy arrays in and out.
 //!
-//! The arrays that show the arms are made once and written in place. Users have read-only views of them.
-//! A contiguous, writable array of doubles from the user is read without a copy.
+//! The arrays of the arms' values are created once and written in place. Users have read-only views of
+//! them. A contiguous, writable array of doubles from the user is read without a copy.
 //!
-//! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
+//! **Invariant:** every row of every array has its lane's present values whenever no call is
+//! running.
 
 mod given;
 mod lanes;
@@ -29,30 +30,30 @@ use lanes::{Piece, Steps};
 use pool::pool;
 use windows::Windows;
 
-/// Lane-steps between two looks for signals: some tens of milliseconds of one core.
+/// Lane-steps between two checks for signals: some tens of milliseconds of one core.
 const STEPS_PER_LOOK: u64 = 250_000;
 
-/// Most arms of one batch, some 500 MB: many more than a batch is any faster with.
+/// Most arms of one batch, about 500 MB. A batch is fastest with far fewer.
 const MOST_ARMS: usize = 1_000_000;
 
 /// Most threads that share the work of one batch.
 const MOST_THREADS: usize = 1024;
 
-/// The number of links never changes. The state is behind a lock, since threads may share a batch.
+/// The number of links never changes. A lock protects the state, because threads may share a batch.
 #[derive(Debug)]
 enum Either {
     Two(Mutex<Vec<Simulation<2>>>),
     Three(Mutex<Vec<Simulation<3>>>),
 }
 
-/// Many arms, advanced in whole steps; each is a `Simulation`, to the bit, whatever the number of threads.
+/// Many arms, advanced in whole steps. Each is bit-identical to a `Simulation`, for any number of threads.
 ///
-/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
-/// made once and overwritten by every call that changes the arms. Copy values that you need later. An array argument
-/// has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read without a
-/// copy. `threads` share the work: by default as many as there are cores, and fewer if the system allows no more. With
-/// 1 the caller's thread does the work. Calls that change one batch from several threads wait for each other. The
-/// arrays can be read meanwhile, and show the present state of each arm. A batch can be neither copied nor pickled. A
+/// All start as in a fresh runtime. `position`, `velocity`, `effort`, `time` and `diverged` are read-only arrays,
+/// created once and overwritten by every call that changes the arms. Copy values that you need later. An array
+/// argument has one row per arm, (`n_arms`, links), or one for all, (links,). Contiguous, writable doubles are read
+/// without a copy. `threads` share the work: by default one per core, or fewer if the system refuses some. With 1 the
+/// caller's thread does the work. Calls that change one batch from several threads wait for each other. The arrays
+/// can be read meanwhile, and show the present state of each arm. A batch cannot be copied or pickled. A
 /// process that is forked while another thread steps the batch must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
@@ -90,10 +91,9 @@ impl Batch {
         })
     }
 
-    /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm
-    /// that has diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as
-    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps,
-    /// the effort with it.
+    /// Takes `steps` steps (1 by default) with every arm, or a whole number per arm, (`n_arms`,). A diverged arm
+    /// takes no more. `effort` [N m] is added to the controller's for all these steps, as `Simulation.disturb` does.
+    /// The interpreter's lock is released meanwhile. Ctrl-C ends the call between two steps, and the effort too.
     #[pyo3(signature = (steps=None, effort=None))]
     fn step(
         &self,
@@ -134,8 +134,8 @@ impl Batch {
         taken
     }
 
-    /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask
-    /// (`n_arms`,), or those of some indices.
+    /// Returns to the starting pose at rest, at time 0, as `Simulation.reset`: all arms, those of a mask
+    /// (`n_arms`,), or those with the given indices.
     #[pyo3(signature = (arms=None))]
     fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
@@ -154,9 +154,8 @@ impl Batch {
         })
     }
 
-    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given). These are all
-    /// arms, or the arms that `arms` names as in `reset`, with one row for each of them or one for all. Clocks and
-    /// controllers stay.
+    /// Sets the states of arms: `position` [rad] and `velocity` [rad/s] (zeros by default), one row per arm or one
+    /// for all. `arms` selects them as in `reset`. Clocks and controllers do not change.
     #[pyo3(signature = (position, velocity=None, arms=None))]
     fn set_state(
         &self,
@@ -191,7 +190,7 @@ impl Batch {
         })
     }
 
-    /// Has the controllers hold the arms at `positions` [rad] and `velocities` [rad/s] (zeros unless given).
+    /// Sets the setpoints: `positions` [rad] and `velocities` [rad/s] (zeros by default).
     #[pyo3(signature = (positions, velocities=None))]
     fn set_setpoint(
         &self,
@@ -215,7 +214,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes the gains that are given: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integrals stay.
+    /// Changes the given gains: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integrals do not change.
     #[pyo3(signature = (kp=None, ki=None, kd=None))]
     fn set_gains(
         &self,
@@ -242,8 +241,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes the parameters that are given: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths`
-    /// [m].
+    /// Changes the given parameters: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
     #[pyo3(signature = (gravity=None, masses=None, lengths=None))]
     fn set_params(
         &self,
@@ -275,7 +273,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes what is given: `method`, a name or one for each arm, and `timestep` [s], a number or (`n_arms`,).
+    /// Changes the given values: `method`, a name or one per arm, and `timestep` [s], a number or (`n_arms`,).
     #[pyo3(signature = (method=None, timestep=None))]
     fn set_integrator(
         &self,
@@ -301,8 +299,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes what is given: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`, true
-    /// or false or one of them for each arm. As `Simulation.control_period` and `Simulation.control_delay`.
+    /// Changes the given values: `control_period` [s], a number or (`n_arms`,), 0 for every step, and `control_delay`,
+    /// one boolean or one per arm. As `Simulation.control_period` and `Simulation.control_delay`.
     #[pyo3(signature = (control_period=None, control_delay=None))]
     fn set_control_period(
         &self,
@@ -359,7 +357,7 @@ impl Batch {
         }
     }
 
-    /// Number of threads that share the work. Where the system has no more threads, fewer do.
+    /// Number of threads that share the work. There are fewer if the system refuses some.
     #[getter]
     fn threads(&self) -> usize {
         self.threads
@@ -389,8 +387,7 @@ impl Batch {
         self.windows.time.view.clone_ref(py)
     }
 
-    /// Arms of which a step led out of the finite numbers since their reset, (`n_arms`,);
-    /// overwritten by the next call.
+    /// Whether each arm has diverged since its reset, (`n_arms`,); overwritten by the next call.
     #[getter]
     fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.diverged.view.clone_ref(py)

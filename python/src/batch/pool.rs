@@ -1,22 +1,23 @@
 //! The threads that batches share.
 //!
-//! **Invariant:** a thread belongs to the process that asks for it.
+//! **Invariant:** a thread belongs to the process that requests it.
 
 use std::iter;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// A process, how many threads it asked for, and those that it got; `None` where the system gave none.
+/// A process, its requested number of threads, and its threads; `None` if the system refused all.
 type Kept = (u32, usize, Option<Arc<ThreadPool>>);
 
-/// The pools of this process: a forked child has none of its parent's threads. The latest used come last.
+/// The pools of this process, because a forked child has none of its parent's threads. The last used ones
+/// are at the end.
 static POOLS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 
-/// Numbers of threads that are kept ready, the latest that were used; others end with the call that uses them.
+/// The number of pools that are kept, the last used ones. Others end with their call.
 const MOST_KEPT: usize = 4;
 
-/// The threads that share the work, or fewer where the system has no more of them; none for one alone.
+/// The threads that share the work, or fewer if the system refuses some; `None` for one thread.
 pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
     if threads == 1 {
         return None;
@@ -31,7 +32,7 @@ pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
         None => started(threads),
     };
     pools.push((process, threads, pool.clone()));
-    // A parent's threads are left as they are: in the child nobody is there to end them.
+    // A parent's threads are not dropped, because they do not exist in the child.
     let own = |(of, ..): &Kept| *of == process;
     if pools.iter().filter(|one| own(one)).count() > MOST_KEPT
         && let Some(oldest) = pools.iter().position(own)
@@ -41,7 +42,7 @@ pub(super) fn pool(threads: usize) -> Option<Arc<ThreadPool>> {
     pool
 }
 
-/// As many threads as the system has, up to `threads`. The number of threads changes no result.
+/// As many threads as the system allows, up to `threads`. Their number does not change results.
 fn started(threads: usize) -> Option<Arc<ThreadPool>> {
     let fewer = iter::successors(Some(threads), |count| Some(count / 2));
     fewer.take_while(|&count| count > 1).find_map(|count| {

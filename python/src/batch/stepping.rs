@@ -1,7 +1,6 @@
-//! The steps of a batch, with looks for signals.
+//! The steps of a batch, with checks for signals.
 //!
-//! **Invariant:** a signal's handler that looks at the arms, or changes them, waits for nothing: it runs between two
-//! pieces.
+//! **Invariant:** a signal's handler that reads or changes the arms never waits, because it runs between two pieces.
 
 use std::sync::Mutex;
 
@@ -13,7 +12,7 @@ use super::lanes::{self, Piece};
 use super::windows::Windows;
 use crate::patience::hold;
 
-/// Takes all steps, from those of this piece on, with a look for signals between two pieces.
+/// Takes all steps from this piece on, with a check for signals between two pieces.
 pub(super) fn take<const N: usize>(
     py: Python<'_>,
     arms: &Mutex<Vec<Simulation<N>>>,

@@ -1,6 +1,6 @@
-//! The arrays that show a batch's arms.
+//! The arrays of a batch's values.
 //!
-//! **Invariant:** they are made once, and are read-only.
+//! **Invariant:** they are created once, and are read-only for users.
 
 use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
 use pyo3::IntoPyObject;
@@ -10,7 +10,7 @@ use super::lanes::Shown;
 use crate::arrays::read_only;
 use crate::fields::{Held, refused};
 
-/// An array that shows the arms, and the view of it that users get.
+/// An array of the arms' values, and the users' view of it.
 #[derive(Debug)]
 pub(super) struct Window<T, D> {
     array: Py<PyArray<T, D>>,
@@ -29,12 +29,12 @@ impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
     fn write<'py>(&self, py: Python<'py>) -> PyResult<PyReadwriteArray<'py, T, D>> {
         let array = self.array.bind(py).try_readwrite();
         array.map_err(|_| {
-            refused("this batch's own arrays are in use elsewhere: hand in copies of them")
+            refused("this batch's own arrays are in use elsewhere: pass copies of them")
         })
     }
 }
 
-/// An array of zeros; `PyArray::zeros` panics where there is no memory.
+/// An array of zeros. `PyArray::zeros` would panic without memory.
 fn zeros<'py, T: Element, D: numpy::ndarray::Dimension>(
     py: Python<'py>,
     shape: impl IntoPyObject<'py>,
@@ -45,7 +45,7 @@ fn zeros<'py, T: Element, D: numpy::ndarray::Dimension>(
         .cast_into()?)
 }
 
-/// The arrays that show the arms.
+/// The arrays of the arms' values.
 #[derive(Debug)]
 pub(super) struct Windows {
     pub(super) position: Window<f64, numpy::Ix2>,
@@ -68,7 +68,8 @@ impl Windows {
         })
     }
 
-    /// Has them written, with the interpreter's lock released. Where they are in use elsewhere, `write` is not called.
+    /// Calls `write` for them, with the interpreter's lock released. If they are in use elsewhere, `write` is not
+    /// called.
     pub(super) fn write(
         &self,
         py: Python<'_>,

@@ -1,7 +1,7 @@
-//! An action of the arm's in the graph: three services and two topics, as ROS 2 makes them.
+//! An action of the arm in the graph: three services and two topics, as in ROS 2.
 //!
-//! **Invariant:** a goal is accepted when the arm has said something of it. Every caller that waits for its end is
-//! answered, at the latest when the arm goes.
+//! **Invariant:** a goal is accepted at the arm's first message about it. Every caller that waits for its end is
+//! answered, at the latest when the arm disconnects.
 
 use std::rc::Rc;
 
@@ -25,7 +25,7 @@ use crate::interfaces::{ActionInterface, ServiceInterface, cancel_goal};
 use crate::report;
 use crate::translation;
 
-/// The type of the topic on which the states of goals are told.
+/// The type of the topic with the states of goals.
 const STATUS_TYPE: &str = "action_msgs/msg/GoalStatusArray";
 
 /// An action in the graph.
@@ -41,12 +41,12 @@ pub struct ActionBridge {
     _inlets: [Inlet; 3],
 }
 
-/// Somebody asks.
+/// A request.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct Requested(Part, Request);
 
-/// Which of an action's services is asked.
+/// The requested service of an action.
 #[derive(Debug, Clone, Copy)]
 enum Part {
     SendGoal,
@@ -55,7 +55,7 @@ enum Part {
 }
 
 impl ActionBridge {
-    /// Starts it there.
+    /// Starts it.
     ///
     /// # Errors
     /// If Zenoh refuses.
@@ -121,7 +121,7 @@ impl ActionBridge {
         let mut goal = read.get_mut("goal").map(Value::take).unwrap_or_default();
         let goal = translation::arguments(self.action.goal_fields(), &mut goal);
         if let Err(request) = self.goals.begin(id, request) {
-            // An id that is there already, or too many goals.
+            // The id exists already, or there are too many goals.
             return self.tell_acceptance(request, false, Stamp::now());
         }
         let pursue = Pursue {
@@ -147,7 +147,7 @@ impl ActionBridge {
         request.respond(&self.interface.send_goal, &response);
     }
 
-    /// The arm has said something of a goal, so it is the arm's.
+    /// The arm has sent a message about a goal, so it has accepted it.
     fn accept(&mut self, id: GoalId) {
         let accepted = self.goals.accept(id);
         if let Some((request, stamp)) = accepted {
@@ -223,13 +223,13 @@ impl Actor for ActionBridge {
     type Context = Context<Self>;
 
     fn started(&mut self, _: &mut Self::Context) {
-        // Nobody has a goal yet, and who looks shall see that.
+        // There is no goal yet. Publish this, so that new subscribers see it.
         self.publish_status();
     }
 
     fn stopped(&mut self, _: &mut Self::Context) {
         for request in self.goals.drain() {
-            request.refuse("the arm has gone");
+            request.refuse("the arm has disconnected");
         }
     }
 }

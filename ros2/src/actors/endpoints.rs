@@ -1,16 +1,16 @@
-//! Endpoints of the bridges in the graph.
+//! The endpoints of the bridges in the graph.
 //!
-//! **Invariant:** no number of an endpoint is used twice.
+//! **Invariant:** every endpoint has a different number.
 
 use pendularm::protocol::catalog::Node;
 
 use crate::convention::{Endpoint, EndpointKind, GraphNode, Named, Place};
 use crate::interfaces::ServiceInterface;
 
-/// Makes endpoints, each under a number of its own.
+/// Creates endpoints, each with its own number.
 pub(super) struct Endpoints {
     pub(super) place: Place,
-    /// The number of the last one.
+    /// The last used number.
     pub(super) last: usize,
 }
 
@@ -45,7 +45,7 @@ impl Endpoints {
     }
 }
 
-/// A node as the graph has it.
+/// A node in the graph.
 pub(super) fn graph_node(node: Node) -> GraphNode {
     let id = Node::ALL.iter().position(|one| *one == node);
     GraphNode {

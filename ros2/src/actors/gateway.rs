@@ -1,4 +1,4 @@
-//! The arm's side: one rosbridge connection, with the topics that are wanted and the calls that wait.
+//! The arm's side: one rosbridge connection, with the subscribed topics and the waiting calls.
 //!
 //! **Invariant:** every call is answered, at the latest when the connection ends.
 
@@ -18,7 +18,7 @@ use crate::report::{self, Repeated};
 
 /// Pause between two tries to connect.
 const RETRY: Duration = Duration::from_secs(1);
-/// Calls that may wait for their answers.
+/// Most calls that wait for their answers.
 const MAX_CALLS: usize = 1024;
 
 /// The arm's side.
@@ -26,7 +26,7 @@ pub struct Gateway {
     address: String,
     token: Option<String>,
     graph: Recipient<ArmPresence>,
-    /// Which connection this is, from 1.
+    /// The number of the connection, from 1.
     link: u64,
     outgoing: Option<mpsc::Sender<String>>,
     listeners: HashMap<&'static str, Recipient<ArmMessage>>,
@@ -37,7 +37,7 @@ pub struct Gateway {
 }
 
 impl Gateway {
-    /// A gateway to the arm at that address, which tells the graph when the arm comes and goes.
+    /// A gateway to the arm at that address. It informs the graph when the arm connects and disconnects.
     #[must_use]
     pub fn new(address: String, token: Option<String>, graph: Recipient<ArmPresence>) -> Self {
         Self {
@@ -80,11 +80,11 @@ impl Gateway {
         ctx.spawn(opened);
     }
 
-    /// Puts a frame into the queue; the error says why it can't.
+    /// Puts a frame into the queue. The error has the reason for a failure.
     fn write(&self, frame: &Value) -> Result<(), String> {
-        let outgoing = self.outgoing.as_ref().ok_or("the arm is not there")?;
+        let outgoing = self.outgoing.as_ref().ok_or("the arm is not connected")?;
         let sent = outgoing.try_send(format!("{frame}\n"));
-        sent.map_err(|_| "the arm takes nothing more".to_owned())
+        sent.map_err(|_| "the arm accepts nothing more".to_owned())
     }
 
     fn answered(&mut self, mut frame: Value) {
@@ -97,13 +97,13 @@ impl Gateway {
             is_success: frame.get("result") == Some(&Value::Bool(true)),
             status: text(&frame, "status").to_owned(),
         };
-        // The caller may have gone meanwhile.
+        // The caller may have ended meanwhile.
         let _ = waiting.send(Ok(answer));
     }
 }
 
 impl Gateway {
-    /// Tells who sent a goal how it goes, or how it ended.
+    /// Passes feedback or the end of a goal to its sender.
     fn tell_of_goal(&mut self, mut frame: Value, is_end: bool) {
         let id = text(&frame, "id").to_owned();
         let values = frame.get_mut("values").map(Value::take).unwrap_or_default();
@@ -170,10 +170,10 @@ impl Handler<Ended> for Gateway {
         if link != self.link {
             return;
         }
-        report::say(&format!("the arm at {} has gone: {why}", self.address));
+        report::say(&format!("lost the arm at {}: {why}", self.address));
         self.outgoing = None;
         self.listeners.clear();
-        // Dropped, each tells its waiting caller.
+        // Dropping a call sends an error to its caller.
         self.calls.clear();
         self.goals.clear();
         self.graph.do_send(ArmPresence::Gone);
@@ -195,7 +195,7 @@ impl Handler<Listen> for Gateway {
                 "unsubscribe"
             }
         };
-        // An arm that has gone takes its topics along, and they are asked for again when it is back.
+        // A new connection has no subscriptions, so the topics are subscribed again.
         let _ = self.write(&json!({"op": op, "topic": topic}));
     }
 }
@@ -235,7 +235,7 @@ impl Handler<Cancel> for Gateway {
 
     fn handle(&mut self, Cancel { action, id }: Cancel, _: &mut Self::Context) {
         let name = action.name();
-        // If the arm has gone, so has the goal.
+        // If the arm has disconnected, the goal has ended.
         let _ = self.write(&json!({"op": "cancel_action_goal", "id": id, "action": name}));
     }
 }
@@ -263,12 +263,12 @@ impl Handler<CallArm> for Gateway {
         Box::pin(async move {
             written?;
             let answer = receiver.await;
-            answer.unwrap_or_else(|_| Err("the arm has gone".to_owned()))
+            answer.unwrap_or_else(|_| Err("the arm has disconnected".to_owned()))
         })
     }
 }
 
-/// A member that is a text; empty if there is none.
+/// A text member; empty if it is missing.
 fn text<'a>(frame: &'a Value, name: &str) -> &'a str {
     frame.get(name).and_then(Value::as_str).unwrap_or_default()
 }

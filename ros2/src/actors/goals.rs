@@ -1,20 +1,20 @@
-//! The goals of one action: which are there, how they stand, and who waits for them. Pure: `R` is a request.
+//! The goals of one action, their states and their waiting callers. Pure: `R` is a request.
 //!
-//! **Invariant:** no more than [`MAX_GOALS`] are kept; the oldest that has ended makes room.
+//! **Invariant:** at most [`MAX_GOALS`] are stored. The oldest ended one is removed for a new one.
 
 use std::collections::VecDeque;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
-/// Goals that are kept, ended ones too, for callers that ask late.
+/// Most stored goals, including ended ones for late requests.
 pub const MAX_GOALS: usize = 64;
-/// Requests that may wait for the end of one goal.
+/// Most requests that wait for the end of one goal.
 const MAX_WAITING: usize = 16;
-/// In front of a goal's id where the arm sees it.
+/// Prefix of a goal's id at the arm.
 const PREFIX: &str = "ros2-";
 
-/// The states of `action_msgs/msg/GoalStatus` that are not the arm's to tell.
+/// The states of `action_msgs/msg/GoalStatus` that the arm does not send.
 const ACCEPTED: i8 = 1;
 const EXECUTING: i8 = 2;
 const CANCELING: i8 = 3;
@@ -39,10 +39,10 @@ pub struct Stamp {
 #[derive(Debug)]
 pub struct Goal<R> {
     id: GoalId,
-    /// When it came.
+    /// The time of its arrival.
     pub stamp: Stamp,
     status: i8,
-    /// The caller that sent it, until the arm has said something of it.
+    /// Its sender, until the arm's first message about it.
     pub asked: Option<R>,
     /// The callers that wait for its end.
     pub waiting: Vec<R>,
@@ -75,14 +75,14 @@ impl GoalId {
         json!({"uuid": self.0})
     }
 
-    /// The id by which the arm knows the goal.
+    /// The id of the goal at the arm.
     #[must_use]
     pub fn text(self) -> String {
         let hex = self.0.iter().map(|byte| format!("{byte:02x}"));
         PREFIX.chars().map(String::from).chain(hex).collect()
     }
 
-    /// The goal that the arm knows by that id.
+    /// The goal with that id at the arm.
     #[must_use]
     pub fn of_text(text: &str) -> Option<Self> {
         let number = u128::from_str_radix(text.strip_prefix(PREFIX)?, 16).ok()?;
@@ -97,7 +97,7 @@ impl GoalId {
 impl Stamp {
     const ZERO: Self = Self { sec: 0, nanosec: 0 };
 
-    /// The time now.
+    /// The present time.
     #[must_use]
     pub fn now() -> Self {
         let since = SystemTime::now()
@@ -131,10 +131,10 @@ impl<R> GoalTable<R> {
         self.0.iter_mut().find(|goal| goal.id == id)
     }
 
-    /// A goal has come; its request comes back if it can't be taken.
+    /// Adds a goal. Returns its request if it cannot be added.
     ///
     /// # Errors
-    /// If there is a goal of that id, or no room for another.
+    /// If there is a goal with that id, or no space for another.
     pub fn begin(&mut self, id: GoalId, asked: R) -> Result<(), R> {
         if self.get(id).is_some() {
             return Err(asked);
@@ -157,7 +157,7 @@ impl<R> GoalTable<R> {
         Ok(())
     }
 
-    /// The arm pursues it. Its sender may hear so, once.
+    /// The arm has accepted it. Returns its sender, once.
     pub fn accept(&mut self, id: GoalId) -> Option<(R, Stamp)> {
         let goal = self.get(id)?;
         let asked = goal.asked.take()?;
@@ -165,13 +165,13 @@ impl<R> GoalTable<R> {
         Some((asked, goal.stamp))
     }
 
-    /// The arm never pursued it.
+    /// The arm never accepted it.
     pub fn remove(&mut self, id: GoalId) -> Option<Goal<R>> {
         let at = self.0.iter().position(|goal| goal.id == id)?;
         self.0.remove(at)
     }
 
-    /// It has ended: the callers that wait for that.
+    /// It has ended. Returns the callers that wait for the end.
     pub fn end(&mut self, id: GoalId, status: i8, result: Value) -> Vec<R> {
         let Some(goal) = self.get(id) else {
             return Vec::new();
@@ -181,10 +181,10 @@ impl<R> GoalTable<R> {
         std::mem::take(&mut goal.waiting)
     }
 
-    /// Somebody waits for its end.
+    /// Adds a caller that waits for its end.
     ///
     /// # Errors
-    /// The request, if it has not to wait: with the result, or with none if there is no such goal or no room.
+    /// The request, if it does not have to wait: with the result, or with `None` if there is no such goal or no space.
     pub fn wait(&mut self, id: GoalId, request: R) -> Result<(), (R, Option<&Value>)> {
         match self.0.iter_mut().find(|goal| goal.id == id) {
             None => Err((request, None)),
@@ -197,8 +197,8 @@ impl<R> GoalTable<R> {
         }
     }
 
-    /// The goals that a request to cancel means, and its code. Without an id it means all up to a time, and without that
-    /// all.
+    /// The goals of a cancel request, and its code. Without an id it is for all goals up to a time, and without a time
+    /// for all.
     pub fn cancel(&mut self, id: GoalId, until: Stamp) -> (i8, Vec<GoalId>) {
         if !id.is_zero() && self.get(id).is_none() {
             return (UNKNOWN_GOAL, Vec::new());
@@ -225,7 +225,7 @@ impl<R> GoalTable<R> {
         json!({"goal_id": id.json(), "stamp": stamp.json()})
     }
 
-    /// All as `action_msgs/msg/GoalStatusArray`, but for those of which the arm has not said anything.
+    /// All as `action_msgs/msg/GoalStatusArray`, except goals without a message from the arm.
     #[must_use]
     pub fn status(&self) -> Value {
         let known = self.0.iter().filter(|goal| goal.asked.is_none());
@@ -238,7 +238,7 @@ impl<R> GoalTable<R> {
         json!({"status_list": list})
     }
 
-    /// Everybody who waits for anything.
+    /// All waiting callers.
     pub fn drain(&mut self) -> Vec<R> {
         let goals = self.0.drain(..);
         goals

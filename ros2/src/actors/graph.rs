@@ -1,6 +1,6 @@
-//! The Zenoh session, and what of the arm stands in the graph.
+//! The Zenoh session, and the arm's entries in the graph.
 //!
-//! **Invariant:** the graph shows the arm's nodes, topics and services while the arm answers, and not otherwise.
+//! **Invariant:** the graph shows the arm's nodes, topics and services only while the arm is connected.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -37,17 +37,17 @@ pub struct GraphBridge {
     services: Vec<(Service, Rc<ServiceInterface>)>,
     actions: Vec<(Action, Rc<ActionInterface>)>,
     session: Option<Session>,
-    /// There while the arm answers.
+    /// `Some` while the arm is connected.
     gateway: Option<Addr<Gateway>>,
     is_arm_here: bool,
     nodes: Vec<LivelinessToken>,
     bridges: Vec<Recipient<Leave>>,
-    /// The last number that an endpoint has had. None is used again: the one before may still be going.
+    /// The last used number of an endpoint. No number is reused, because its endpoint may still be closing.
     last_endpoint: usize,
     complaint: Repeated,
 }
 
-/// The router's connection came or went.
+/// The router has connected or disconnected.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct RouterNews {
@@ -55,7 +55,7 @@ struct RouterNews {
 }
 
 impl GraphBridge {
-    /// The graph's side of what was asked for.
+    /// A graph with these options.
     #[must_use]
     pub fn new(options: Options) -> Self {
         let rosapi = Rosapi::ALL.into_iter().map(Service::Rosapi);
@@ -81,13 +81,13 @@ impl GraphBridge {
             is_arm_here: false,
             nodes: Vec::new(),
             bridges: Vec::new(),
-            // Behind the numbers of the nodes.
+            // After the numbers of the nodes.
             last_endpoint: Node::ALL.len(),
             complaint: Repeated::default(),
         }
     }
 
-    /// Looks for the router, on a thread of its own.
+    /// Searches the router, on a separate thread.
     fn open(&mut self, ctx: &mut Context<Self>) {
         let config = match config(&self.options.router) {
             Ok(config) => config,
@@ -117,7 +117,7 @@ impl GraphBridge {
         self.join();
     }
 
-    /// Puts the arm into the graph, if both are there.
+    /// Adds the arm to the graph, if both are connected.
     fn join(&mut self) {
         if !self.is_arm_here || !self.bridges.is_empty() {
             return;
@@ -239,17 +239,17 @@ impl Handler<RouterNews> for GraphBridge {
 
     fn handle(&mut self, RouterNews { is_here }: RouterNews, _: &mut Self::Context) {
         let router = &self.options.router;
-        // Zenoh finds the way back by itself, and declares everything again.
+        // Zenoh reconnects by itself, and declares everything again.
         if is_here {
-            report::say(&format!("the router at {router} is here"));
+            report::say(&format!("connected to the router at {router}"));
         } else {
-            report::say(&format!("the router at {router} has gone; looking for it"));
+            report::say(&format!("lost the router at {router}; reconnecting"));
         }
     }
 }
 
-/// Opens a session, and has told when the router comes and goes. Zenoh waits here, and refuses to do so on a thread of an
-/// asynchronous runtime.
+/// Opens a session, and reports when the router connects and disconnects. Zenoh blocks here, which is not allowed on a
+/// thread of an asynchronous runtime.
 fn open_session(config: Config, news: Recipient<RouterNews>) -> zenoh::Result<Session> {
     let session = zenoh::open(config).wait()?;
     let info = session.info();
@@ -263,14 +263,14 @@ fn open_session(config: Config, news: Recipient<RouterNews>) -> zenoh::Result<Se
     Ok(session)
 }
 
-/// A session that connects to the router and to nothing else: it neither listens nor looks around.
+/// A session that connects only to the router. It neither listens nor scouts.
 fn config(router: &str) -> zenoh::Result<Config> {
     let config = json!({
         "mode": "client",
         "connect": {"endpoints": [router]},
         "listen": {"endpoints": []},
         "scouting": {"multicast": {"enabled": false}, "gossip": {"enabled": false}},
-        // Latched messages are kept by their time.
+        // Latched messages are stored by time.
         "timestamping": {"enabled": true},
     });
     Config::from_json5(&config.to_string())

@@ -1,6 +1,6 @@
 //! A service in the graph: requests in, replies out.
 //!
-//! **Invariant:** a request that is taken is replied to: with a response, or with an error that says why there is none.
+//! **Invariant:** every accepted request gets a response or an error with the reason.
 
 use pendularm::protocol::ros::{cdr, cdr_reader};
 use serde_json::Value;
@@ -13,14 +13,14 @@ use crate::convention::attachment::Attachment;
 use crate::interfaces::ServiceInterface;
 use crate::report;
 
-/// A service in the graph, for as long as this is there.
+/// A service in the graph, while this value exists.
 pub(super) struct Inlet {
     _queryable: Queryable<()>,
     _token: LivelinessToken,
 }
 
 impl Inlet {
-    /// A service there. `take` gets every request, and gives it back if there is no room for it.
+    /// Declares a service. `take` gets every request, and returns it if there is no space for it.
     pub(super) fn new(
         session: &Session,
         endpoint: Endpoint,
@@ -50,7 +50,7 @@ impl Request {
         read.map_err(|why| why.to_string())
     }
 
-    /// Replies with a response, under the number and the id of who asked.
+    /// Replies with a response, with the number and the id of the caller.
     pub(super) fn respond(self, interface: &ServiceInterface, response: &Value) {
         let Self(query) = self;
         let asked = query
@@ -67,7 +67,7 @@ impl Request {
         }
     }
 
-    /// Replies with a reason, which clients of ROS 2 log.
+    /// Replies with a reason, which ROS 2 clients log.
     pub(super) fn refuse(self, why: &str) {
         refuse(&self.0, why);
     }

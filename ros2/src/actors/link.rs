@@ -1,6 +1,7 @@
 //! The TCP connection to the arm: one JSON object per line.
 //!
-//! **Invariant:** a line is read when the one before it has been taken. Writes wait in bounded buffers.
+//! **Invariant:** a line is read after the previous one has been handled. Writes wait in bounded
+//! buffers.
 
 use std::time::Duration;
 
@@ -14,22 +15,23 @@ use tokio::time::timeout;
 
 use crate::report;
 
-/// Time to connect and to be let in.
+/// Time to connect and to authenticate.
 const OPENING: Duration = Duration::from_secs(5);
-/// An arm publishes its clock 60 times a second, paused or not. A silence of this length means that it is gone.
+/// An arm publishes its clock 60 times a second, paused or not. After this time without a message it counts as
+/// disconnected.
 const SILENCE: Duration = Duration::from_secs(10);
-/// Longest line that is read; a run of `/study/rollout` with all its samples has some megabytes.
+/// Longest line that is read. A run of `/study/rollout` with all its samples has some megabytes.
 const MAX_LINE: u64 = 64 * 1024 * 1024;
-/// Frames that may wait to be written.
+/// Most frames that wait to be written.
 const QUEUE: usize = 1024;
-/// The id of the first call, whose answer says that the arm lets us in.
+/// The id of the first call, whose answer shows that the arm accepts the client.
 const GREETING: &str = "pendularm-ros2";
 
-/// A frame that came.
+/// A received frame.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(super) struct Came {
-    /// The connection that it came by.
+    /// Its connection.
     pub(super) link: u64,
     /// The frame.
     pub(super) frame: Value,
@@ -39,14 +41,14 @@ pub(super) struct Came {
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(super) struct Ended {
-    /// Which one.
+    /// The connection.
     pub(super) link: u64,
-    /// Why.
+    /// The reason.
     pub(super) why: String,
 }
 
-/// Connects, is let in, and from then on hands every frame to `came`, and the end to `ended`. A line in the channel
-/// is written.
+/// Connects and authenticates. From then on every frame is passed to `came`, and the end to `ended`. Lines in the
+/// channel are written.
 pub(super) async fn open(
     link: u64,
     address: String,
@@ -57,7 +59,7 @@ pub(super) async fn open(
     let connecting = async {
         let stream = TcpStream::connect(&address).await;
         let stream = stream.map_err(|error| error.to_string())?;
-        // Frames are small, and each is waited for.
+        // Frames are small, and each one is awaited.
         stream
             .set_nodelay(true)
             .map_err(|error| error.to_string())?;
@@ -77,7 +79,7 @@ pub(super) async fn open(
     Ok(sender)
 }
 
-/// Shows the token and waits for the answer to a first call.
+/// Sends the token and waits for the answer to a first call.
 async fn greet(
     reader: &mut BufReader<OwnedReadHalf>,
     writer: &mut OwnedWriteHalf,
@@ -105,13 +107,13 @@ async fn greet(
     }
 }
 
-/// Hands over one frame after the other, and says why there are no more.
+/// Passes on frames, and returns the reason for the end.
 async fn read(link: u64, mut reader: BufReader<OwnedReadHalf>, came: &Recipient<Came>) -> String {
     loop {
         let frame = match timeout(SILENCE, next(&mut reader)).await {
             Ok(Ok(frame)) => frame,
             Ok(Err(why)) => return why,
-            Err(_) => return "it has fallen silent".to_owned(),
+            Err(_) => return "it sends nothing more".to_owned(),
         };
         if came.send(Came { link, frame }).await.is_err() {
             return "the gateway is busy".to_owned();
@@ -126,16 +128,16 @@ async fn next(reader: &mut BufReader<OwnedReadHalf>) -> Result<Value, String> {
     match read {
         Err(error) => Err(error.to_string()),
         Ok(0) => Err("it has closed the connection".to_owned()),
-        Ok(_) if !line.ends_with(b"\n") => Err("it broke off within a line".to_owned()),
+        Ok(_) if !line.ends_with(b"\n") => Err("it closed the connection within a line".to_owned()),
         Ok(_) => serde_json::from_slice(&line).map_err(|error| format!("no JSON: {error}")),
     }
 }
 
-/// Writes what comes. The reader notices when the connection ends.
+/// Writes queued lines. The reader detects the end of the connection.
 async fn write(mut writer: OwnedWriteHalf, mut frames: mpsc::Receiver<String>) {
     while let Some(frame) = frames.recv().await {
         if let Err(error) = writer.write_all(frame.as_bytes()).await {
-            report::say(&format!("the arm takes nothing more: {error}"));
+            report::say(&format!("the arm accepts nothing more: {error}"));
             return;
         }
     }

@@ -1,4 +1,4 @@
-//! The actors, and the messages between them. All are on one thread; Zenoh has threads of its own, which only put
+//! The actors, and the messages between them. All are on one thread. Zenoh has its own threads, which only put
 //! messages into mailboxes.
 //!
 //! | actor | does |
@@ -6,11 +6,11 @@
 //! | [`gateway::Gateway`] | one rosbridge connection to the arm, opened again when it ends |
 //! | [`graph::GraphBridge`] | the Zenoh session; starts the bridges when both sides are there, and stops them |
 //! | [`publisher::Publisher`] | one per topic that the arm publishes |
-//! | [`subscription::Subscription`] | one per topic that the arm takes |
+//! | [`subscription::Subscription`] | one per topic that the arm subscribes to |
 //! | [`service::ServiceBridge`] | one per service |
 //! | [`action::ActionBridge`] | one per action |
 //!
-//! **Invariant:** mailboxes are bounded. One that is full refuses a message, and says so to the sender.
+//! **Invariant:** mailboxes are bounded. A full one refuses a message, and the sender gets an error.
 
 pub mod action;
 mod endpoints;
@@ -28,35 +28,35 @@ use actix::prelude::*;
 use pendularm::protocol::catalog::Action;
 use serde_json::Value;
 
-/// Messages that may wait for one actor.
+/// Most messages that wait for one actor.
 const MAILBOX: usize = 1024;
 
-/// The arm came or went. Addressed to the graph.
+/// The arm has connected or disconnected. For the graph.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 #[rtype(result = "()")]
 pub enum ArmPresence {
-    /// It answers.
+    /// It is connected.
     Here,
     /// Its connection has ended.
     Gone,
 }
 
-/// A message of the arm's. Addressed to the topic's publisher.
+/// A message of the arm. For the topic's publisher.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct ArmMessage(pub Value);
 
-/// The arm's messages on a topic are wanted, or no longer. Addressed to the gateway.
+/// Subscribes to a topic of the arm, or ends that. For the gateway.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Listen {
     /// The topic, by the arm's name.
     pub topic: &'static str,
-    /// Where its messages go; none ends it.
+    /// The recipient of its messages; `None` ends the subscription.
     pub to: Option<Recipient<ArmMessage>>,
 }
 
-/// A message for the arm. Addressed to the gateway.
+/// A message for the arm. For the gateway.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct PublishToArm {
@@ -66,7 +66,7 @@ pub struct PublishToArm {
     pub msg: Value,
 }
 
-/// A call of a service of the arm's. Addressed to the gateway; the error says why there is no answer.
+/// A call of a service of the arm. For the gateway. The error has the reason for no answer.
 #[derive(Message, Debug)]
 #[rtype(result = "Result<Answer, String>")]
 pub struct CallArm {
@@ -81,13 +81,13 @@ pub struct CallArm {
 pub struct Answer {
     /// Its fields.
     pub values: Value,
-    /// Whether the call was done.
+    /// Whether the call succeeded.
     pub is_success: bool,
-    /// Why not.
+    /// The reason for a failure.
     pub status: String,
 }
 
-/// A goal for the arm. Addressed to the gateway; the error says why it was not sent.
+/// A goal for the arm. For the gateway. The error has the reason why it was not sent.
 #[derive(Message)]
 #[rtype(result = "Result<(), String>")]
 pub struct Pursue {
@@ -101,7 +101,7 @@ pub struct Pursue {
     pub to: Recipient<GoalUpdate>,
 }
 
-/// A goal is no longer wanted. Addressed to the gateway.
+/// Cancels a goal. For the gateway.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct Cancel {
@@ -111,7 +111,7 @@ pub struct Cancel {
     pub id: String,
 }
 
-/// News of a goal from the arm. Addressed to the action.
+/// News of a goal from the arm. For the action.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct GoalUpdate {
@@ -124,13 +124,13 @@ pub struct GoalUpdate {
 /// An event in the life of a goal.
 #[derive(Debug)]
 pub enum GoalEvent {
-    /// How it goes.
+    /// Feedback.
     Feedback(Value),
     /// It has ended, with a status of `action_msgs/msg/GoalStatus`; 0 if it was never accepted.
     End(i8, Value),
 }
 
-/// The arm has gone: the graph shall not show the bridge any longer. Addressed to every bridge.
+/// The arm has disconnected, so the graph must not show the bridge any more. For every bridge.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct Leave;

@@ -1,6 +1,6 @@
 //! A publisher in the graph: bytes out, numbered.
 //!
-//! **Invariant:** the numbers of one publisher's messages begin with 1, and none is missing.
+//! **Invariant:** the messages of a publisher are numbered from 1 without gaps.
 
 use std::time::Duration;
 
@@ -13,10 +13,10 @@ use crate::convention::attachment::{Attachment, GID};
 use crate::convention::{Endpoint, gid};
 use crate::report;
 
-/// How often a latched topic says which message was its last, if there was a new one: as `rmw_zenoh` does.
+/// The interval in which a latched topic announces its last message after a new one, as in `rmw_zenoh`.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
-/// The parts of a publisher that live and end together.
+/// The parts of a publisher with the same lifetime.
 struct Parts {
     publisher: AdvancedPublisher<'static>,
     _token: LivelinessToken,
@@ -26,7 +26,7 @@ struct Parts {
 
 /// A publisher in the graph.
 pub(super) struct Outlet {
-    /// There until it is dropped.
+    /// Declared until it is dropped.
     parts: Option<Parts>,
     key: String,
     gid: [u8; GID],
@@ -34,7 +34,7 @@ pub(super) struct Outlet {
 }
 
 impl Outlet {
-    /// A publisher there. A latched one gives its last message to late subscribers.
+    /// Declares a publisher. A latched one sends its last message to late subscribers.
     pub(super) fn new(
         session: &Session,
         endpoint: Endpoint,
@@ -63,7 +63,7 @@ impl Outlet {
         })
     }
 
-    /// Tells whether somebody wants the messages, whenever that changes.
+    /// Reports whether there are subscribers, at every change.
     pub(super) fn watch(
         &mut self,
         tell: impl Fn(bool) + Send + Sync + 'static,
@@ -90,7 +90,7 @@ impl Outlet {
 
 impl Drop for Outlet {
     fn drop(&mut self) {
-        // Zenoh waits for the heartbeat's task to end, which it refuses to do on a thread of an asynchronous runtime.
+        // Zenoh waits for the end of the heartbeat's task, which is not allowed on a thread of an asynchronous runtime.
         let parts = self.parts.take();
         std::thread::spawn(move || drop(parts));
     }

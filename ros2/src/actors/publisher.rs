@@ -1,7 +1,7 @@
-//! A topic of the arm's in the graph: JSON in, CDR out.
+//! A topic of the arm in the graph: JSON in, CDR out.
 //!
-//! **Invariant:** the bridge subscribes to a topic of the arm only while the graph has a subscriber for it, or if late
-//! subscribers get the last message.
+//! **Invariant:** the bridge subscribes to a topic of the arm only while the graph has a subscriber for it, or if it
+//! is latched.
 
 use actix::prelude::*;
 use pendularm::protocol::catalog::Topic;
@@ -22,13 +22,13 @@ pub struct Publisher {
     gateway: Addr<Gateway>,
 }
 
-/// Somebody in the graph wants the topic, or nobody any longer.
+/// Whether the topic has a subscriber in the graph.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct Watched(bool);
 
 impl Publisher {
-    /// Starts it there.
+    /// Starts it.
     ///
     /// # Errors
     /// If Zenoh refuses.

@@ -1,6 +1,6 @@
-//! A service of the arm's in the graph: a request is a call, and its answer the response.
+//! A service of the arm in the graph: a request becomes a call, and its answer the response.
 //!
-//! **Invariant:** every request is answered, also when the arm goes while it waits.
+//! **Invariant:** every request is answered, even if the arm disconnects while it waits.
 
 use std::rc::Rc;
 
@@ -23,13 +23,13 @@ pub struct ServiceBridge {
     _inlet: Inlet,
 }
 
-/// Somebody asks.
+/// A request.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct Requested(Request);
 
 impl ServiceBridge {
-    /// Starts it there.
+    /// Starts it.
     ///
     /// # Errors
     /// If Zenoh refuses.
@@ -73,7 +73,7 @@ impl Handler<Requested> for ServiceBridge {
             args: translation::arguments(self.service.fields(), &mut read),
         });
         let interface = Rc::clone(&self.interface);
-        // Not the actor's: it is answered when the actor has gone, too.
+        // This task is independent of the actor, so the request is answered even after the actor has ended.
         actix_rt::spawn(async move {
             match asked.await {
                 Ok(Ok(answer)) => reply(request, &interface, answer),

@@ -1,6 +1,6 @@
-//! A topic that the arm takes: CDR in, JSON out.
+//! A topic that the arm subscribes to: CDR in, JSON out.
 //!
-//! **Invariant:** bytes that are no message of the type are dropped, and it is said why.
+//! **Invariant:** bytes that are not a message of the type are dropped, and the reason is logged.
 
 use actix::prelude::*;
 use pendularm::protocol::catalog::Topic;
@@ -16,7 +16,7 @@ use super::{Leave, MAILBOX, PublishToArm};
 use crate::convention::Endpoint;
 use crate::report::{self, Repeated};
 
-/// A topic that the arm takes.
+/// A topic that the arm subscribes to.
 pub struct Subscription {
     topic: Topic,
     one: Type,
@@ -26,13 +26,13 @@ pub struct Subscription {
     _token: LivelinessToken,
 }
 
-/// A message of somebody's in the graph.
+/// A message from the graph.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct Taken(Sample);
 
 impl Subscription {
-    /// Starts it: messages come under `key`, and the graph knows it by `token`.
+    /// Starts it. Messages have the key `key`, and `token` is its entry in the graph.
     ///
     /// # Errors
     /// If Zenoh refuses.

@@ -1,6 +1,6 @@
-//! The 33 bytes that every message, request and response carries beside its payload.
+//! The 33 bytes that every message, request and response has besides its payload.
 //!
-//! **Invariant:** the layout is that of `rmw_zenoh` since April 2025; ROS 2 drops a message without it.
+//! **Invariant:** the layout is that of `rmw_zenoh` since April 2025. ROS 2 drops a message without it.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -9,19 +9,19 @@ pub const GID: usize = 16;
 /// Bytes of an attachment: two numbers of 8, the length of the id, the id.
 const LENGTH: usize = 8 + 8 + 1 + GID;
 
-/// Which message of whom this is.
+/// The identification of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Attachment {
     /// The message's number, from 1.
     pub sequence: i64,
-    /// When it was sent, in nanoseconds since 1970.
+    /// The time of sending, in nanoseconds since 1970.
     pub sent: i64,
-    /// The sender, or the caller.
+    /// The id of the sender or the caller.
     pub gid: [u8; GID],
 }
 
 impl Attachment {
-    /// The attachment of a message that goes out now.
+    /// The attachment of a message that is sent now.
     #[must_use]
     pub fn now(sequence: i64, gid: [u8; GID]) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
@@ -46,7 +46,7 @@ impl Attachment {
         bytes
     }
 
-    /// The attachment of these bytes, if they are one.
+    /// The attachment in these bytes, if they are valid.
     #[must_use]
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let (sequence, rest) = bytes.split_first_chunk()?;

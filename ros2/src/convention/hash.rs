@@ -1,7 +1,7 @@
-//! Type hashes (RIHS01): the SHA-256 of a type's description as JSON, by which ROS 2 knows whether two ends mean the
-//! same.
+//! Type hashes (RIHS01): the SHA-256 of a type's description as JSON, by which ROS 2 compares the types of two
+//! endpoints.
 //!
-//! **Invariant:** the description has every type inside, sorted by name, and neither constants nor defaults.
+//! **Invariant:** the description has every inner type, sorted by name, and neither constants nor defaults.
 
 use std::collections::BTreeMap;
 
@@ -9,15 +9,14 @@ use pendularm::protocol::catalog::Field;
 use pendularm::protocol::catalog::types::{self, Type};
 use sha2::{Digest, Sha256};
 
-/// Added to the number of a type for so many of it.
+/// Added to the number of a type for arrays of it.
 const ARRAY: u32 = 48;
 const BOUNDED: u32 = 96;
 const UNBOUNDED: u32 = 144;
 /// The number of a type that has fields.
 const NESTED: u32 = 1;
 
-/// The hash of a type: `RIHS01_` and 64 digits. Types inside that the catalogue does not have are looked for in
-/// `beside`.
+/// The hash of a type: `RIHS01_` and 64 digits. Inner types that are not in the catalog are searched in `beside`.
 #[must_use]
 pub fn type_hash(first: Type, beside: &[Type]) -> String {
     let digest = Sha256::digest(description(first, beside));
@@ -25,7 +24,7 @@ pub fn type_hash(first: Type, beside: &[Type]) -> String {
     format!("RIHS01_{hex}")
 }
 
-/// The text that is hashed.
+/// The hashed text.
 fn description(first: Type, beside: &[Type]) -> String {
     let mut inside = BTreeMap::new();
     collect(first, beside, &mut inside);
@@ -37,7 +36,7 @@ fn description(first: Type, beside: &[Type]) -> String {
     )
 }
 
-/// Puts every type inside `one` into `found`.
+/// Adds every type inside `one` to `found`.
 fn collect(one: Type, beside: &[Type], found: &mut BTreeMap<&'static str, Type>) {
     for field in one.fields {
         let base = Kind::of(field).base;
@@ -72,7 +71,7 @@ fn field_description(field: &Field) -> String {
     )
 }
 
-/// A field's type, taken apart.
+/// The parts of a field's type.
 struct Kind {
     base: &'static str,
     /// Added to its number.
@@ -107,7 +106,7 @@ impl Kind {
 fn number(base: &str) -> u32 {
     match base {
         "int8" => 2,
-        // A `char` of ROS is a byte without a sign.
+        // A ROS `char` is an unsigned byte.
         "uint8" | "char" => 3,
         "int16" => 4,
         "uint16" => 5,
@@ -128,7 +127,7 @@ fn number(base: &str) -> u32 {
 mod tests {
     use super::*;
 
-    /// By `get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)` of the Python package rosbags.
+    /// From `get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)` of the Python package rosbags.
     const JAZZY: [(&str, &str); 11] = [
         (
             "sensor_msgs/msg/JointState",
@@ -170,7 +169,7 @@ mod tests {
             "trajectory_msgs/msg/MultiDOFJointTrajectory",
             "RIHS01_3a18fd095292a65cfde8833c72985a30af981f3ec44494655c6267262b443a4a",
         ),
-        // By the code that ROS 2 generates for it.
+        // From the code that ROS 2 generates for it.
         (
             "control_msgs/msg/JointComponentTolerance",
             "RIHS01_739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4",

@@ -1,21 +1,21 @@
 //! The wire conventions of `rmw_zenoh` (ROS 2 Jazzy): names, tokens, attachments, type hashes. Pure.
 //!
-//! **Invariant:** names stand here as ROS 2 has them on Zenoh, and nowhere else.
+//! **Invariant:** only this module has the names of ROS 2 on Zenoh.
 
 pub mod attachment;
 pub mod hash;
 
 use twox_hash::XxHash3_128;
 
-/// How many messages a peer's queue keeps, which the graph shows.
+/// The depth of a peer's queue in the graph.
 const DEPTH: usize = 10;
 
-/// Where everything stands: a domain, a namespace in it, and the session that it belongs to.
+/// The place of all names: a domain, a namespace in it, and the session.
 #[derive(Debug, Clone)]
 pub struct Place {
     /// The ROS domain.
     pub domain: u32,
-    /// Empty, or a namespace with a slash in front: `/left`.
+    /// Empty, or a namespace with a leading slash: `/left`.
     pub namespace: String,
     /// The Zenoh session's id.
     pub zid: String,
@@ -26,7 +26,7 @@ pub struct Place {
 pub enum EndpointKind {
     /// A publisher.
     Publisher,
-    /// A publisher whose last message a new subscription gets.
+    /// A publisher that sends its last message to a new subscription.
     LatchedPublisher,
     /// A subscription.
     Subscription,
@@ -43,7 +43,7 @@ impl EndpointKind {
         }
     }
 
-    /// Reliability, durability, history and depth, deadline, lifespan, liveliness: empty is the default.
+    /// Reliability, durability, history and depth, deadline, lifespan, liveliness. Empty means the default.
     fn qos(self) -> String {
         match self {
             Self::LatchedPublisher => ":1:,1:,:,:,,".to_owned(),
@@ -63,7 +63,7 @@ pub struct Named<'a> {
     pub hash: &'a str,
 }
 
-/// An endpoint: the key expression of what it sends or takes, and the token by which the graph knows it.
+/// An endpoint: the key expression of its messages, and its token in the graph.
 #[derive(Debug, Clone)]
 pub struct Endpoint {
     /// The key expression.
@@ -82,7 +82,7 @@ pub struct GraphNode {
 }
 
 impl Place {
-    /// The name with the namespace in front.
+    /// The name after the namespace.
     fn full_name(&self, name: &str) -> String {
         format!("{}{name}", self.namespace)
     }
@@ -99,13 +99,13 @@ impl Place {
         )
     }
 
-    /// The token by which the graph knows a node.
+    /// The token of a node in the graph.
     #[must_use]
     pub fn node_token(&self, node: GraphNode) -> String {
         self.token_head(node, node.id, "NN")
     }
 
-    /// The token by which the graph knows an endpoint of a node.
+    /// The token of a node's endpoint in the graph.
     fn token(&self, node: GraphNode, id: usize, kind: EndpointKind, of: Named<'_>) -> String {
         format!(
             "{}/{}/{}/{}/{}",
@@ -132,7 +132,7 @@ impl Place {
         }
     }
 
-    /// All up to the node's name; the enclave is empty.
+    /// The parts up to the node's name. The enclave is empty.
     fn token_head(&self, node: GraphNode, id: usize, code: &str) -> String {
         format!(
             "@ros2_lv/{}/{}/{}/{id}/{code}/%/{}/{}",
@@ -145,14 +145,14 @@ impl Place {
     }
 }
 
-/// The id of an endpoint, by which its messages are known to come from it.
+/// The id of an endpoint, which identifies the sender of its messages.
 #[must_use]
 pub fn gid(token: &str) -> [u8; attachment::GID] {
-    // The lower half comes first.
+    // The lower half is first.
     XxHash3_128::oneshot(token.as_bytes()).to_le_bytes()
 }
 
-/// The name of a type as DDS has it: `sensor_msgs::msg::dds_::JointState_`.
+/// The name of a type in DDS: `sensor_msgs::msg::dds_::JointState_`.
 fn dds_type(name: &str) -> String {
     match name.rsplit_once('/') {
         Some((package, last)) => format!("{}::dds_::{last}_", package.replace('/', "::")),
@@ -190,7 +190,7 @@ mod tests {
         }
     }
 
-    /// The examples of `rmw_zenoh`'s design document, but for the depth of the queue.
+    /// The examples of `rmw_zenoh`'s design document, except the depth of the queue.
     #[test]
     fn names_are_those_of_the_design_document() {
         let here = place("");

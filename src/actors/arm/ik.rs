@@ -1,6 +1,6 @@
-//! Inverse kinematics: `/ik/solve`, and the same question from `ik_action`.
+//! Inverse kinematics: `/ik/solve`, and the same request from `ik_action`.
 //!
-//! **Invariant:** nothing about the arm is kept: lengths and pose are asked of it for every solution.
+//! **Invariant:** no state of the arm is stored. Lengths and pose are requested for every solution.
 
 use actix::prelude::*;
 
@@ -19,13 +19,13 @@ pub struct Ik<const N: usize> {
 }
 
 impl<const N: usize> Ik<N> {
-    /// A node that asks `arm`.
+    /// A node that requests lengths and pose from `arm`.
     #[must_use]
     pub fn new(arm: Recipient<ArmPose<N>>) -> Self {
         Self { arm }
     }
 
-    /// Enters this node's service into the registry's table.
+    /// Adds this node's service to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<Solve<N>>(Service::Solve, address.clone());
     }

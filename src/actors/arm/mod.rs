@@ -1,6 +1,6 @@
-//! The arm and those who drive it: the simulation, inverse kinematics, goals, paths and timed trials.
+//! The arm and the nodes that drive it: simulation, inverse kinematics, goals, paths and timed trials.
 //!
-//! **Invariant:** the arm is stepped in one place, `sim`; the others ask it by messages.
+//! **Invariant:** only `sim` steps the arm. The others send it messages.
 
 pub mod follow;
 pub mod ik;

@@ -1,6 +1,6 @@
-//! A call on its way through the workers: room for its answer is taken, then the answer is computed and written.
+//! A call on the workers: it takes memory for its answer, then the answer is computed and written.
 //!
-//! **Invariant:** a call is answered once, and works no more once its caller is gone.
+//! **Invariant:** a call is answered once. It stops when its caller disconnects.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use crate::actors::resources::memory::NoRoom;
 use crate::actors::resources::work_clock;
 use crate::services::study::Work;
 
-/// Hands a call to the workers.
+/// Passes a call to the workers.
 pub(super) fn answer<T: Send + 'static>(
     workers: &WorkerPool,
     reply: Reply<T>,
@@ -27,7 +27,7 @@ struct Answering<T> {
 }
 
 enum AnsweringStage<T> {
-    /// Room for the answer is yet to be taken.
+    /// Memory for the answer has not been taken yet.
     Asked(Box<dyn Work<T>>),
     Working(Box<dyn Work<T>>),
     Writing(Box<dyn Pieces>),
@@ -46,7 +46,7 @@ impl<T: Send> Answering<T> {
         match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
             AnsweringStage::Asked(_) | AnsweringStage::Working(_) => self.reply.refuse(why),
             AnsweringStage::Writing(mut pieces) => pieces.refuse(why),
-            // The pool may end between the answer and the last look at the clock.
+            // The pool may end between the answer and the last check of the clock.
             AnsweringStage::Answered => {}
         }
     }

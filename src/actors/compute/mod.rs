@@ -1,6 +1,6 @@
 //! Work that takes longer than a turn of an actor: a pool of workers, and the services that compute on it.
 //!
-//! **Invariant:** nothing in here keeps an actor's thread for longer than a slice.
+//! **Invariant:** nothing here blocks an actor's thread for longer than a slice.
 
 mod answering;
 pub mod integration;

@@ -1,9 +1,9 @@
-//! `/study/*`: predictions and offline runs of the arm, done on the worker pool, apart from the live arm.
+//! `/study/*`: predictions and offline runs on the worker pool, without effect on the live arm.
 //!
-//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is.
-//! A connection hands over one computation at a time.
+//! A missing value is requested from the arm when the computation begins. The arm itself does not change. A connection
+//! submits one computation at a time.
 //!
-//! **Invariant:** a call is answered once, and neither the arm nor another client waits for it.
+//! **Invariant:** a call is answered once, and blocks neither the arm nor another client.
 
 use std::time::Instant;
 
@@ -33,13 +33,13 @@ pub struct Study<const N: usize> {
 }
 
 impl<const N: usize> Study<N> {
-    /// A node that asks `arm` and computes on `workers`.
+    /// A node that requests settings from `arm` and computes on `workers`.
     #[must_use]
     pub fn new(arm: Recipient<ArmSettings<N>>, workers: WorkerPool) -> Self {
         Self { arm, workers }
     }
 
-    /// Asks the arm for its present settings, then hands the work to the workers.
+    /// Requests the arm's present settings, then passes the work to the workers.
     fn begin<T: Send + 'static, W: Work<T> + 'static>(
         &self,
         mut reply: Reply<T>,
@@ -53,7 +53,7 @@ impl<const N: usize> Study<N> {
         }));
     }
 
-    /// Enters this node's services into the registry's table.
+    /// Adds this node's services to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
         nodes.serve_long::<RunOffline<N>>(Service::Rollout, address.clone());
@@ -120,10 +120,10 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-/// The arm's question for its limit: one slice.
+/// The arm's request for its limit: one slice.
 struct Limiting<const N: usize> {
     control: ControlLoop<N>,
-    /// The way to the answer; if it is dropped unused, there is none.
+    /// The sender of the answer. If it is dropped unused, there is no answer.
     answer: Option<oneshot::Sender<ClockLimits>>,
 }
 

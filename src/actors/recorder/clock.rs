@@ -1,10 +1,10 @@
-//! The time of day, as it stands in a record: the only place that asks for it, and nothing is decided by it.
+//! The time of day, for records only. No decision depends on it.
 //!
-//! **Invariant:** it is asked for once, and counted on from there, so that it never runs backwards.
+//! **Invariant:** it is read once and continued with a monotonic clock, so it never runs backwards.
 
 use std::time::{Duration, Instant, SystemTime};
 
-/// A clock that tells the time of day and never runs backwards.
+/// A clock of the time of day that never runs backwards.
 #[derive(Clone, Copy)]
 pub(super) struct TapeClock {
     began: Instant,
@@ -12,7 +12,7 @@ pub(super) struct TapeClock {
 }
 
 impl TapeClock {
-    /// The clock as it stands now.
+    /// A clock that starts at the present time of day.
     pub(super) fn start() -> Self {
         let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
         Self {

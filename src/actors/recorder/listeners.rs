@@ -1,6 +1,6 @@
-//! Makes entries of the record out of what arm and registry tell.
+//! Converts events of the arm and the registry to entries of the record.
 //!
-//! **Invariant:** a listener copies and does not wait.
+//! **Invariant:** a listener copies and never blocks.
 
 use bytes::Bytes;
 
@@ -9,7 +9,7 @@ use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
 use crate::actors::gateway::messages::{Tap, Tapped};
 use crate::record::{Content, Note, write_note};
 
-/// The arm's inputs and states; `put` answers whether it has taken an entry.
+/// The arm's inputs and states. `put` returns whether it has accepted an entry.
 #[must_use]
 pub fn arm<const N: usize>(
     mut put: impl FnMut(Content) -> bool + Send + 'static,
@@ -33,7 +33,7 @@ pub fn arm<const N: usize>(
     })
 }
 
-/// Topics, calls and answers; none for one that is longer than [`MAX_RECORDED_FRAME`].
+/// Topics, calls and answers; `None` for one longer than [`MAX_RECORDED_FRAME`].
 #[must_use]
 pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
     Box::new(move |what| {
@@ -76,7 +76,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
     })
 }
 
-/// A frame counts towards what its client holds as long as it is shared: a slow file would be the client's fault.
+/// The frame is copied, because a shared frame would count for its client while a slow file holds it.
 fn copied(frame: &Bytes) -> Bytes {
     Bytes::copy_from_slice(frame)
 }

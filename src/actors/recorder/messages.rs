@@ -1,7 +1,6 @@
-//! The questions to the recorder.
+//! The requests to the recorder.
 //!
-//! **Invariant:** an answer comes when what was asked for is done: a file that is named exists, one that has ended is
-//! whole.
+//! **Invariant:** an answer is sent after the action: the named file exists, and an ended file is complete.
 
 use std::path::PathBuf;
 
@@ -10,10 +9,10 @@ use actix::prelude::*;
 use crate::actors::node::Ask;
 use crate::protocol::op::fields::Rejections;
 
-/// Begin a record in the folder that the operator has chosen.
+/// Starts a record in the operator's folder.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StartRecording {
-    /// The file's name, without a folder; one is made up if there is none.
+    /// The file's name, without a folder. Without one, a name is generated.
     pub name: Option<String>,
     /// Fields that were not valid.
     pub rejected: Rejections,
@@ -23,7 +22,7 @@ impl Ask for StartRecording {
     type Answer = Result<String, NotRecorded>;
 }
 
-/// End the record.
+/// Ends the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StopRecording;
 
@@ -31,7 +30,7 @@ impl Ask for StopRecording {
     type Answer = Result<Recorded, NotRecorded>;
 }
 
-/// A record that has ended.
+/// A finished record.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recorded {
     /// The file's name.
@@ -40,27 +39,27 @@ pub struct Recorded {
     pub messages: u64,
     /// Bytes of these messages.
     pub bytes: u64,
-    /// Messages that were not taken, because the file was slow.
+    /// Messages that were dropped, because the file was slow.
     pub dropped: u64,
 }
 
-/// Begin a record in this file. From the runtime, when it starts.
+/// Starts a record in this file. From the runtime, when it starts.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 #[rtype(result = "Result<(), NotRecorded>")]
 pub struct RecordTo(pub PathBuf);
 
-/// End the record, if there is one. From the runtime, when it ends.
+/// Ends the record, if there is one. From the runtime, when it ends.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct EndRecord;
 
-/// Why nothing is recorded, or no more.
+/// Why a record was not started or not ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotRecorded {
-    /// Fields that are not as they should be.
+    /// Rejected fields.
     #[error("{0}")]
     Rejected(Rejections),
-    /// The operator has chosen no folder.
+    /// The operator has set no folder.
     #[error("recording by service needs a folder: start the program with --record-dir")]
     NoFolder,
     /// There is a record already.
@@ -69,8 +68,8 @@ pub enum NotRecorded {
         /// The file's name.
         String,
     ),
-    /// It is not a client's to end.
-    #[error("{0} was begun by the operator with --record, and ends with the program")]
+    /// A client cannot end the operator's record.
+    #[error("{0} was started by the operator with --record, and ends with the program")]
     Operators(
         /// The file's name.
         String,
@@ -78,13 +77,13 @@ pub enum NotRecorded {
     /// There is no record.
     #[error("nothing is being recorded")]
     Nothing,
-    /// The folder has this many files already.
-    #[error("the folder holds {0} records already")]
+    /// The folder is full.
+    #[error("the folder has {0} records already: remove some")]
     Full(
-        /// As many as it may.
+        /// The number of records.
         usize,
     ),
-    /// The file can't be written.
+    /// The file cannot be written.
     #[error("{file}: {why}")]
     File {
         /// The file's name, or the operator's path.

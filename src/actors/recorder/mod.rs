@@ -1,6 +1,6 @@
-//! `/recorder/*` and `--record`: has registry and arm tell what passes, and a thread write it.
+//! `/recorder/*` and `--record`: receives events of the registry and the arm. A thread writes them.
 //!
-//! **Invariant:** there is one record at a time; arm and registry tell nothing without one.
+//! **Invariant:** there is one record at a time. Without one, arm and registry send no events.
 
 mod clock;
 pub mod limits;
@@ -32,11 +32,11 @@ use crate::record::RunSettings;
 pub struct Recorder<const N: usize> {
     arm: Recipient<Tell<N>>,
     registry: Recipient<SetTap>,
-    /// Folder in which clients may have records made.
+    /// Folder for clients' records.
     folder: Option<PathBuf>,
     settings: RunSettings,
     current: Option<Current>,
-    /// Records so far: the end of one says nothing about the next.
+    /// The number of records so far. The end of a record does not concern the next one.
     begun: u64,
 }
 
@@ -44,13 +44,13 @@ pub struct Recorder<const N: usize> {
 struct Current {
     file: String,
     number: u64,
-    /// Whether a client has begun it: only then may a client end it.
+    /// Whether a client has started it. Only then may a client end it.
     by_client: bool,
     end: oneshot::Receiver<Recorded>,
 }
 
 impl<const N: usize> Recorder<N> {
-    /// A recorder at rest; clients may have it write into `folder`, if there is one.
+    /// A recorder without a record. Clients may record into `folder`, if there is one.
     #[must_use]
     pub fn new(
         arm: Recipient<Tell<N>>,
@@ -151,7 +151,7 @@ impl<const N: usize> Handler<Over> for Recorder<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Recorder<N> {
-    /// Begins a record, unless there is one.
+    /// Starts a record, unless there is one.
     fn begin(
         &mut self,
         target: TapeTarget,
@@ -178,12 +178,12 @@ impl<const N: usize> Recorder<N> {
                 why: "there is no thread to write it".to_owned(),
             };
             let Begun { tape, end } = begun.await.map_err(no_thread)??;
-            // Either is there as long as the program.
+            // Both exist as long as the program.
             let of_arm = tape.clone();
             let listener = listeners::arm(move |content| of_arm.put(content));
             let _ = arm.send(Tell(Some(listener))).await;
             let tap = listeners::registry(move |content| {
-                // Without any one of these the run can be repeated all the same.
+                // A replay needs none of these messages.
                 let _ = tape.put_or_count(content);
             });
             let _ = registry.send(SetTap(Some(tap))).await;
@@ -202,13 +202,13 @@ impl<const N: usize> Recorder<N> {
         })
     }
 
-    /// Ends the record, and waits until its file is whole; none if there is no record.
+    /// Ends the record, and waits until its file is complete; `None` if there is no record.
     fn end(&mut self) -> impl ActorFuture<Self, Output = Option<Recorded>> + use<N> {
         let current = self.current.take();
         let (arm, registry) = (self.arm.clone(), self.registry.clone());
         let ends = async move {
             let current = current?;
-            // Each gives up its tape; with the last one the thread ends the file.
+            // Each drops its tape. After the last one the thread ends the file.
             let _ = arm.send(Tell(None)).await;
             let _ = registry.send(SetTap(None)).await;
             let recorded = current.end.await.ok()?;
@@ -224,10 +224,10 @@ impl<const N: usize> Recorder<N> {
     }
 }
 
-/// Looks into the folder in which clients may have records made, as is done before each of them.
+/// Checks the folder for clients' records, as before each record.
 ///
 /// # Errors
-/// The system's word, if that is no folder.
+/// The system's error, if it is not a folder.
 pub fn look_into(folder: &Path) -> Result<(), NotRecorded> {
     fs::read_dir(folder)
         .map(drop)
@@ -237,7 +237,7 @@ pub fn look_into(folder: &Path) -> Result<(), NotRecorded> {
         })
 }
 
-/// The place of a client's record: the file's name, and all about the file.
+/// The destination of a client's record with its file's name.
 fn place(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
     let made_up = || format!("run-{}", TapeClock::start().now());
     let mut name = name.unwrap_or_else(made_up);

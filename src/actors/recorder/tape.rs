@@ -1,7 +1,7 @@
-//! The way of entries to the file: a bounded queue, and the thread that writes.
+//! The path of entries to the file: a bounded queue, and the thread that writes.
 //!
-//! **Invariant:** nobody waits for the file. A message that does not fit into the queue is dropped, counted and
-//! reported; an input is dropped last of all.
+//! **Invariant:** no sender waits for the file. A message that does not fit into the queue is dropped, counted
+//! and reported. Inputs are dropped last.
 
 use std::fs::{self, File};
 use std::io;
@@ -19,17 +19,17 @@ use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_EN
 use super::messages::{NotRecorded, Recorded};
 use crate::record::{Content, McapWriter, RecordEntry, RecordError, RunSettings};
 
-/// The end of a record's file name.
+/// The extension of a record's file name.
 const EXTENSION: &str = "mcap";
 
 /// Destination of a record.
 pub(super) struct TapeTarget {
     pub(super) path: PathBuf,
-    /// Bytes after which it ends by itself, and other records beside it are counted; none for the operator's own.
+    /// Size limit in bytes, with which other records in the folder are also counted; `None` for the operator's own.
     pub(super) limit: Option<u64>,
 }
 
-/// The way into a record that is being written. The thread ends with the last of them.
+/// The queue of a record. The thread ends when the last clone is dropped.
 #[derive(Clone)]
 pub(super) struct Tape {
     entries: SyncSender<RecordEntry>,
@@ -45,14 +45,15 @@ struct TapeCounts {
     is_over: AtomicBool,
 }
 
-/// A record that has begun.
+/// A started record.
 pub(super) struct Begun {
     pub(super) tape: Tape,
-    /// Comes when the file is whole.
+    /// Receives the result when the file is complete.
     pub(super) end: oneshot::Receiver<Recorded>,
 }
 
-/// Begins a record; the answer comes from its thread. `over` is called there when it ends before its last tape.
+/// Starts a record. Its thread sends the answer, and calls `over` there if the record ends before its last tape
+/// is dropped.
 pub(super) fn begin(
     target: TapeTarget,
     settings: RunSettings,
@@ -83,22 +84,22 @@ pub(super) fn begin(
                 return;
             }
             let recorded = write(scribe, &queue, &counts, &target, over);
-            // The program may be ending without waiting for the file.
+            // The program may end without waiting for the file.
             let _ = ended.send(recorded);
         });
     if let Err(error) = spawned {
-        tracing::error!(%error, file, "no thread to record with");
+        tracing::error!(%error, file, "cannot start a thread for the record");
     }
     begun
 }
 
-/// The name of the file, as answers give it.
+/// The name of the file in answers.
 pub(super) fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// Makes the file, which must not be there: no record is ever overwritten.
+/// Creates the file, which must not exist, so no record is overwritten.
 fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
     let refused = |why: io::Error| failure(target, &why);
     if let (Some(_), Some(folder)) = (target.limit, target.path.parent()) {
@@ -113,7 +114,7 @@ fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
     File::create_new(&target.path).map_err(refused)
 }
 
-/// The operator gets the path that he gave. Clients get a name without the path of the folder.
+/// The operator gets the given path. Clients get a name without the folder.
 fn failure(target: &TapeTarget, why: &impl ToString) -> NotRecorded {
     let path = &target.path;
     NotRecorded::File {
@@ -126,13 +127,13 @@ fn failure(target: &TapeTarget, why: &impl ToString) -> NotRecorded {
 }
 
 impl Tape {
-    /// Records something, unless there is no room; whether it did.
+    /// Records an entry, unless the queue is full. Returns whether it did.
     pub(super) fn put(&self, content: Content) -> bool {
         if self.counts.is_over.load(Ordering::Relaxed) {
             return false;
         }
         let bytes = content.allocated();
-        // Inputs are few and short, and without one of them the rest can't be repeated.
+        // Inputs are few and short, and a replay needs every one.
         let share = if matches!(content, Content::Input { .. }) {
             1
         } else {
@@ -154,7 +155,7 @@ impl Tape {
         false
     }
 
-    /// The same; something that was too long to be made an entry is dropped.
+    /// The same. `None` stands for an entry that was too long and is dropped.
     pub(super) fn put_or_count(&self, content: Option<Content>) -> bool {
         if content.is_none() {
             self.counts.dropped.fetch_add(1, Ordering::Relaxed);
@@ -164,14 +165,14 @@ impl Tape {
 }
 
 impl TapeCounts {
-    /// An entry waits no more.
+    /// An entry has left the queue.
     fn written(&self, bytes: usize) {
         self.entries.fetch_sub(1, Ordering::Relaxed);
         self.bytes.fetch_sub(bytes, Ordering::Relaxed);
     }
 }
 
-/// Writes entry after entry until the last tape is gone, the file takes no more, or it is long enough.
+/// Writes entries until the last tape is dropped, the file fails, or the size limit is reached.
 fn write(
     mut scribe: McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
@@ -195,7 +196,7 @@ fn write(
             tracing::warn!(
                 file = recorded.file,
                 bytes = recorded.bytes,
-                "the record is as long as it may be, and ends"
+                "the record has reached its size limit and ends"
             );
             over();
         }
@@ -207,7 +208,7 @@ fn write(
     recorded
 }
 
-/// Whether that was all there was; false if the file has become too long.
+/// Writes waiting entries. Returns `false` if the file has become too long.
 fn take_entries(
     scribe: &mut McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
@@ -222,7 +223,7 @@ fn take_entries(
             Ok(entry) => {
                 counts.written(entry.content.allocated());
                 match scribe.write(&entry) {
-                    // A frame that can't be read back is one of ours gone wrong, and no reason to end.
+                    // A frame that cannot be read back is a fault of the runtime, but does not end the record.
                     Err(error @ RecordError::Frame(_)) => {
                         tracing::warn!(%error, "a message is not recorded");
                     }
@@ -261,7 +262,7 @@ mod tests {
     use super::*;
     use crate::protocol::catalog::Topic;
 
-    /// A tape whose queue nobody empties.
+    /// A tape with a queue that is never emptied.
     fn stuck() -> (Tape, Receiver<RecordEntry>) {
         let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
         let tape = Tape {

@@ -1,4 +1,4 @@
-//! The questions to the recorder in JSON, and the responses.
+//! The requests to the recorder in JSON, and the responses.
 //!
 //! **Invariant:** a client names a file, never a folder.
 
@@ -15,7 +15,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 
 impl<const N: usize> Recorder<N> {
-    /// Enters this node's services into the registry's table.
+    /// Adds this node's services to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<StartRecording>(Service::RecorderStart, address.clone());
         nodes.serve::<StopRecording>(Service::RecorderStop, address.clone());
@@ -75,7 +75,7 @@ impl Answered for StopRecording {
     }
 }
 
-/// Whether that is the name of a file, and nothing else on any system.
+/// Whether this is a plain file name on every system.
 fn is_file_name(name: &str) -> bool {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'-' | b'_');
     (1..=MAX_FILE_NAME).contains(&name.len()) && !name.starts_with('.') && name.bytes().all(plain)

@@ -1,11 +1,10 @@
-//! Work that would keep the gateway's thread for longer than a turn, done on another thread meanwhile.
+//! Runs long work of the gateway on other threads.
 //!
-//! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Long work that needs
-//! nothing but its bytes and that one client waits for is done here. Examples are a frame of megabytes to be read, a
-//! message to be encoded, and a long list to be written.
+//! The gateway's thread serves every client, so no work may block it for much more than a millisecond. Long work for
+//! one client that needs only its own bytes is done here. Examples are reading a frame of megabytes, encoding a
+//! message, and writing a long list.
 //!
-//! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of work. The others wait
-//! in the order in which they came.
+//! **Invariant:** at most [`PLACES`] threads of one gateway work on each kind of work. Further work waits in order.
 
 use std::sync::Arc;
 
@@ -16,22 +15,22 @@ use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 use crate::protocol::limits::MEDIUM;
 
-/// Threads at work at once on each kind of work.
+/// Most active threads for each kind of work.
 pub const PLACES: usize = 2;
 
-/// The kinds of work. Each has places of its own.
+/// The kinds of work. Each has its own places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkKind {
     /// Reads a frame or encodes a message.
     Usual,
-    /// The same with more than [`MEDIUM`]: shorter work does not wait for it.
+    /// The same for more than [`MEDIUM`] bytes. Shorter work does not wait for it.
     Long,
-    /// Writes a long list. It keeps its place while it waits for the room of its answer.
+    /// Writes a long list. It keeps its place while it waits for memory for its answer.
     Listing,
 }
 
 impl WorkKind {
-    /// Reads or encodes that many bytes.
+    /// The kind for reading or encoding this number of bytes.
     #[must_use]
     pub const fn of(bytes: usize) -> Self {
         if bytes > MEDIUM {
@@ -50,14 +49,14 @@ thread_local! {
 pub struct WorkPermit(OwnedSemaphorePermit);
 
 impl WorkPermit {
-    /// A place, once one is free: for work that is to take nothing while it waits. `None` if the runtime is ending.
+    /// Waits for a free place, for work that uses no memory while it waits. `None` if the runtime is ending.
     pub async fn take(kind: WorkKind) -> Option<Self> {
         let free = FREE.with(|free| free.get(kind as usize).map(Arc::clone))?;
         free.acquire_owned().await.ok().map(Self)
     }
 
-    /// Does `work` on another thread; in a simulation, which has one, on that and a turn later. `None` if it panicked,
-    /// which is logged, or if the runtime is ending.
+    /// Runs `work` on another thread, or one turn later on the same thread in a simulation, which has only one. `None`
+    /// after a panic, which is logged, or if the runtime is ending.
     pub async fn perform<T: Send + 'static>(
         self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -84,7 +83,7 @@ impl WorkPermit {
     }
 }
 
-/// Waits for a place and does `work` there.
+/// Waits for a place and runs `work` there.
 pub async fn aside<T: Send + 'static>(
     kind: WorkKind,
     work: impl FnOnce() -> T + Send + 'static,

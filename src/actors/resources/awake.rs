@@ -1,28 +1,28 @@
-//! Keeps a thread awake for a moment after it has taken part in a call, because the next message is likely to come at
-//! once.
+//! Keeps a thread awake for a moment after a call, because the next message is likely to arrive at once.
 //!
-//! A call goes from the gateway's thread to the arm's and back. Waking a thread whose core has gone to sleep takes
-//! longer than all the work of the call. A client that calls again and again would pay for it twice each time. Others
-//! are let through: the thread offers its core at every turn. Both costs are measured in `docs/benchmarks.md`.
+//! A call passes from the gateway's thread to the arm's and back. Waking a thread on a sleeping core takes longer
+//! than all the work of the call, and happens twice per call. Other threads are not delayed, because the thread
+//! yields its core at every turn. `docs/benchmarks.md` has both costs.
 //!
-//! **Invariant:** nobody stays awake for longer than [`MOMENT`] after the last call, and idle runtimes not at all.
+//! **Invariant:** a thread stays awake for at most [`MOMENT`] after the last call, and not at all in an idle
+//! runtime.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use crate::actors::resources::work_clock;
 
-/// Longer than the time from a call to a client's next one on the same machine, short beside a tick.
+/// Longer than the time between two calls of a client on the same machine, and short compared with a tick.
 pub const MOMENT: Duration = Duration::from_micros(50);
 
 thread_local! {
-    /// The time until which this thread stays awake; none while it may sleep.
+    /// The time until which this thread stays awake; `None` while it may sleep.
     static UNTIL: Cell<Option<Instant>> = const { Cell::new(None) };
 }
 
-/// The present thread stays awake for another [`MOMENT`].
+/// Keeps the present thread awake for another [`MOMENT`].
 pub fn stay_awake() {
-    // A simulation has one thread, and its time does not pass while that is awake.
+    // A simulation has one thread, and its time does not pass while this thread is awake.
     if work_clock::is_counted() {
         return;
     }

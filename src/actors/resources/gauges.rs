@@ -1,10 +1,10 @@
-//! Counters that one node writes and another reports: the gateway's part of `/diagnostics`, and work whose
-//! absence is to be shown. The pools for what is long lie beside them.
+//! Counters that one node writes and another reads: the gateway's part of `/diagnostics`, and a counter
+//! that shows that no unneeded work is done. The pools for long frames and answers are here too.
 //!
-//! The arm publishes `/diagnostics` from its own thread. Asking the registry once a second would make the gateway part
-//! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
+//! The arm publishes `/diagnostics` from its own thread. A request to the registry once a second would make the arm
+//! wait for the gateway, so the arm reads these shared counters.
 //!
-//! **Invariant:** the counters are statistics: nothing is decided by them.
+//! **Invariant:** the counters are statistics. No decision depends on them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -20,7 +20,7 @@ pub struct Gauges {
 }
 
 impl Gauges {
-    /// Counters at zero, beside these pools.
+    /// Counters at zero, with these pools.
     #[must_use]
     pub fn with(memory: Memory) -> Self {
         Self {
@@ -41,13 +41,13 @@ impl Gauges {
         self.connections.load(Ordering::Relaxed)
     }
 
-    /// Topic messages that full outboxes have dropped since the start.
+    /// Topic messages dropped by outboxes since the start.
     #[must_use]
     pub fn messages_dropped(&self) -> u64 {
         self.messages_dropped.load(Ordering::Relaxed)
     }
 
-    /// Estimates of the arm's local error made since the start: none without a subscriber.
+    /// Estimates of the arm's local error since the start. Without a subscriber there are none.
     #[must_use]
     pub fn error_estimates(&self) -> u64 {
         self.error_estimates.load(Ordering::Relaxed)

@@ -1,10 +1,9 @@
-//! Memory that clients make the program hold: bounded places times a bounded client, and two pools for long frames
-//! and answers.
+//! The memory that clients use: bounded places times a bounded client, and two pools for long frames and answers.
 //!
 //! Short bytes have a bound in each connection (`gateway::limits`). An answer longer than [`SHORT`] takes a [`Permit`]
 //! before it is computed, and keeps it until it has been written. A published message longer than [`MEDIUM`], and any
-//! other frame longer than [`SHORT`], takes one while it is read, performed and passed on. The client waits if no
-//! permit is left. The permit travels with the bytes, and is given back with their last copy.
+//! other frame longer than [`SHORT`], takes one while it is read, performed and forwarded. The client waits if no
+//! permit is left. The permit stays with the bytes, and is released with their last copy.
 //!
 //! **Invariant:** bytes longer than [`SHORT`] have a permit, except published messages of at most [`MEDIUM`].
 
@@ -19,12 +18,11 @@ pub use crate::protocol::limits::SHORT;
 const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
-/// Long frames that are there at once.
+/// Most long frames at once.
 pub const LONG_FRAMES: usize = 3;
-/// Bytes of the long answers that are there at once, computed or being computed: one of a million steps, or many of
-/// ten thousand.
+/// Most bytes of long answers at once, finished or being computed: one of a million steps, or many of ten thousand.
 pub const LONG_ANSWERS: usize = 96 * MIB;
-/// The part of an answer that one permit of the pool stands for.
+/// The bytes of an answer per permit of the pool.
 const ANSWER_PART: usize = 16 * KIB;
 
 /// The two pools; clones share them.
@@ -53,17 +51,17 @@ impl Memory {
         }
     }
 
-    /// The permit for a long frame, once there is one. They go to those who wait in the order in which they came.
+    /// Waits for the permit for a long frame. Permits are granted in the order of the requests.
     pub async fn long_frame(&self) -> Permit {
         let permit = Arc::clone(&self.frames).acquire_owned().await;
         Permit::new(permit.ok())
     }
 
-    /// The permit for an answer of at most `bytes` bytes, if there is room for it now. The longest answer finds room
-    /// once all others are gone.
+    /// The permit for an answer of at most `bytes` bytes, if there is enough memory now. The longest answer fits
+    /// once all others have been released.
     ///
     /// # Errors
-    /// [`NoRoom`] while others have taken it.
+    /// [`NoRoom`] while other answers use it.
     pub fn answer(&self, bytes: usize) -> Result<Permit, NoRoom> {
         let parts = bytes.div_ceil(ANSWER_PART).min(self.size.1);
         let parts = u32::try_from(parts).unwrap_or(u32::MAX);
@@ -73,7 +71,7 @@ impl Memory {
             .map_err(|_| NoRoom)
     }
 
-    /// Permits that are taken, of both pools.
+    /// The number of taken permits of both pools.
     #[must_use]
     pub fn taken(&self) -> usize {
         self.size.0 + self.size.1
@@ -82,11 +80,11 @@ impl Memory {
     }
 }
 
-/// Others have taken the room for long answers: some of it is free again once theirs have been written.
+/// Other answers use the memory for long answers. It is released when they have been written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoRoom;
 
-/// Room for a long frame, or for a long answer, until its last clone is dropped.
+/// The permit for a long frame or a long answer, until its last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct Permit {
     _taken: Arc<Option<OwnedSemaphorePermit>>,
@@ -99,7 +97,7 @@ impl Permit {
     }
 }
 
-/// Has the permit, if there is one, travel with these bytes, if they are long.
+/// Attaches the permit, if there is one, to these bytes, if they are long.
 #[must_use]
 pub fn cover(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
     match permit.filter(|_| bytes.len() > SHORT) {
@@ -111,7 +109,7 @@ pub fn cover(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
     }
 }
 
-/// The same for a topic message, which takes no room if it is a modest one.
+/// The same for a topic message, which needs no permit up to [`MEDIUM`].
 #[must_use]
 pub fn cover_message(permit: Option<&Permit>, bytes: Bytes) -> Bytes {
     let permit = permit.filter(|_| bytes.len() > MEDIUM);

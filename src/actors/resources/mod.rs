@@ -1,7 +1,6 @@
-//! The machine that all nodes share: memory, which is counted, time for work, which is measured, and threads for work
-//! that takes long.
+//! Shared resources of all nodes: counted memory, measured work time, and threads for long work.
 //!
-//! **Invariant:** nothing in here imports a node, so that every node can use it.
+//! **Invariant:** nothing here imports a node, so every node can use it.
 
 pub mod aside;
 pub mod awake;

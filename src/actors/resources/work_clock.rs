@@ -1,32 +1,32 @@
-//! The clock on which the cost of work is measured: the slices of computations, the arm's wake-ups.
+//! The clock for the cost of work: the slices of computations and the arm's wake-ups.
 //!
-//! It is the machine's own, unless a simulation counts instead. There each look costs the same, so that the work done
-//! between two looks, and all that follows from it, is the same in every run.
+//! It is the machine's clock, or a counter in a simulation. There each reading costs the same, so the work between
+//! two readings, and everything that follows from it, is the same in every run.
 //!
-//! **Invariant:** only what work costs is read here. Simulation time and what a client waits for go by the runtime's
-//! clock.
+//! **Invariant:** this clock is only for the cost of work. Simulation time and clients' waiting times use the
+//! runtime's clock.
 
 use std::cell::Cell;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 thread_local! {
-    /// How looks are counted on this thread; none where the machine's clock counts.
+    /// The counter of this thread; `None` for the machine's clock.
     static COUNTED: Cell<Option<Counted>> = const { Cell::new(None) };
 }
 
-/// Time that passes with looks at it alone.
+/// Time that passes only with readings.
 #[derive(Clone, Copy)]
 struct Counted {
     began: Instant,
-    /// The cost of a look.
+    /// The cost of a reading.
     cost: Duration,
-    /// The cost of all of them so far.
+    /// The cost of all readings so far.
     spent: Duration,
 }
 
 impl Counted {
-    /// Looks once more.
+    /// Counts one more reading.
     fn look(mut self) -> Self {
         self.spent += self.cost;
         COUNTED.set(Some(self));
@@ -34,7 +34,7 @@ impl Counted {
     }
 }
 
-/// The time now. Only differences mean something.
+/// The present time. Only differences count.
 #[must_use]
 pub fn now() -> Instant {
     match COUNTED.get() {
@@ -43,7 +43,7 @@ pub fn now() -> Instant {
     }
 }
 
-/// The same time as a number. Only differences on one thread mean something.
+/// The same time as a number. Only differences on one thread count.
 #[must_use]
 pub fn reading() -> Duration {
     static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
@@ -53,8 +53,7 @@ pub fn reading() -> Duration {
     }
 }
 
-/// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
-/// pass.
+/// From now on the time on this thread advances by `cost` with each reading, and not otherwise.
 pub fn count(cost: Duration) {
     COUNTED.set(Some(Counted {
         began: Instant::now(),
@@ -63,7 +62,7 @@ pub fn count(cost: Duration) {
     }));
 }
 
-/// Whether looks are counted on this thread.
+/// Whether readings are counted on this thread.
 #[must_use]
 pub fn is_counted() -> bool {
     COUNTED.get().is_some()

@@ -1,6 +1,6 @@
-//! The nodes by which a client of ROS finds its way: rosapi, parameters, rosout, and frames for web viewers.
+//! The nodes for ROS clients: rosapi, parameters, rosout, and frames for web viewers.
 //!
-//! **Invariant:** these nodes hold no state of the arm; they ask for it.
+//! **Invariant:** these nodes store no state of the arm. They request it.
 
 pub mod parameters;
 pub mod rosapi;

@@ -1,6 +1,6 @@
 //! `/rosout`: the runtime's own warnings and errors.
 //!
-//! **Invariant:** without subscribers no warning is even noted.
+//! **Invariant:** without subscribers no warning is stored.
 
 use actix::prelude::*;
 use tokio::sync::mpsc;
@@ -14,7 +14,7 @@ use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::LogMessage;
 
-/// Warnings that may wait to be published; the rest is in the log alone.
+/// Most warnings that wait to be published. Others are only in the log.
 const MAX_WAITING: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -28,7 +28,7 @@ pub struct Rosout {
 }
 
 impl Rosout {
-    /// Publishes warnings with the time that `clock` tells.
+    /// Publishes warnings with the time of `clock`.
     #[must_use]
     pub fn new(clock: Recipient<SimulationTime>, publish: Recipient<Publish>) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Rosout {
         }
     }
 
-    /// Enters the topic into the registry's table.
+    /// Adds the topic to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         let node = address.clone().recipient();
         nodes.publishers.insert(Topic::Rosout, node);
@@ -97,13 +97,13 @@ fn message((metadata, msg): Warning, time: f64) -> Publish {
     })
 }
 
-/// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
+/// The actor of the reporting module: `registry` for `pendularm::actors::gateway::registry::ops`.
 fn node_of(target: &'static str) -> &'static str {
     let modules = target.split("::").skip_while(|part| *part != "actors");
     let modules: Vec<&'static str> = modules.skip(1).take(2).collect();
     match modules[..] {
         ["arm", "sim"] => "arm_sim",
-        // Folders, in which the actors stand.
+        // The folders of the actors.
         ["arm" | "compute" | "gateway" | "resources" | "ros", actor] | [actor, ..] => actor,
         [] => "pendularm",
     }

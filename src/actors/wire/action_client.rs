@@ -1,7 +1,7 @@
-//! Goals of an action: the registry's message to the node that serves the action, and the way back to the sender.
+//! Goals of an action: the registry's message to the node of the action, and the way back to the sender.
 //!
-//! **Invariant:** feedback may be lost on its way to a slow client, the end of a goal may not, and it comes after it.
-//! Both are handed over as values, and written by the registry.
+//! **Invariant:** feedback for a slow client may be dropped. The end of a goal is never dropped, and follows all
+//! feedback. Both are passed as values, and written by the registry.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,20 +15,20 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
 
-/// A client's goal for an action or its end, as the registry passes it on.
+/// A client's goal or cancellation, forwarded by the registry.
 pub enum ActionRequest {
     /// A goal.
     Goal {
-        /// Its fields, unread.
+        /// Its fields, not parsed yet.
         arguments: Arguments,
         /// The client that sent it.
         client: ActionClient,
-        /// Dropped when the goal has been set in motion, or refused: the client's next frame is read then.
+        /// Dropped when the goal has started or is refused. The client's next frame is read then.
         done: Done,
     },
-    /// The end of a goal that the same client has sent under the same id.
+    /// Cancels the goal that the same client has sent with the same id.
     Cancel {
-        /// The client that wants it; it gets an error status if no such goal is active.
+        /// The client that cancels. It gets an error status if no such goal is active.
         from: Canceller,
         /// Dropped when the goal has ended.
         done: Done,
@@ -48,15 +48,15 @@ pub struct SentGoal {
 pub struct Canceller {
     /// The way back.
     pub respond: Recipient<Respond>,
-    /// The goal that is meant.
+    /// The goal to cancel.
     pub goal: SentGoal,
 }
 
-/// The client that sent a goal, and the ways to it.
+/// The client that sent a goal, and its recipients.
 pub struct ActionClient {
-    /// Results, which are never lost.
+    /// Recipient of results, which are never dropped.
     pub respond: Recipient<Respond>,
-    /// Feedback, which may be.
+    /// Recipient of feedback, which may be dropped.
     pub feedback: Recipient<Feedback>,
     /// The connection.
     pub connection: ConnectionId,
@@ -64,14 +64,14 @@ pub struct ActionClient {
     pub action: Arc<str>,
     /// The goal's id, if it has one.
     pub id: Option<Payload>,
-    /// Whether feedback was asked for.
+    /// Whether the client gets feedback.
     pub wants_feedback: bool,
-    /// Set when the client is gone.
+    /// Set when the client has disconnected.
     pub gone: Arc<AtomicBool>,
 }
 
 impl Canceller {
-    /// Tells why nothing was ended.
+    /// Sends the reason why no goal was cancelled.
     pub fn refuse(&self, why: &str) {
         let SentGoal { connection, id } = &self.goal;
         let status = Respond::error(*connection, why, id.as_ref());
@@ -80,26 +80,26 @@ impl Canceller {
 }
 
 impl ActionClient {
-    /// True once the client has disconnected.
+    /// Whether the client has disconnected.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         self.gone.load(Ordering::Relaxed)
     }
 
-    /// Whether this goal is the one that is meant.
+    /// Whether this is the given goal.
     #[must_use]
     pub fn is(&self, goal: &SentGoal) -> bool {
         self.connection == goal.connection && self.id == goal.id
     }
 
-    /// Tells by a status why the goal has no effect yet.
+    /// Sends a status with the reason why the goal has no effect yet.
     pub fn warn(&self, why: &str) {
         let id = self.id.as_ref();
         let status = Respond::status(self.connection, Level::Warning, why, id);
         self.respond.do_send(status);
     }
 
-    /// Tells how the goal goes, if that was asked for.
+    /// Sends feedback, if the client gets it.
     pub fn feed_back(&self, values: impl Serialize + Send + 'static) {
         if self.wants_feedback {
             let (action, id) = (Arc::clone(&self.action), self.id.clone());
@@ -111,7 +111,7 @@ impl ActionClient {
         }
     }
 
-    /// Tells how the goal ended.
+    /// Sends the result of the goal.
     pub fn conclude(&self, values: impl Serialize + Send + 'static, status: GoalStatus) {
         let result = status != GoalStatus::Unknown;
         let (action, id) = (Arc::clone(&self.action), self.id.clone());
@@ -126,7 +126,7 @@ impl ActionClient {
         });
     }
 
-    /// Tells why the goal was not accepted: there, clients expect a text for values.
+    /// Sends the reason why the goal was not accepted. In this case clients expect a text in `values`.
     pub fn refuse(&self, why: &str) {
         self.conclude(why.to_owned(), GoalStatus::Unknown);
     }

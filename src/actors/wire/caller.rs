@@ -1,6 +1,6 @@
-//! A call as the registry passes it on, the client that made it, and the way back.
+//! A call forwarded by the registry, its client, and the way back.
 //!
-//! **Invariant:** every call is answered once: a caller that is dropped unanswered says so itself.
+//! **Invariant:** every call is answered once: a caller that is dropped unanswered sends an error.
 
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,19 +21,19 @@ use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
 use crate::services::Address;
 
-/// A call of one of the runtime's own services, as the registry passes it on.
+/// A call of one of the runtime's own services, forwarded by the registry.
 pub struct ServiceCall {
     /// The service that was called.
     pub service: Service,
-    /// The caller's arguments, unread.
+    /// The caller's arguments, not parsed yet.
     pub arguments: Arguments,
     /// The way back.
     pub caller: Caller,
 }
 
-/// A client's message on a topic that the runtime subscribes to, as the registry passes it on.
+/// A client's message on a topic of the runtime, forwarded by the registry.
 pub struct TopicMessage {
-    /// The message, as far as the runtime needs it.
+    /// The parts of the message that the runtime needs.
     pub heard: NodeMessage,
     /// The way back, for an error status.
     pub respond: Recipient<Respond>,
@@ -41,16 +41,16 @@ pub struct TopicMessage {
     pub connection: ConnectionId,
     /// Ends with the client's connection.
     pub present: Weak<()>,
-    /// Ends with the client's connection, and when the client stops listening for what comes of its message.
+    /// Ends with the client's connection, or when the client unsubscribes from the replies to its message.
     pub listening: Weak<()>,
     /// The frame's `id`, if it had one.
     pub id: Option<Payload>,
-    /// Dropped when the message has taken effect: the connection reads its next frame then.
+    /// Dropped when the message has taken effect. The connection reads its next frame then.
     pub done: Done,
 }
 
 impl TopicMessage {
-    /// Tells the client by an error status why this is no message for `topic`.
+    /// Sends the client an error status with the reason why the message is not valid for `topic`.
     pub fn refuse(self, topic: Topic, why: &impl Display) {
         let msg = format!("{}: {why}", topic.name());
         let status = Respond::error(self.connection, &msg, self.id.as_ref());
@@ -61,22 +61,22 @@ impl TopicMessage {
     }
 }
 
-/// The client that called, and the way back to it. Dropped unanswered, it says so.
+/// The calling client, and the way back to it. If it is dropped unanswered, it sends an error.
 pub struct Caller {
     registry: Recipient<Respond>,
     connection: ConnectionId,
-    /// None once the answer has been given.
+    /// `None` once the answer has been sent.
     pub(super) address: Option<Address>,
-    /// The room that is taken for a long answer, or else for the long frame that asked.
+    /// The permit for a long answer, or for the long frame of the call.
     permit: Option<Permit>,
     gone: Arc<AtomicBool>,
     pub(super) done: Option<Done>,
-    /// Where there is room for a long answer; not everybody asks for one.
+    /// The pools for long answers, if the call may have one.
     memory: Option<Memory>,
 }
 
 impl Caller {
-    /// The client `connection`, which called `service`, spelled `name`; the receiver ends with the call.
+    /// The client `connection`, which called `service`, spelled `name`. The receiver ends with the call.
     #[must_use]
     pub fn new(
         registry: Recipient<Respond>,
@@ -99,7 +99,7 @@ impl Caller {
         (caller, ended)
     }
 
-    /// Long answers find their room here. `asked` is the permit of the frame that asked, if that was long.
+    /// Sets the pools for long answers. `asked` is the permit of the call's frame, if that was long.
     #[must_use]
     pub fn within(mut self, memory: Memory, asked: Option<Permit>) -> Self {
         self.memory = Some(memory);
@@ -126,17 +126,17 @@ impl Caller {
         self.address.as_ref()?.id()
     }
 
-    /// True once the caller has disconnected: nobody waits for the answer any more.
+    /// Whether the caller has disconnected.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         self.gone.load(Ordering::Relaxed)
     }
 
-    /// Takes room for an answer of at most `bytes` bytes, beside the echo of the caller's `id`, before it is computed.
-    /// Short ones need none to be taken.
+    /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
+    /// computed. Short answers need no reservation.
     ///
     /// # Errors
-    /// While there is none: answers on their way to clients have taken it.
+    /// While other answers use it.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
         let (Some(address), Some(memory)) = (&self.address, &self.memory) else {
             return Ok(());
@@ -149,13 +149,13 @@ impl Caller {
         Ok(())
     }
 
-    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
+    /// Sends the caller a status, before the answer, with the reason why the request has no effect yet.
     pub(super) fn warn(&self, why: &str) {
         let status = Respond::status(self.connection, Level::Warning, why, self.id());
         self.registry.do_send(status);
     }
 
-    /// Answers `result: true`; the call ends when this is dropped.
+    /// Answers `result: true`. The call ends when this value is dropped.
     pub fn succeed(&mut self, values: &impl Serialize) {
         self.answer_at_once(|address| address.response(values, ""));
     }
@@ -165,7 +165,7 @@ impl Caller {
         self.answer_at_once(|address| address.failure(why));
     }
 
-    /// Answers and ends the call; `write` is called by the registry.
+    /// Answers and ends the call. The registry calls `write`.
     pub(super) fn conclude(
         mut self,
         done: Option<Done>,

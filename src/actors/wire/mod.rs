@@ -1,9 +1,9 @@
-//! Between the registry and the nodes: a client's call is read here and becomes a question, and a node's answer is
-//! written here and becomes the call's one response.
+//! Translation between the registry and the nodes: a client's call is read here as a question, and a node's answer
+//! is written here as the call's one response.
 //!
-//! A question that clients can ask says how it is read and how its answer is written ([`Callable`]); the table of
-//! routes ([`Nodes`]) says which node is asked. All that goes wrong on the way is in here, once: bad arguments, a
-//! question that was dropped, and how an error is written.
+//! A question that clients can send defines its reader and the writer of its answer ([`Callable`]). The table of
+//! routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
+//! question, and the form of an error.
 //!
 //! **Invariant:** a node sees no JSON. Arguments are read before a node gets the call. Its answer is written
 //! afterwards, by the registry or by the thread that has a long answer.

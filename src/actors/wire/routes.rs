@@ -1,4 +1,4 @@
-//! The table of routes: which node serves a service or an action, listens to a topic and publishes one.
+//! The table of routes: the node that serves a service or an action, and that subscribes to or publishes a topic.
 //!
 //! **Invariant:** arguments are read here or aside, never on the thread of the node.
 
@@ -14,8 +14,9 @@ use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::services::{Answered, Callable, Streamed};
 
-/// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
-/// so these take a fifth of a millisecond. Only computations, paths and lists of parameters take longer ones.
+/// Longer arguments are read on another thread. Numbers near the middle between two doubles take 5 µs per 24 bytes, so
+/// this length takes at most a fifth of a millisecond. Only computations, paths and lists of parameters accept longer
+/// ones.
 const LONG_ARGUMENTS: usize = 1024;
 
 /// Passes a message to its node.
@@ -24,23 +25,23 @@ pub type Route<T> = Box<dyn Fn(T) + Send>;
 /// The runtime's own nodes, by the services, topics and actions that they serve.
 #[derive(Default)]
 pub struct Nodes {
-    /// The way of a call to the node that answers it.
+    /// Passes a call to the node that answers it.
     pub services: HashMap<Service, Route<ServiceCall>>,
-    /// The way of a goal to the node that serves its action.
+    /// Passes a goal to the node that serves its action.
     pub actions: HashMap<Action, Route<ActionRequest>>,
-    /// The way of a message to the node that listens to its topic.
+    /// Passes a message to the node that subscribes to its topic.
     pub listeners: HashMap<Topic, Route<TopicMessage>>,
     /// The node that publishes each of the runtime's topics.
     pub publishers: HashMap<Topic, Recipient<Interest>>,
 }
 
 impl Nodes {
-    /// A row of a node's table: calls of `service` are this question.
+    /// Adds a row to a node's table: calls of `service` are this question.
     pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
         self.route(service, node.into(), || AnswerForm::Short(A::write));
     }
 
-    /// The same where the answer may be long.
+    /// The same for a service with a possibly long answer.
     pub fn serve_long<A: Streamed>(
         &mut self,
         service: Service,
@@ -77,10 +78,10 @@ impl Nodes {
     }
 }
 
-/// Reads arguments of `length` bytes: long ones on another thread, while the client's next frames wait.
+/// Reads arguments of `length` bytes. Long ones are read on another thread, while the client's next frames wait.
 pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
     if length > LONG_ARGUMENTS {
-        // Boxed, for every kind of task is compiled anew: there is one then, not one for each service.
+        // The task is boxed, so only one kind is compiled, and not one for each service.
         let read: Box<dyn FnOnce() + Send> = Box::new(read);
         actix_rt::spawn(aside(WorkKind::of(length), read));
     } else {

@@ -1,6 +1,6 @@
-//! A client that has asked: it waits for an answer, which is written for it.
+//! A client that waits for an answer.
 //!
-//! **Invariant:** errors are reported by the thread that would have written the answer.
+//! **Invariant:** the thread that writes the answer also reports errors.
 
 use bytes::Bytes;
 
@@ -10,17 +10,17 @@ use crate::actors::node::{Asker, Done, Pieces, Unserved};
 use crate::actors::resources::memory::NoRoom;
 use crate::services::{Address, ResponseWriter};
 
-/// A client that has asked for a `T`.
+/// A client that waits for a `T`.
 pub(super) struct ClientAsker<T> {
     pub(super) caller: Caller,
     pub(super) form: AnswerForm<T>,
 }
 
-/// How an answer is written.
+/// The writer of an answer.
 pub(super) enum AnswerForm<T> {
     /// At once, by the registry.
     Short(fn(T, &Address) -> Bytes),
-    /// A piece at a time.
+    /// In pieces.
     Long(fn(T, &Address) -> Box<dyn ResponseWriter>),
 }
 
@@ -75,7 +75,7 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
 /// A response that is being written.
 struct Writing {
     caller: Caller,
-    /// None once the response is on its way.
+    /// `None` once the response has been sent.
     writer: Option<Box<dyn ResponseWriter>>,
 }
 

@@ -1,9 +1,9 @@
 //! Forward dynamics by an articulated-body recursion in which nothing cancels.
 //!
-//! A joint transmits a force and an effort, and the effort is known. So link `i` with everything beyond it is, to the
-//! link before, a relation between the acceleration `p` of its joint and the force `f` through it. This is `f = A p +
-//! B`, with a symmetric positive definite 2×2 tensor `A`. One pass from the tip to the base finds every `A` and `B`,
-//! one pass back the accelerations.
+//! A joint transmits a force and an effort, and the effort is known. So link `i` and all links beyond it act on the
+//! previous link as `f = A p + B`: the force `f` through the joint depends on the joint's acceleration `p`. `A` is a
+//! symmetric positive definite 2×2 tensor. A pass from the tip to the base computes every `A` and `B`. A second pass
+//! from the base to the tip computes the accelerations.
 //!
 //! In the frame of link `i` (x along it, y across it) and in units of its mass, let its tip carry `A = (a b; b c)` and
 //! `B`. With `u = (τ_i - τ_{i+1}) / (m_i l_i)`, `w = l_i φ̇_i²`, `W = 1 + 3c`, `X = 1 + a + 3c + 3 det A` and `E = det
@@ -17,24 +17,24 @@
 //! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
 //! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
-//! A link needs one quotient, `1 / (W X)`, whose result is waited for longest. So everything that can be is computed
-//! beside it, and few operations follow a number that is late. For the outermost link, which carries nothing, `A'` is
-//! `1/4 + 3/4 x xᵀ`.
+//! A link needs one quotient, `1 / (W X)`. A division has the longest latency, so all independent terms are computed
+//! meanwhile, and few operations depend on the result. For the outermost link, which carries nothing, `A'` is `1/4 +
+//! 3/4 x xᵀ`.
 //!
-//! The masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares when
-//! they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the same
-//! two directions, because a heavy tip makes `x` 1e9 times `d`. As a plain vector, the rounding error of its stiff part
-//! would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise. Rotations
-//! are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
-//! acceleration of the base. Without it nothing depends on where the first link points to, and
-//! [`super::weightless_dynamics`] leaves out that angle's sine and cosine.
+//! The masses enter only through sums of positive terms. `A'` is kept as two squares, because a rotation into the frame
+//! of the previous link keeps squares. A rotated matrix would have cancellation. `B'` is kept along the same two
+//! directions, because a heavy tip makes `x` 1e9 times `d`. As a plain vector, the rounding error of its stiff part
+//! would bury the soft one. `E` comes from these parts too. Without either of the two, up to ten digits are lost.
+//! Rotations are composed joint by joint, so a joint angle of 1e8 rad loses no digits either. Gravity is an upward
+//! acceleration of the base. Without gravity nothing depends on the first joint angle, and
+//! [`super::weightless_dynamics`] omits its sine and cosine.
 //!
-//! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
-//! heavy tip (`tests/math/`). Known limit: masses *and* lengths that spread by many powers of ten at once, such as 1e7
-//! kg in 0.1 mm at the end of 500 km of gram-light links. There the joint of the tiny tip may lose eight.
+//! On the stored arms of 1 to 6 links, masses 1e-9 to 1e9 and lengths 1e-6 to 1e6, at most one digit is lost, and 1.2
+//! with a heavy tip (`tests/math/`). Known limit: masses *and* lengths that both differ by many powers of ten, such as
+//! 1e7 kg in 0.1 mm at the end of 500 km of links of a gram. There the last joint may lose eight digits.
 //!
-//! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics
-//! Algorithms* (2008), ch. 7; the split into two directions is our own.
+//! **Invariant:** every arm and every n uses this one kernel. Source of the method: Featherstone, *Rigid Body
+//! Dynamics Algorithms* (2008), ch. 7; the split into two directions is our own.
 
 #![allow(
     clippy::indexing_slicing,
@@ -47,8 +47,8 @@ use crate::math::trig;
 
 const THIRD: f64 = 1.0 / 3.0;
 
-/// The joint accelerations of one arm or of several side by side, with or without gravity.
-#[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
+/// The joint accelerations of one arm, or of several side by side, with or without gravity.
+#[inline(always)] // inlined: the recursion is unrolled, and constants at both ends are folded
 pub(in crate::math) fn recursion<T: Number, const N: usize, const HAS_GRAVITY: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
@@ -64,7 +64,7 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const HAS_GRAVITY: b
     recursion_along::<T, N, HAS_GRAVITY>(rods, gravity, (&sin, &cos), qd, tau)
 }
 
-/// The recursion from the sines and cosines of all angles; where nothing weighs, the first are not looked at.
+/// The recursion, given the sines and cosines of all angles. Without gravity the first pair is not used.
 #[inline(always)]
 pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool>(
     rods: &[Rod<T>; N],
@@ -87,8 +87,8 @@ pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool
         transmitted * rods[i].per_mass_length
     });
 
-    // From the tip to the base: the inertia and bias that each link carries, and how its tip will
-    // answer the one before.
+    // From the tip to the base: the inertia and bias that each link carries, and the acceleration
+    // of its tip as a function of the previous tip's.
     let mut carried = Carried::nothing(zero);
     let mut hinges = [Hinge::none(zero); N];
     let mut per_w = [zero; N];
@@ -104,7 +104,7 @@ pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool
     }
     per_w[0] = zero.like(1.0) / carried.big_w;
 
-    // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
+    // From the base to the tip: the accelerations. Gravity is an upward acceleration of the base.
     let u3 = if N > 1 { tau[0] - tau[1] } else { tau[0] } * (rods[0].per_mass_length * 3.0);
     let free = u3 - carried.bias_y3;
     let (mut tip, mut inner);
@@ -136,11 +136,11 @@ pub(super) fn recursion_along<T: Number, const N: usize, const HAS_GRAVITY: bool
     relative
 }
 
-/// Sines and cosines of all angles but the first, for which those of 0 stand.
+/// Sines and cosines of all angles except the first, which counts as 0.
 #[inline(always)]
 fn sin_cos_beyond_first<T: Number, const N: usize>(q: &[T; N]) -> ([T; N], [T; N]) {
-    // The constant stands last, where the compiler takes its sine and cosine and finds the others side by side. With it
-    // in front a step of 3 links takes fewer instructions and half as long again.
+    // The constant is last, so the compiler evaluates its sine and cosine itself and finds the other angles side by
+    // side. If it is first, a step of 3 links takes fewer instructions but 1.5 times as long.
     let zero = q[0].like(0.0);
     let beyond = entries!(zero, i => if i + 1 < N { q[i + 1] } else { zero });
     let (sin, cos) = trig::sin_cos(&beyond);
@@ -169,8 +169,8 @@ impl<T: Number> Planar<T> {
     }
 }
 
-/// How the tip of a link accelerates across it: `free - x p_x - y p_y`, if the tip of the link before, in whose frame
-/// `p` is, accelerates by `p`; `W` times over.
+/// The acceleration of a link's tip across the link, times `W`: `free - x p_x - y p_y`. `p` is the acceleration of
+/// the previous link's tip, in that link's frame.
 #[derive(Clone, Copy)]
 struct Hinge<T> {
     free: T,
@@ -189,8 +189,8 @@ impl<T: Number> Hinge<T> {
     }
 }
 
-/// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by
-/// what the link needs of it.
+/// The load at the tip of a link, `A = (a b; b c)` and `B`, in the frame of that link and per unit of its mass.
+/// The fields are the terms that the link uses.
 #[derive(Clone, Copy)]
 struct Carried<T> {
     a: T,
@@ -240,7 +240,7 @@ impl<T: Number> Carried<T> {
         }
     }
 
-    /// How the tip that carries this answers its joint, `W` times over.
+    /// The acceleration of the tip that carries this, as a function of its joint's acceleration, times `W`.
     #[inline(always)]
     fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
         Hinge {
@@ -250,7 +250,7 @@ impl<T: Number> Carried<T> {
         }
     }
 
-    /// Adds the rod that carries this and turns about its joint.
+    /// Adds the rod that carries this load and turns about its joint.
     #[inline(always)]
     fn with_rod(&self, u: T, w: T) -> Body<T> {
         let big_w = self.big_w;
@@ -269,8 +269,9 @@ impl<T: Number> Carried<T> {
     }
 }
 
-/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass. Every product and
-/// sum is made before the one quotient that all of it needs, and that is waited for longest.
+/// The load of a link and all links beyond it on the link's joint, in the link's frame, per unit of its mass. Every
+/// product and sum that does not depend on the quotient is computed before it, because the division has the longest
+/// latency.
 #[derive(Clone, Copy)]
 struct Body<T> {
     big_w: T,
@@ -294,13 +295,13 @@ impl<T: Number> Body<T> {
         self.big_x * self.quotient
     }
 
-    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link in that
-    /// frame.
+    /// The same in the frame of the previous link and per unit of *its* mass. The argument is the direction of this
+    /// link in that frame.
     #[inline(always)]
     fn turned(&self, u: T, mass_ratio: T, x_axis: Planar<T>) -> Carried<T> {
         let Planar { x, y } = x_axis;
         let (m, m3) = (mass_ratio, mass_ratio * 3.0);
-        // X v, W X d and the axes by which the soft part goes.
+        // X v, W X d and the axes of the soft part.
         let v = Planar::new(
             self.big_x * x + self.half_b * y,
             self.big_x * y - self.half_b * x,
@@ -313,7 +314,7 @@ impl<T: Number> Body<T> {
             self.phi * v.x - self.psi * (half_w * y),
             self.phi * v.y + self.psi * (half_w * x),
         );
-        // E, from its stiff and its soft part.
+        // E, as the sum of its stiff and soft part.
         let psi = (u + self.psi * half_w * q) * self.big_x;
         let d_phi = self.d * self.phi;
         let e3 = Planar::new(

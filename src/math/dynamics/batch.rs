@@ -1,8 +1,8 @@
-//! Accelerations of one arm in many states, a lane of the machine's registers for each.
+//! Accelerations of one arm in many states, with one SIMD lane per state.
 //!
-//! Numbers come and go in columns, a slice per joint, which registers are filled from without a shuffle.
+//! Input and output are columns, one slice per joint, so registers are loaded without a shuffle.
 //!
-//! **Invariant:** every state has the bits that [`super::forward_dynamics`] gives, in every batch.
+//! **Invariant:** every result is bit-identical to [`super::forward_dynamics`], in every batch.
 
 #![allow(
     clippy::indexing_slicing,
@@ -15,11 +15,11 @@ use super::recursion;
 use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Arithmetic, Number, Registers, Wide, entries};
 
-/// A column per joint: entry `k` of each is of state `k`.
+/// One column per joint. Entry `k` of each column belongs to state `k`.
 pub type Columns<'a, const N: usize> = [&'a [f64]; N];
 
 impl Registers {
-    /// Does [`forward_dynamics`] in these registers.
+    /// Computes [`forward_dynamics`] with registers of one width.
     pub fn forward_dynamics<const N: usize>(
         self,
         arm: &Arm<N>,
@@ -43,9 +43,9 @@ impl Registers {
 }
 
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
-/// The shortest column decides the number of states; longer columns of `qdd` keep the rest of theirs.
+/// The shortest column decides the number of states. Entries of `qdd` beyond it do not change.
 ///
-/// Never panics, and is as finite as [`super::forward_dynamics`].
+/// Never panics. A result is finite exactly if [`super::forward_dynamics`] returns a finite one.
 ///
 /// ```
 /// use pendularm::math::{arm::Arm, dynamics::batch};
@@ -71,7 +71,7 @@ pub fn forward_dynamics<const N: usize>(
     Registers::widest().forward_dynamics(arm, q, qd, tau, qdd);
 }
 
-/// States too few to fill the registers are taken one by one.
+/// If there are too few states to fill the registers, they are computed one by one.
 fn alone<const N: usize>(
     arm: &Arm<N>,
     given: [Columns<'_, N>; 3],
@@ -87,8 +87,8 @@ fn alone<const N: usize>(
     }
 }
 
-/// Takes as many registers at a time as there is room for: a second one hides what the first waits for, and costs more
-/// than that where there are 16.
+/// Processes two registers at a time if the machine has enough of them. The second one hides the latency of the first;
+/// with only 16 registers it costs more than it saves.
 #[inline(always)]
 fn in_registers<S: Simd, const N: usize>(
     simd: S,
@@ -104,8 +104,8 @@ fn in_registers<S: Simd, const N: usize>(
     }
 }
 
-/// States from the first on. The last registers begin earlier where the states do not fill them, and take some a second
-/// time.
+/// Processes all states in order. If the last states do not fill their registers, those start earlier, and some states
+/// are computed twice.
 #[inline(always)]
 fn together<S: Simd, const K: usize, const N: usize>(
     simd: S,
@@ -132,7 +132,7 @@ fn together<S: Simd, const K: usize, const N: usize>(
     }
 }
 
-/// A rod that is the same in all lanes.
+/// The same rod in all lanes.
 #[inline(always)]
 fn in_lanes<T: Number>(rod: &Rod, any: T) -> Rod<T> {
     Rod {

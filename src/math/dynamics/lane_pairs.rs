@@ -1,10 +1,11 @@
-//! One arm in the lower lanes of registers of two, sines and cosines in both: the fastest layout on baseline `x86-64`.
+//! One arm in the lower lanes of two-lane registers, with sines and cosines in both lanes: the fastest layout on
+//! baseline `x86-64`.
 //!
-//! Left to itself, the compiler packs numbers of the recursion in pairs as it finds them. That saves instructions, but
-//! each pair is shuffled together and apart where the next result is waited for: with 3 links a third of the time.
-//! Values that are in a register of two from the start stay as they are.
+//! The compiler alone packs numbers of the recursion into pairs. That saves instructions, but shuffles each pair on
+//! the critical path: with 3 links a third of the time. Values that are in a two-lane register from the start need no
+//! shuffle.
 //!
-//! **Invariant:** the bits are those of the same recursion over plain numbers.
+//! **Invariant:** results are bit-identical to the same recursion over plain numbers.
 
 #![allow(
     clippy::indexing_slicing,
@@ -18,7 +19,7 @@ use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Arithmetic, Number, Wide, entries};
 use crate::math::trig;
 
-/// Forward dynamics as in [`super::forward_dynamics`], with gravity or without.
+/// Computes [`super::forward_dynamics`], with or without gravity.
 #[inline(always)]
 pub(super) fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
     simd: Sse2,
@@ -51,7 +52,7 @@ pub(super) fn accelerations<const N: usize, const HAS_GRAVITY: bool>(
     accelerations
 }
 
-/// A number beside 0, where a number that is loaded stands anyway.
+/// A number in the lower lane and 0 in the upper, as after a load.
 #[inline(always)]
 fn alone<S: Simd<f64s = f64x2<S>>>(simd: S, value: f64) -> Wide<S, 1> {
     Wide::two(simd, value, 0.0)

@@ -10,8 +10,8 @@
 //! | G | gravity load, gradient of the potential energy | n, N m | [`gravity_load`] |
 //! | q̈ | joint accelerations | n, rad/s² | [`textbook`], [`forward_dynamics`] |
 //!
-//! [`textbook`] is this line as it stands. The arm itself steps with [`forward_dynamics`], a recursion along the
-//! links. It needs no matrix and loses up to ten digits less on uneven arms. A test holds the two together.
+//! [`textbook`] evaluates this equation directly. The arm itself steps with [`forward_dynamics`], a recursion
+//! along the links. It needs no matrix and loses up to ten digits less on uneven arms. A test compares the two.
 //!
 //! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i` with unit vectors `u_i = (cos φ_i, sin φ_i)`,
 //! the Lagrangian is
@@ -20,10 +20,10 @@
 //!
 //! where `γ_i = m_i/2 + m_{i+1} + … + m_n`, `μ_ij = γ_max(i,j)` for `i ≠ j`, and `μ_ii = m_i/3 + m_{i+1} + … + m_n`.
 //! Since `φ̇_i` is the sum of the first `i` joint rates, the effort about joint `i` is the sum of the efforts about the
-//! links `i…n`. So joint-space terms are sums over outer links of the terms of this Lagrangian.
+//! links `i…n`. So a joint-space term is a sum of this Lagrangian's terms over the outer links.
 //!
-//! **Invariant:** one derivation for every n; no branch on the number of links. Source: Spong, Hutchinson
-//! and Vidyasagar, *Robot Modeling and Control* (2006), ch. 7.
+//! **Invariant:** one derivation holds for every n, without a branch on the number of links. Source:
+//! Spong, Hutchinson and Vidyasagar, *Robot Modeling and Control* (2006), ch. 7.
 
 #![allow(
     clippy::indexing_slicing,
@@ -48,7 +48,7 @@ use glam::DVec2;
 /// Joint accelerations `q̈ = M⁻¹ (τ - C q̇ - G)` \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the
 /// efforts `tau` \[N m\].
 ///
-/// Not finite where rounding leaves `M` no longer positive definite, as on very uneven arms.
+/// The result is not finite if rounding makes `M` indefinite, as on very uneven arms.
 ///
 /// ```
 /// use pendularm::math::arm::Arm;
@@ -106,8 +106,7 @@ pub fn solve<const N: usize>(m: &[[f64; N]; N], y: [f64; N]) -> [f64; N] {
 #[must_use]
 pub fn mass_matrix<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [[f64; N]; N] {
     let u = directions(q);
-    // Joint i moves the links a >= i, joint j the links b >= j. Summed for i >= j only, so that M is symmetric to the
-    // bit.
+    // Joint i moves the links a >= i, joint j the links b >= j. Only i >= j is summed, so M is exactly symmetric.
     let entry = |i: usize, j: usize| -> f64 {
         let row = |a: usize| {
             (j..N)
@@ -161,7 +160,8 @@ pub fn inverse_dynamics<const N: usize>(
     }))
 }
 
-/// Kinetic energy \[J\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\]; a sum of squares, so never negative.
+/// Kinetic energy \[J\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\]. It is a sum of squares, so it is
+/// never negative.
 #[must_use]
 pub fn kinetic_energy<const N: usize>(arm: &Arm<N>, q: &[f64; N], qd: &[f64; N]) -> f64 {
     let u = directions(q);
@@ -203,8 +203,8 @@ pub(crate) fn weight_moment<const N: usize>(arm: &Arm<N>, i: usize) -> f64 {
     arm.gravity() * (0.5 * arm.masses()[i] + arm.rods[i].beyond) * arm.lengths()[i]
 }
 
-/// Unit vectors along the links. Rotations are composed joint by joint: the sum of wound joint angles would lose
-/// the digits that their sines and cosines still have.
+/// Unit vectors along the links. Rotations are composed joint by joint. A sum of large joint angles would lose
+/// digits that their sines and cosines still have.
 fn directions<const N: usize>(q: &[f64; N]) -> [DVec2; N] {
     let (sin, cos) = trig::sin_cos(q);
     let mut direction = DVec2::X;

@@ -7,8 +7,8 @@ use crate::math::arm::Arm;
 
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
 ///
-/// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
-/// of `f64` (mass ratios of about 1e75 between neighbours).
+/// Never panics. The result is not finite if the input is not, or if an intermediate value exceeds the range of
+/// `f64` (mass ratios of about 1e75 between neighbours).
 #[must_use]
 #[inline(always)]
 pub fn forward_dynamics<const N: usize>(
@@ -20,8 +20,8 @@ pub fn forward_dynamics<const N: usize>(
     accelerations::<N, true>(arm, q, qd, tau)
 }
 
-/// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
-/// for fewer instructions. The first angle is not looked at, not even whether it is finite.
+/// [`forward_dynamics`] of an arm without gravity, in fewer instructions. The results are bit-identical, except the
+/// sign of an acceleration of zero. The first angle is not used, and need not be finite.
 #[must_use]
 #[inline(always)]
 pub fn weightless_dynamics<const N: usize>(

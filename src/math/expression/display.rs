@@ -1,4 +1,4 @@
-//! Writes an expression as text: one spelling for each program, with no parenthesis that the grammar does not need.
+//! Writes an expression as text: one spelling for each program, with only the necessary parentheses.
 //!
 //! **Invariant:** the text parses to the very same program.
 
@@ -9,7 +9,7 @@ use super::program::{Arity, Operation, Precedence};
 
 /// A part that is still to be written.
 enum Part {
-    /// The operand that ends at this operation, in parentheses if it binds looser than the level.
+    /// The operand that ends at this operation. It gets parentheses if its level is below the given one.
     Operand {
         root: usize,
         level: Precedence,
@@ -20,7 +20,7 @@ enum Part {
 impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let starts = self.starts();
-        // Operands are written from left to right, which is the order of the literals.
+        // Operands are written from left to right, in the order of the literals.
         let mut literals = self.0.literals.iter();
         let mut pieces = Vec::new();
         if let Some(root) = self.0.ops.len().checked_sub(1) {
@@ -103,7 +103,7 @@ impl Expression {
     }
 }
 
-/// The loosest that the left and the right operand may be without parentheses.
+/// The lowest levels at which the left and the right operand need no parentheses.
 fn operand_levels(op: Operation) -> (Precedence, Precedence) {
     match op.level() {
         Precedence::Sum => (Precedence::Sum, Precedence::Product),
@@ -137,7 +137,7 @@ fn write_atom<'a>(
     }
     let value = literals.next().copied().unwrap_or_default();
     if value.is_infinite() {
-        // The grammar has no name for infinity; any literal beyond the range of f64 is one.
+        // The grammar has no name for infinity, but a literal beyond the range of f64 is infinite.
         f.write_str("1e999")
     } else if value == 0.0 || (1e-5..1e16).contains(&value) {
         write!(f, "{value}")

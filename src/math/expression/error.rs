@@ -1,19 +1,19 @@
-//! The faults of an expression, in sentences for the person who wrote it.
+//! The faults of an expression, as sentences for its author.
 //!
 //! **Invariant:** a message is short and printable for every text. A quotation in it is escaped and shortened.
 
 use std::fmt;
 
-/// Longest piece of the text that a message repeats, in characters: enough to recognise the place.
+/// Longest quotation of the text in a message, in characters: enough to recognise the place.
 const MAX_QUOTED: usize = 20;
 
 /// Why a text is not an expression. Columns count characters, from 1.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExpressionError {
-    /// Nothing but white space.
+    /// The text has only white space.
     #[error("expected an expression in t, found an empty text")]
     Empty,
-    /// A character that no token has.
+    /// A character that is in no token.
     #[error("unrecognized character {found} at column {column}")]
     UnrecognizedCharacter {
         /// Its position.
@@ -21,7 +21,7 @@ pub enum ExpressionError {
         /// The character.
         found: Found,
     },
-    /// A name that is neither the variable nor a function.
+    /// A name that is neither `t` nor a function.
     #[error(
         "unknown name {found} at column {column}: \
          the variable is t, the functions are sin, cos, tan, exp, sqrt, ln and abs"
@@ -37,10 +37,10 @@ pub enum ExpressionError {
     ExpectedDigit {
         /// Position of the missing digit.
         column: usize,
-        /// The number as far as it goes.
+        /// The number up to this position.
         found: Found,
     },
-    /// Something else where a value must start.
+    /// A token that cannot start a value, where a value must start.
     #[error("expected a number, t, a function, - or ( at column {column}, found {found}")]
     ExpectedOperand {
         /// Position of the missing value.
@@ -48,7 +48,7 @@ pub enum ExpressionError {
         /// The text there.
         found: Found,
     },
-    /// Something else where only an operator or a closing parenthesis can follow.
+    /// A token other than an operator or a closing parenthesis after a value.
     #[error("expected an operator at column {column}, found {found}")]
     ExpectedOperator {
         /// Position of the missing operator.
@@ -66,13 +66,13 @@ pub enum ExpressionError {
         /// The text there.
         found: Found,
     },
-    /// A closing parenthesis too many.
+    /// A closing parenthesis without an opening one.
     #[error("the ) at column {column} closes nothing")]
     Unopened {
         /// Its position.
         column: usize,
     },
-    /// A closing parenthesis too few.
+    /// An opening parenthesis without a closing one.
     #[error("the ( at column {column} is never closed")]
     Unclosed {
         /// Position of the innermost open one.
@@ -80,12 +80,12 @@ pub enum ExpressionError {
     },
 }
 
-/// The text at a place, fit to be printed.
+/// The text at a place, in a printable form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Found {
     /// A piece of the text, at most 20 characters of it, escaped.
     Text(String),
-    /// Nothing more.
+    /// The end of the text.
     End,
 }
 

@@ -1,6 +1,6 @@
-//! Cuts the text of an expression into numbers, names and signs.
+//! Splits the text of an expression into numbers, names and signs.
 //!
-//! **Invariant:** every byte is looked at a bounded number of times, and tokens borrow from the text.
+//! **Invariant:** every byte is read a bounded number of times, and tokens borrow from the text.
 
 use super::error::{ExpressionError, Found};
 
@@ -15,7 +15,7 @@ pub(super) enum LexemeKind {
     Sign(u8),
 }
 
-/// A token and where it stands.
+/// A token and its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lexeme<'a> {
     pub(super) kind: LexemeKind,
@@ -24,10 +24,10 @@ pub(super) struct Lexeme<'a> {
     pub(super) start: usize,
 }
 
-/// Gives the tokens one after another.
+/// Iterates over the tokens.
 pub(super) struct Lexer<'a> {
     text: &'a str,
-    /// Offset of what has not been read; always between two characters.
+    /// Offset of the unread rest; always between two characters.
     at: usize,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Lexer<'a> {
         Ok(Some(Lexeme { kind, text, start }))
     }
 
-    /// The column just after the last character that is not white space. For a text that has been read to its end.
+    /// The column just after the last character that is not white space. The text must have been read to its end.
     pub(super) fn end_column(&self) -> usize {
         column(self.text.trim_ascii_end().len())
     }
@@ -76,7 +76,7 @@ impl<'a> Lexer<'a> {
             return Err(self.expected_digit(start));
         }
         self.exponent(start)?;
-        // The standard library reads exactly the forms that came this far, correctly rounded, in linear time.
+        // The standard library parses exactly these forms, correctly rounded, in linear time.
         let value = self.text.get(start..self.at).map(str::parse);
         debug_assert!(matches!(value, Some(Ok(_))), "digits make a number");
         Ok(LexemeKind::Number(
@@ -84,8 +84,8 @@ impl<'a> Lexer<'a> {
         ))
     }
 
-    /// An `e` right after a number starts its exponent, unless it starts a name (`2exp(t)`): then a name follows a
-    /// number, for which the parser has the better message.
+    /// An `e` right after a number starts its exponent, unless it starts a name (`2exp(t)`). Then the parser
+    /// reports a name after a number, which is the better message.
     fn exponent(&mut self, start: usize) -> Result<(), ExpressionError> {
         let rest = self.text.as_bytes().get(self.at..).unwrap_or_default();
         let [b'e' | b'E', after @ ..] = rest else {
@@ -125,7 +125,7 @@ impl<'a> Lexer<'a> {
         self.text.as_bytes().get(self.at).copied()
     }
 
-    /// Passes over bytes that satisfy the test and says how many they were. They must be ASCII.
+    /// Skips bytes that satisfy the test and returns their number. They must be ASCII.
     fn skip(&mut self, test: impl Fn(u8) -> bool) -> usize {
         let start = self.at;
         while self.peek().is_some_and(&test) {
@@ -135,8 +135,8 @@ impl<'a> Lexer<'a> {
     }
 }
 
-/// The column, from 1, of the character at a byte offset. A text without a mistake, and a text up to its first
-/// mistake, is ASCII: every other character is unrecognized. So bytes are characters there.
+/// The column, from 1, of the character at a byte offset. A text up to its first mistake is ASCII, because
+/// every other character is a mistake. So bytes count characters there.
 pub(super) const fn column(offset: usize) -> usize {
     offset + 1
 }

@@ -9,10 +9,10 @@
 //! | atom | `2.5e-3`, `t`, `(a)`, `sin(a)` and the like | |
 //!
 //! Negation binds tighter than `^`: `-2^2` is `(-2)^2 = 4`, and `2^-1` is `0.5`. There is no unary plus, no named
-//! constant, no implied multiplication. Names are case-sensitive. Values are ordinary `f64`: a domain error is NaN, a
-//! literal too large for `f64`, such as `1e999`, is infinity.
+//! constant and no implied multiplication. Names are case-sensitive. Values are ordinary `f64`. A domain error is
+//! NaN. A literal too large for `f64`, such as `1e999`, is infinity.
 //!
-//! `lexer` cuts the text into tokens, `parser` orders them into the flat postfix `program` that [`Expression`] holds,
+//! `lexer` splits the text into tokens. `parser` orders them into the flat postfix `program` of the [`Expression`].
 //! `display` writes that program as text again.
 //!
 //! **Invariant:** nothing here recurses. Time and memory of parsing, evaluating, printing and dropping grow linearly
@@ -27,11 +27,11 @@ mod program;
 pub use error::{ExpressionError, Found};
 use program::{Operation, Program};
 
-/// An expression in `t`. A value that exists is well-formed.
+/// An expression in `t`. Every value of this type is well-formed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression(Program);
 
-/// Working memory for [`Expression::evaluate_in`], to be allocated once and used for many evaluations.
+/// Working memory for [`Expression::evaluate_in`], allocated once for many evaluations.
 #[derive(Debug, Clone)]
 pub struct Stack(Vec<f64>);
 
@@ -44,7 +44,7 @@ impl Expression {
         parser::parse(text).map(Self)
     }
 
-    /// How many literals, variables, operators and function calls the expression has; parentheses count nothing.
+    /// The number of literals, variables, operators and function calls. Parentheses do not count.
     ///
     /// This is the work of one evaluation.
     #[must_use]
@@ -66,14 +66,14 @@ impl Expression {
 
     /// The value at time `t` \[s\], computed in memory that the caller keeps between evaluations.
     ///
-    /// A stack made for another expression serves as well; it grows once.
+    /// A stack of another expression can be used too; it then grows once.
     #[must_use]
     pub fn evaluate_in(&self, stack: &mut Stack, t: f64) -> f64 {
         let stack = &mut stack.0;
         stack.clear();
         let mut literals = self.0.literals.iter();
-        // The topmost value stays out of the stack: most operations then touch no memory. A value that is pushed below
-        // the very first operand is never taken back.
+        // The topmost value is kept in a variable, so most operations access no memory. The value pushed below the
+        // first operand is never popped.
         let mut top = f64::NAN;
         for op in &self.0.ops {
             match op {
@@ -105,7 +105,7 @@ impl Expression {
     }
 }
 
-/// The left operand. The parser only emits an operation after its operands, so it is there.
+/// The left operand. It exists, because the parser emits an operation only after its operands.
 #[inline(always)]
 fn below(stack: &mut Vec<f64>) -> f64 {
     stack.pop().unwrap_or(f64::NAN)

@@ -1,7 +1,7 @@
-//! Orders the tokens of an expression into a postfix program: Dijkstra's shunting yard, which keeps what is still open
-//! on a stack of its own.
+//! Orders the tokens of an expression into a postfix program, by Dijkstra's shunting-yard algorithm. Its stack holds
+//! operators and parentheses that are not complete.
 //!
-//! **Invariant:** an operation is emitted only after its operands, so that the program of an accepted text leaves
+//! **Invariant:** an operation is emitted only after its operands, so the program of an accepted text leaves
 //! exactly one value.
 
 use super::error::{ExpressionError, Found};
@@ -127,8 +127,8 @@ impl Parser<'_> {
                 });
             }
         };
-        // An operation that binds tighter is complete. So is an equal that groups from the left; only `^` groups from
-        // the right.
+        // An operation that binds tighter is complete. So is one of the same level that groups from the left. Only
+        // `^` groups from the right.
         self.emit_while(|waiting| {
             waiting > op.level() || (waiting == op.level() && waiting != Precedence::Power)
         });
@@ -199,8 +199,8 @@ impl Parser<'_> {
     }
 }
 
-/// Byte offset of the last `(` that nothing closes. Looked up only for the message: remembering the place of every open
-/// parenthesis would cost more memory than the program.
+/// Byte offset of the last `(` that is not closed. It is searched only for the message: positions of all open
+/// parentheses would need more memory than the program.
 fn innermost_open(text: &str) -> usize {
     let mut closed = 0_usize;
     for (offset, byte) in text.bytes().enumerate().rev() {

@@ -1,6 +1,6 @@
-//! The postfix program of an expression, and what its operations are.
+//! The postfix program of an expression, and its operations.
 //!
-//! **Invariant:** an operation is a single byte, so that a program is no larger than its text.
+//! **Invariant:** an operation is a single byte, so a program is no larger than its text.
 
 /// One operation of the postfix program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub(super) enum Operation {
     Abs,
 }
 
-/// How many operands an operation takes off the stack. Every operation puts one value back.
+/// The number of operands that an operation pops. Every operation pushes one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arity {
     Zero,
@@ -85,6 +85,6 @@ pub(super) struct Program {
     pub(super) ops: Vec<Operation>,
     /// The literals in the order written; none is negative or NaN.
     pub(super) literals: Vec<f64>,
-    /// Most values that wait at the same time during an evaluation.
+    /// The largest number of values on the stack during an evaluation.
     pub(super) depth: usize,
 }

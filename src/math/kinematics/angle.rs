@@ -1,9 +1,9 @@
-//! Angles that differ by whole turns: which one is meant.
+//! Selection among angles that differ by whole turns.
 //!
-//! Whole turns are taken away by the sine and cosine, whose argument the platform reduces by all the digits of π.
-//! Subtracting a rounded 2π a million times would cost nine digits of a joint that has wound up.
+//! Sine and cosine remove whole turns, because they reduce their argument with all digits of π. A rounded 2π,
+//! subtracted a million times, would lose nine digits.
 //!
-//! **Invariant:** an angle that is in range already comes back bit for bit.
+//! **Invariant:** an angle that is in range is returned bit for bit.
 
 use crate::math::elementary::{atan2, sin_cos};
 use std::f64::consts::PI;
@@ -34,10 +34,10 @@ pub fn turn(from: f64, to: f64) -> f64 {
     )
 }
 
-/// `solution` \[rad\] with each joint shifted by whole turns to within π of `present`, so that a wound-up arm does not
-/// unwind.
+/// `solution` \[rad\] with each joint shifted by whole turns to within π of `present`, so an arm that has turned many
+/// times does not turn back.
 ///
-/// A `present` that is not finite leaves its joint as it is.
+/// A joint whose `present` is not finite is not shifted.
 #[must_use]
 pub fn nearest_turn<const N: usize>(solution: &[f64; N], present: &[f64; N]) -> [f64; N] {
     let mut shifted = *solution;

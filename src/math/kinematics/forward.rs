@@ -1,7 +1,7 @@
 //! Forward kinematics: from joint angles to points, for any number of links.
 //!
-//! **Invariant:** headings are composed as rotations by the *relative* angles; summing angles first would cost as many
-//! digits as the joints have wound up.
+//! **Invariant:** headings are composed as rotations by the *relative* angles. A sum of large angles would lose
+//! digits.
 
 use glam::DVec2;
 

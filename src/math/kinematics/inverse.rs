@@ -1,52 +1,53 @@
 //! Inverse kinematics of 2 and 3 links in closed form.
 //!
-//! The wrist (the end effector itself for 2 links) is at distance `r` and bearing `β` from the base. The Law of
-//! Cosines closes the triangle `l₁, l₂, r`, and the last link is decoupled from it:
+//! The wrist (the end effector itself for 2 links) is at distance `r` and bearing `β` from the base. The law of
+//! cosines gives the triangle `l₁, l₂, r`. The last link does not depend on it:
 //!
 //! ```text
 //! wrist = target - l₃ (cos φ, sin φ)      q₂ = ±(π - ∠(l₁, l₂))      q₁ = β ∓ ∠(l₁, r)      q₃ = φ - q₁ - q₂
 //! ```
 //!
-//! No angle is taken from a cosine: near the edges of reach half of its digits would be gone. Half-angle forms of the
-//! same law, factored so that only differences of given lengths occur, keep them all (W. Kahan, *Miscalculating Area
-//! and Angles of a Needle-like Triangle*).
+//! No angle is computed from a cosine: near the edges of the reach half of its digits would be lost. Half-angle forms
+//! of the same law keep all digits. They are factored so that only differences of given lengths occur (W. Kahan,
+//! *Miscalculating Area and Angles of a Needle-like Triangle*).
 //!
 //! A 3-link arm that may choose its orientation has the wrist at distance `w`, `w² = r² + l₃² - 2 r l₃ cos θ`, with
-//! `θ = φ - β` and the target at distance `r`. That grows with `|θ|`, so `|l₁ - l₂| ≤ w ≤ l₁ + l₂` admits
-//! `θ₀ ≤ |θ| ≤ θ₁`, whose ends are angles of two more triangles.
+//! `θ = φ - β` and the target at distance `r`. `w` grows with `|θ|`, so `|l₁ - l₂| ≤ w ≤ l₁ + l₂` admits `θ₀ ≤ |θ|
+//! ≤ θ₁`. The ends are angles of two more triangles.
 //!
-//! **Invariant:** what lies up to [`BOUNDARY`] outside the reach is solved as the boundary itself, and nothing else is
-//! ever moved.
+//! **Invariant:** a target up to [`BOUNDARY`] outside the reach is solved as the boundary itself. No other target is
+//! moved.
 
 use glam::DVec2;
 
 use super::{Reach, Target, Unreachable, heading, turn, wrap};
 use crate::math::elementary::{atan2, hypot};
 
-/// How far outside the reach a target still counts as on its edge, as a share of the sum of the lengths. It is far
-/// above the rounding of a boundary computed elsewhere (1e-13), and far below anything that could be meant (1 nm per
-/// metre).
+/// Distance outside the reach at which a target still counts as on its edge, relative to the sum of the lengths. It
+/// is far above the rounding error of a boundary computed elsewhere (1e-13), and far below any intended distance (1
+/// nm per metre).
 pub const BOUNDARY: f64 = 1e-9;
 
-/// Rounding of a wrist's distance, as a share of the sum of the lengths. It is a difference of two vectors of that
-/// size, each good to a few units in the last place.
+/// Rounding error of the wrist's distance, relative to the sum of the lengths. The distance is a difference of two
+/// vectors of that size, each accurate to a few units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Rounding of one joint angle \[rad\]: four units in the last place of π. Poses that differ by less are as near.
+/// Rounding error of one joint angle \[rad\]: four units in the last place of π. Poses that differ by less count
+/// as equally near.
 const ANGLE_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Joint angles \[rad\], each in (-π, π], that put the end effector of an arm with these `lengths` \[m\] on `target`.
 ///
-/// `present` \[rad\] decides what the target leaves open. Of the two elbows the one with the smaller sum of squared
-/// wrapped differences from it is given, and `q₂ ≥ 0` where they are equally near. Three links without an orientation
-/// keep the present one if it is admissible and take the nearest admissible one otherwise, the counter-clockwise one of
-/// two that are equally near. Where the wrist is to be on the base itself, the first joint stays as it is.
+/// `present` \[rad\] selects among several solutions. Of the two elbow poses, the one with the smaller sum of squared
+/// wrapped differences from `present` is returned, or `q₂ ≥ 0` if both are equally near. Three links without an
+/// orientation keep the present orientation if it is admissible. Otherwise they take the nearest admissible one, and of
+/// two equally near ones the counter-clockwise one. If the wrist is on the base, the first joint does not change.
 ///
-/// `lengths` are finite and greater than 0, as an arm's are; a `present` that is not finite counts as 0.
+/// `lengths` must be finite and greater than 0. A `present` that is not finite counts as 0.
 ///
 /// # Errors
 ///
-/// [`Unreachable`] says which limit is exceeded, and by which numbers.
+/// [`Unreachable`] names the exceeded limit and the numbers.
 pub fn solve<const N: usize>(
     lengths: &[f64; N],
     present: &[f64; N],
@@ -85,17 +86,18 @@ pub fn solve<const N: usize>(
     }
 }
 
-/// Lengths in multiples of a power of two near the longest, so that no square or sum of them overflows or vanishes.
+/// Lengths in multiples of a power of two near the longest one, so that no square or sum of them overflows or
+/// underflows.
 struct Chain {
     /// The power of two \[m\]; dividing by it is exact.
     unit: f64,
     l1: f64,
     l2: f64,
-    /// 0 for an arm of two links, whose wrist is its end effector.
+    /// 0 for an arm of two links: its wrist is the end effector.
     l3: f64,
 }
 
-/// On which side of a reach a distance lies.
+/// The position of a distance relative to a reach.
 enum Outside {
     Beyond,
     TooClose,
@@ -114,7 +116,7 @@ impl Chain {
         }
     }
 
-    /// Distances that links 1 and 2 give the wrist.
+    /// The distances from the base that links 1 and 2 allow for the wrist.
     fn wrist_reach(&self) -> Reach {
         Reach::of(&[self.l1, self.l2])
     }
@@ -133,8 +135,8 @@ impl Chain {
 
     /// Refuses a target that is outside the whole arm's `reach`.
     ///
-    /// A target only just outside needs no moving: [`half_angle`] makes triangles flat that do not close, and the flat
-    /// one is the boundary.
+    /// A target just outside is not moved: [`half_angle`] flattens a triangle that does not close, and the flat
+    /// triangle is the boundary.
     fn checked(
         &self,
         reach: Reach,
@@ -175,7 +177,7 @@ impl Chain {
         let Err(side) = self.judged(reach, distance) else {
             return Ok((wrist, wrap(phi)));
         };
-        // If no orientation would help, the sender should hear that.
+        // If no orientation is possible, the error reports that instead.
         self.checked(
             Reach::of(&[self.l1, self.l2, self.l3]),
             end_effector,
@@ -211,8 +213,8 @@ impl Chain {
         let present = heading(present);
         let present_phi = atan2(present.y, present.x);
 
-        // This is asked first, so that a present orientation is kept bit for bit, even on the edge of what is
-        // admissible. On the base itself all orientations are admissible or none.
+        // This is checked first, so an admissible present orientation is kept bit for bit, even at the limit.
+        // On the base itself all orientations are admissible or none.
         let reach = self.wrist_reach();
         let wrist = end_effector - self.l3 * present;
         let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);
@@ -234,7 +236,7 @@ impl Chain {
         Ok((end_effector - self.l3 * DVec2::from_angle(phi), phi))
     }
 
-    /// The joints that put the wrist there and turn the last link along `phi`, with the elbow nearer to `present`.
+    /// The joints for this position of the wrist and the orientation `phi`, with the elbow nearer to `present`.
     fn nearest_elbow<const N: usize>(
         &self,
         wrist: DVec2,
@@ -248,7 +250,7 @@ impl Chain {
         let (sin, cos) = half_angle(self.l1, r, self.l2);
         let lead = 2.0 * atan2(sin, cos);
         let pose = |side: f64| -> [f64; N] {
-            // On the base itself the wrist has no bearing, and any first joint will do.
+            // On the base itself the wrist has no bearing, and any first joint angle is a solution.
             let q1 = if wrist == DVec2::ZERO {
                 present.first().copied().map_or(0.0, wrap)
             } else {
@@ -265,9 +267,10 @@ impl Chain {
     }
 }
 
-/// The pose with the smaller sum of squared wrapped differences from `present`; `first` where they are equally near.
+/// The pose with the smaller sum of squared wrapped differences from `present`; `first` if both are equally near.
 fn nearer<const N: usize>(first: [f64; N], second: [f64; N], present: &[f64; N]) -> [f64; N] {
-    // Sums of the squares and of the sizes of the differences: the latter tell how far the former are rounded.
+    // Sums of the squares and of the absolute values of the differences. The latter bound the rounding error
+    // of the former.
     let measured = |pose: &[f64; N]| {
         pose.iter()
             .zip(present)
@@ -286,11 +289,11 @@ fn nearer<const N: usize>(first: [f64; N], second: [f64; N], present: &[f64; N])
     }
 }
 
-/// Sine and cosine of half the angle between sides `p` and `q` of a triangle whose third side is `w`, both up to one
-/// common factor. Sides that do not close a triangle give the flat one nearest to it.
+/// Sine and cosine of half the angle between sides `p` and `q` of a triangle whose third side is `w`, up to a common
+/// factor. Sides that do not form a triangle give the nearest flat one.
 fn half_angle(p: f64, q: f64, w: f64) -> (f64, f64) {
     let (long, short) = if p >= q { (p, q) } else { (q, p) };
-    // Each difference is taken between the two sides that are nearest in size, where it is exact.
+    // Each difference is between the two sides nearest in size, where it is exact.
     let excess = if short >= w {
         w - (long - short)
     } else {

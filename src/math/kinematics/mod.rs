@@ -1,5 +1,4 @@
-//! The end effector's pose, and the joint positions that put it somewhere: forward and closed-form inverse
-//! kinematics.
+//! Forward kinematics, and inverse kinematics in closed form.
 //!
 //! `x = Σ lᵢ cos φᵢ`, `y = Σ lᵢ sin φᵢ`, `φᵢ = q₁ + … + qᵢ`; angles in rad, counter-clockwise, each relative to the
 //! previous link; the base is the origin.
@@ -29,14 +28,14 @@ pub use inverse::{BOUNDARY, solve};
 pub struct Target {
     /// The place for the end effector \[m\].
     pub position: DVec2,
-    /// Heading that the last link should have, `φₙ` \[rad\]; any that is possible where absent. Ignored for 2 links.
+    /// Heading of the last link, `φₙ` \[rad\]. If it is absent, any possible heading. Ignored for 2 links.
     pub orientation: Option<f64>,
 }
 
 /// The distances from the base \[m\] that the end effector of an arm can have: a ring, or a disc where `inner` is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// Least distance \[m\]: the longest link less all the others together, or 0.
+    /// Least distance \[m\]: the length of the longest link minus the sum of the others, or 0.
     pub inner: f64,
     /// Greatest distance \[m\]: the sum of the lengths.
     pub outer: f64,
@@ -63,10 +62,10 @@ impl Reach {
     }
 }
 
-/// Why no pose of the arm answers a [`Target`].
+/// Why no pose of the arm reaches a [`Target`].
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unreachable {
-    /// The end effector can't be put so far away.
+    /// The target is too far away.
     #[error(
         "target ({}, {}) is {} m from the base, beyond the arm's reach of {} m",
         Shown(*.x), Shown(*.y), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
@@ -81,7 +80,8 @@ pub enum Unreachable {
         /// Greatest distance that the arm reaches \[m\].
         limit: f64,
     },
-    /// The longest link can't be folded back so far by the others (for 2 links: nearer than `|l1 - l2|`).
+    /// The target is too near: the other links cannot fold the longest link back so far (for 2 links:
+    /// nearer than `|l1 - l2|`).
     #[error(
         "target ({}, {}) is {} m from the base, closer than the {} m to which the arm can fold",
         Shown(*.x), Shown(*.y), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
@@ -96,7 +96,7 @@ pub enum Unreachable {
         /// Least distance that the arm reaches \[m\].
         limit: f64,
     },
-    /// With this orientation the last link would have to start farther away than the others reach.
+    /// With this orientation the last link would have to start beyond the reach of the others.
     #[error(
         "phi = {} puts the wrist {} m from the base, beyond the reach of links 1 and 2, {} m",
         Shown(*.phi), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
@@ -109,7 +109,7 @@ pub enum Unreachable {
         /// `l1 + l2` \[m\].
         limit: f64,
     },
-    /// With this orientation the last link would have to start nearer to the base than the others fold.
+    /// With this orientation the last link would have to start nearer to the base than the others can fold.
     #[error(
         "phi = {} puts the wrist {} m from the base, closer than the {} m to which links 1 and 2 can fold",
         Shown(*.phi), shown_against(*.distance, *.limit), shown_against(*.limit, *.distance)
@@ -122,16 +122,16 @@ pub enum Unreachable {
         /// `|l1 - l2|` \[m\].
         limit: f64,
     },
-    /// A coordinate, or the orientation of a 3-link arm, is no number to aim at.
+    /// A coordinate, or the orientation of a 3-link arm, is not finite.
     #[error("{0} must be finite")]
     NotFinite(
-        /// The request's name of it: `x`, `y` or `phi`.
+        /// Its name in the request: `x`, `y` or `phi`.
         &'static str,
     ),
-    /// There is a closed form for 2 and 3 links only.
+    /// A closed form exists only for 2 and 3 links.
     #[error("inverse kinematics is solved for 2 or 3 links, not {0}")]
     Links(
-        /// Links asked for.
+        /// The requested number of links.
         usize,
     ),
 }

@@ -1,5 +1,5 @@
-//! Arithmetic as a method's steps need it: less than dynamics and control do, so that numbers of more digits can be
-//! stepped too.
+//! The arithmetic of a method's steps. It has fewer operations than dynamics and control need, so numbers with more
+//! digits can implement it too.
 //!
 //! **Invariant:** every number of the arm's formulas implements it.
 
@@ -16,7 +16,7 @@ pub trait Arithmetic:
     + Add<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
-    /// `value` as a number of the kind of `self`, in as many lanes.
+    /// `value` as a number of the type of `self`, in every lane.
     #[must_use]
     fn like(self, value: f64) -> Self;
 }

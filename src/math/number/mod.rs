@@ -1,12 +1,13 @@
-//! A number of the arm's formulas: one for one arm, or a few registers full of them, a lane for each of several arms.
+//! The number type of the arm's formulas: a double for one arm, or a few registers with one lane for each of several
+//! arms.
 //!
-//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
-//! done in all lanes alike. Two have to look at a lane by itself, the bound of an integral and the quadrant of an
-//! angle: they select and do not branch.
+//! Dynamics, methods and control law are written once, over [`Number`], for any number of lanes. Every operation
+//! acts on all lanes. Two operations depend on the value in each lane: the bound of an integral and the quadrant of
+//! an angle. They select and do not branch.
 //!
-//! **Invariant:** every operation rounds once, to the nearest, as in IEEE 754, and none is fused with the next but
-//! where that changes nothing. So a lane has the bits of the arm that is stepped alone, on every machine and in
-//! registers of every width.
+//! **Invariant:** every operation rounds once, to the nearest, as in IEEE 754. Operations are fused only where the
+//! result is the same. So a lane is bit-identical to the arm stepped alone, on every machine and for every
+//! register width.
 
 mod arithmetic;
 #[cfg(feature = "batch")]
@@ -20,10 +21,10 @@ pub(super) use register::{Wide, apart};
 #[cfg(feature = "batch")]
 pub use registers::Registers;
 
-/// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
+/// An array with an entry for each `$i`. Its length is that of the destination; `$any` is any number of the type.
 ///
-/// A loop in place of [`std::array::from_fn`], whose closures the compiler may leave as functions of their own. There
-/// the wide registers are not switched on, and every operation in them would be a call.
+/// A loop replaces [`std::array::from_fn`], because the compiler may compile its closures as separate functions. The
+/// wide registers are not enabled there, and every operation would be a call.
 macro_rules! entries {
     ($any:expr, $i:ident => $entry:expr) => {{
         let mut entries = [$any; N];
@@ -35,13 +36,12 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// A number, or as many as a few registers have lanes. Constants are the same in all lanes.
+/// A number, or one number per lane of a few registers. Constants are the same in all lanes.
 pub trait Number: Arithmetic {
-    /// How many numbers these are.
+    /// The number of lanes.
     const LANES: usize;
 
-    /// `self - factor * other`, of a product that is exact, or so small that it changes nothing: whether it is rounded
-    /// by itself, or not, is the same.
+    /// `self - factor * other`. The product must be exact, or so small that its rounding does not change the result.
     #[must_use]
     fn sub_exact_product(self, factor: Self, other: f64) -> Self;
 
@@ -49,15 +49,15 @@ pub trait Number: Arithmetic {
     #[must_use]
     fn clamped(self, limit: f64) -> Self;
 
-    /// Whether all lanes of all values are sure to be within `±limit`; NaN is not.
+    /// Whether all lanes of all values are certainly within `±limit`. NaN is not.
     fn all_within(values: &[Self], limit: f64) -> bool;
 
-    /// Sine and cosine of an angle, by those of its rest beyond a number of quarter turns, the lowest two bits of
-    /// `self`. An odd number exchanges them, and their signs are those of the quadrant.
+    /// Sine and cosine of an angle, from those of its remainder. The lowest two bits of `self` are the number of
+    /// quarter turns. An odd number exchanges the two, and the quadrant gives their signs.
     #[must_use]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self);
 
-    /// The number in a lane.
+    /// Returns the number in a lane.
     fn lane(&self, lane: usize) -> f64;
 
     /// Puts a number into a lane.

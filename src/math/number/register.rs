@@ -1,9 +1,9 @@
-//! One or two registers full of numbers, each as wide as the machine's are.
+//! One or two SIMD registers of numbers.
 //!
-//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations
-//! ahead, then always has one to do while another waits for its result.
+//! Every operation is done in both registers, one after the other. While one waits for a result, the
+//! processor can execute the other, because it looks some hundred operations ahead.
 //!
-//! **Invariant:** as in [`super`]: a lane has the bits of one number.
+//! **Invariant:** a lane is bit-identical to a single number, as in [`super`].
 
 #![allow(
     clippy::indexing_slicing,
@@ -17,8 +17,8 @@ use fearless_simd::prelude::*;
 
 use super::{Arithmetic, Number};
 
-/// `$do` for each register, 0 and, if there are two, 1: not as a loop, which the compiler would first have to take
-/// apart for every operation there is.
+/// `$do` for register 0 and, if there are two, register 1. This is not a loop, because the compiler would have to
+/// unroll it for every operation.
 macro_rules! each_register {
     ($i:ident => $do:block) => {{
         {
@@ -32,7 +32,7 @@ macro_rules! each_register {
     }};
 }
 
-/// As many numbers as `K` registers of `S` have lanes; `K` is 1 or 2.
+/// The numbers in all lanes of `K` registers of `S`; `K` is 1 or 2.
 #[derive(Clone, Copy)]
 pub(in crate::math) struct Wide<S: Simd, const K: usize>([S::f64s; K]);
 
@@ -40,7 +40,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     /// Whether there is a second register.
     const TWO: bool = K == 2;
 
-    /// How many lanes one register has.
+    /// The number of lanes of one register.
     pub(in crate::math) const WIDTH: usize = S::f64s::LEN;
 
     /// `value` in all lanes.
@@ -49,13 +49,13 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         Self([S::f64s::splat(simd, value); K])
     }
 
-    /// The proof that the machine has such registers.
+    /// The token that proves that the machine has such registers.
     #[inline(always)]
     pub(in crate::math) fn token(self) -> S {
         self.0[0].token()
     }
 
-    /// The first numbers of `column`, one in each lane; there are enough.
+    /// Loads the first numbers of `column`, one into each lane. `column` must have enough.
     #[inline(always)]
     pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
         let mut loaded = [S::f64s::splat(simd, 0.0); K];
@@ -65,7 +65,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         Self(loaded)
     }
 
-    /// Puts the number of each lane into `column`, which has room for them.
+    /// Stores the number of each lane in `column`, which must be long enough.
     #[inline(always)]
     pub(in crate::math) fn store(self, column: &mut [f64]) {
         each_register!(i => {
@@ -95,13 +95,13 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     }
 }
 
-/// Does something with the machine's registers, in a function of its own: compiled once for all who call it.
+/// Runs a closure with the machine's registers enabled, in a separate function that is compiled once for all callers.
 #[inline(never)]
 pub(in crate::math) fn apart<S: Simd, R>(simd: S, work: impl FnOnce() -> R) -> R {
     simd.vectorize(work)
 }
 
-/// A register of two, as plain `x86-64` has them.
+/// A register of two lanes, as on plain `x86-64`.
 #[cfg(target_arch = "x86_64")]
 impl<S: Simd<f64s = f64x2<S>>> Wide<S, 1> {
     /// A number in each lane.
@@ -110,7 +110,7 @@ impl<S: Simd<f64s = f64x2<S>>> Wide<S, 1> {
         Self([f64x2::simd_from(simd, [lower, upper])])
     }
 
-    /// The number of the upper lane in both.
+    /// The number of the upper lane, in both lanes.
     #[inline(always)]
     pub(in crate::math) fn upper(self) -> Self {
         let [register] = self.0;
@@ -202,7 +202,7 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
         let [first, rest @ ..] = values else {
             return true;
         };
-        // The sum of all squares is compared: if it is within the bound, so is every one.
+        // The sum of all squares is compared: if it is within the bound, so is every square.
         let mut sums = first.0;
         each_register!(i => {
             sums[i] = sums[i] * sums[i];
@@ -252,7 +252,7 @@ fn turned<S: Simd>(shifted: S::f64s, sine: S::f64s, cosine: S::f64s) -> (S::f64s
     let quadrant: S::u64s = shifted.bitcast();
     let (sin, cos): (S::u64s, S::u64s);
     if S::f64s::LEN == 2 {
-        // Plain `x86-64` compares no integers of this length.
+        // Plain `x86-64` has no comparison of integers of this length.
         let odd = S::u64s::splat(simd, 0) - (quadrant & one);
         let (sine, cosine): (S::u64s, S::u64s) = (sine.bitcast(), cosine.bitcast());
         let exchange = (sine ^ cosine) & odd;

@@ -1,6 +1,6 @@
 //! The registers that this machine has.
 //!
-//! **Invariant:** a level is one that the processor was asked for and has.
+//! **Invariant:** a level is used only if the processor reports it.
 
 use std::sync::OnceLock;
 
@@ -8,7 +8,7 @@ use fearless_simd::{Level, Simd, dispatch};
 
 use super::register::Wide;
 
-/// Registers of one width, whose lanes arms or states share.
+/// Registers of one width. Each lane holds one arm or state.
 #[derive(Debug, Clone, Copy)]
 pub struct Registers(Level);
 
@@ -16,12 +16,12 @@ impl Registers {
     /// The widest registers of the machine.
     #[must_use]
     pub fn widest() -> Self {
-        // The processor is asked once.
+        // The processor is queried once.
         static LEVEL: OnceLock<Level> = OnceLock::new();
         Self(*LEVEL.get_or_init(Level::new))
     }
 
-    /// All registers of the machine, the widest first. Results are the same in all of them.
+    /// All register widths of the machine, the widest first. Results are the same for all.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let widest = Self::widest();
@@ -41,13 +41,13 @@ impl Registers {
         all
     }
 
-    /// How many numbers one register has.
+    /// The number of lanes of one register.
     #[must_use]
     pub fn lanes(self) -> usize {
         dispatch!(self.0, simd => lanes_of(simd))
     }
 
-    /// Their name in the library of registers.
+    /// Their name in the SIMD library.
     pub(in crate::math) fn level(self) -> Level {
         self.0
     }

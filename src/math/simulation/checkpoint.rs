@@ -1,6 +1,6 @@
-//! A simulation as plain values, to be kept outside the program and continued from there.
+//! A simulation as plain values, which can be stored outside the program and continued later.
 //!
-//! **Invariant:** a simulation that is continued takes the same steps, bit for bit, as the one that was kept.
+//! **Invariant:** a continued simulation takes the same steps, bit for bit, as the stored one would.
 
 use super::hold::{Held, Hold};
 use super::{Disturbance, Divergence, Simulation};
@@ -8,20 +8,20 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Pid, Setpoint};
 
-/// All that a simulation is, between two steps.
+/// The whole state of a simulation between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checkpoint<const N: usize> {
     /// Lengths, masses and gravity.
     pub arm: Arm<N>,
     /// The controller's gains.
     pub gains: Gains<N>,
-    /// The setpoint at which the arm is to be held.
+    /// The setpoint of the controller.
     pub setpoint: Setpoint<N>,
     /// Integral of the position error \[rad s\].
     pub integral: [f64; N],
     /// Whether the controller is on.
     pub enabled: bool,
-    /// When the control law runs, and the efforts that are held.
+    /// When the control law runs, and the held efforts.
     pub held: Held<N>,
     /// The method that takes the steps.
     pub method: Method,
@@ -33,20 +33,20 @@ pub struct Checkpoint<const N: usize> {
     pub carry: State<N>,
     /// Effort of the latest step \[N m\].
     pub effort: [f64; N],
-    /// Effort \[N m\] that is added until a simulation time \[s\].
+    /// Effort \[N m\] that is added until this simulation time \[s\].
     pub disturbance: Option<([f64; N], f64)>,
-    /// Simulation time when this timestep came into force \[s\].
+    /// Simulation time at which this timestep was set \[s\].
     pub base: f64,
     /// Steps taken since then.
     pub steps_since_base: u64,
     /// Steps taken since the reset.
     pub steps: u64,
-    /// Step and simulation time \[s\] at which a step led out of the finite numbers.
+    /// Step and simulation time \[s\] of the first step whose result was not finite.
     pub divergence: Option<(u64, f64)>,
 }
 
 impl<const N: usize> Simulation<N> {
-    /// The simulation as it is now.
+    /// The present state of the simulation.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint<N> {
         Checkpoint {
@@ -69,7 +69,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// The simulation that was kept. Its timestep has to be greater than 0, its state finite.
+    /// The simulation of a checkpoint. Its timestep must be greater than 0, and its state finite.
     #[must_use]
     pub fn continued(from: &Checkpoint<N>) -> Self {
         let mut pid = Pid::new(from.gains);

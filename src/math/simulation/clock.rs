@@ -1,4 +1,4 @@
-//! Simulation time, and how far it can go.
+//! Simulation time and its limit.
 //!
 //! **Invariant:** time is `base + k timestep`, never a running sum, and finite.
 
@@ -17,16 +17,16 @@ impl<const N: usize> Simulation<N> {
         self.base + in_f64(self.steps_since_base.saturating_add(steps)) * self.timestep
     }
 
-    /// How many of `steps` lead to a finite time.
-    // Within the loop that steps it would take registers: two instructions a step.
+    /// The number of `steps` that lead to a finite time. Inside the step loop this check would cost
+    /// registers and two instructions per step.
     #[inline(never)]
     pub(super) fn steps_with_time(&self, steps: u64) -> u64 {
-        // Times do not fall from step to step, rounding included.
+        // Times do not decrease from step to step, even with rounding.
         partition_point(steps, |step| self.time_after(step + 1).is_finite())
     }
 
-    /// Changes the length of a step \[s\], greater than 0, from the next step on, with which a control period begins;
-    /// time goes on from where it is. The timestep already in force changes nothing, so that repeating it does not turn
+    /// Changes the length of a step \[s\], greater than 0, from the next step on. A control period begins with that
+    /// step. Time continues from its present value. The present timestep changes nothing, so repeating it does not turn
     /// time into a running sum.
     pub fn set_timestep(&mut self, timestep: f64) {
         if timestep.to_bits() != self.timestep.to_bits() {

@@ -1,9 +1,9 @@
-//! Where a step's effort comes from: the control law, run once per control period and held meanwhile; commands while
-//! the controller is off; or the effort that an outside controller sets.
+//! The source of a step's effort: the control law, evaluated once per control period and held between; commands
+//! while the controller is off; or the effort of an external controller.
 //!
-//! A control period is `k` steps, `k` the whole number nearest to the period that was asked for over the timestep, and
-//! at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay, its
-//! result is in force one period later, as where the computation takes as long as the period (Åström and Wittenmark,
+//! A control period has `k` steps. `k` is the whole number nearest to the requested period divided by the timestep,
+//! and at least 1. The law runs on the state at the start of the period, with `k` timesteps as its `dt`. With a delay,
+//! its result is applied one period later, as if the computation took a whole period (Åström and Wittenmark,
 //! Computer-Controlled Systems, 3rd ed., section 1.3).
 //!
 //! **Invariant:** with a period of one step and no delay the law runs in every step, with the timestep as its `dt`.
@@ -12,26 +12,26 @@ use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::pid::{Control, Pid};
 
-/// Most steps of a control period: whole numbers up to it are exact as `f64`. They take years.
+/// Most steps of a control period. Whole numbers up to it are exact as `f64`, and so many steps take years.
 const MOST_STEPS: u64 = 1 << 53;
 
-/// The time between two runs of the law, and whether their answers come late.
+/// The time between two runs of the law, and whether their results are delayed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ControlPeriod {
-    /// Time as asked for \[s\], not negative; 0 stands for every step.
+    /// Requested time \[s\], not negative; 0 means every step.
     pub period: f64,
-    /// Whether an answer is in force one period after the state that it is about.
+    /// Whether a result is applied one period after its state was read.
     pub delay: bool,
 }
 
 impl ControlPeriod {
-    /// How many steps of `timestep` \[s\] it has, at least 1.
+    /// The number of steps of `timestep` \[s\] in it, at least 1.
     #[must_use]
     pub fn steps(&self, timestep: f64) -> u64 {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a cast to an integer saturates, and what is no number becomes 0"
+            reason = "a cast to an integer saturates, and NaN becomes 0"
         )]
         let steps = (self.period / timestep).round() as u64;
         steps.clamp(1, MOST_STEPS)
@@ -44,16 +44,16 @@ impl ControlPeriod {
     }
 }
 
-/// All that is held between two runs of the law.
+/// The values held between two runs of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held<const N: usize> {
     /// When the law runs.
     pub period: ControlPeriod,
-    /// Steps until it runs again; 0 if it does in the next step.
+    /// Steps until it runs again; 0 if it runs in the next step.
     pub due: u64,
-    /// The controller's effort in force \[N m\].
+    /// The controller's present effort \[N m\].
     pub effort: [f64; N],
-    /// With a delay, the effort that will be in force after it \[N m\].
+    /// With a delay, the effort of the next period \[N m\].
     pub computed: [f64; N],
     /// Effort of clients, applied while the controller is off \[N m\].
     pub command: [f64; N],
@@ -75,15 +75,15 @@ impl<const N: usize> Default for Held<N> {
     }
 }
 
-/// The held effort, with the values that follow from it and the timestep.
+/// The held effort, with values computed from it and the timestep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hold<const N: usize> {
     pub(in crate::math) held: Held<N>,
-    /// Steps of a period.
+    /// Steps per period.
     steps: u64,
-    /// Their time \[s\].
+    /// Duration of a period \[s\].
     length: f64,
-    /// Whether the law, if it is on, runs in every step and takes effect at once, and no other effort is given.
+    /// Whether the law, if it is on, runs in every step without delay, and no other effort replaces it.
     pub(in crate::math) every_step: bool,
 }
 
@@ -111,7 +111,7 @@ impl<const N: usize> Hold<N> {
         *self = Self::new(held, timestep);
     }
 
-    /// Holds another effort of clients \[N m\].
+    /// Sets the clients' effort \[N m\].
     pub(super) fn set_command(&mut self, command: [f64; N], timestep: f64) {
         *self = Self::new(
             Held {
@@ -122,7 +122,7 @@ impl<const N: usize> Hold<N> {
         );
     }
 
-    /// Forgets all efforts; a period begins with the next step.
+    /// Clears all efforts. A period begins with the next step.
     pub(super) fn forget(&mut self, timestep: f64) {
         self.begin_period(timestep, |held| {
             *held = Held {
@@ -132,7 +132,7 @@ impl<const N: usize> Hold<N> {
         });
     }
 
-    /// The control of the step that begins now, from `state`, and what is held after it. The law runs if it is due.
+    /// The control for the step that begins now, from `state`, and the held values after it. The law runs if it is due.
     #[must_use]
     pub fn begin_step(&self, pid: &Pid<N>, state: &State<N>) -> (Control<N>, Held<N>) {
         let mut held = self.held;
@@ -158,7 +158,7 @@ impl<const N: usize> Hold<N> {
         (Control { effort, integral }, held)
     }
 
-    /// The step has been taken: its effort is held from now on.
+    /// Commits a step: its effort is held from now on.
     pub fn commit(&mut self, held: Held<N>) {
         self.held = held;
     }

@@ -1,7 +1,6 @@
-//! The increments of one step, and how they are added to a state.
+//! The increments of one step, and their addition to a state.
 //!
-//! **Invariant:** an arm without gravity moves by the same bits, whichever of the two ways through the dynamics it
-//! takes.
+//! **Invariant:** an arm without gravity moves bit-identically with both variants of the dynamics.
 
 #![allow(
     clippy::indexing_slicing,
@@ -25,8 +24,8 @@ pub fn step_under<const N: usize>(
 ) -> Increment<N> {
     let State { position, velocity } = state;
     if method == Method::Euler {
-        // This one is inlined into the caller's loop, where numbers stay in registers from step to step. For the other
-        // methods that would make four times as many copies of the dynamics.
+        // Euler's step is inlined into the caller's loop, where numbers stay in registers from step to step. Inlining
+        // the other methods too would make four times as many copies of the dynamics.
         increment(
             Method::Euler,
             #[inline(always)]
@@ -42,7 +41,7 @@ pub fn step_under<const N: usize>(
     }
 }
 
-/// The state that such a step leads to; the rest of rounding is lost.
+/// The state after such a step, without the rounding error.
 #[inline(always)]
 #[must_use]
 pub fn state_after<const N: usize>(
@@ -69,15 +68,15 @@ fn acceleration<const N: usize>(
     }
 }
 
-/// Whether the dynamics can do without the first angle, and gain by it. Sines and cosines are taken two at a time, so
-/// that an odd number of angles less one is a whole pass less. With 2 links next to nothing is saved.
+/// Whether omitting the first angle makes the dynamics faster. Sines and cosines are computed two at a time, so for
+/// an odd number of links one pass less is needed. With 2 links almost nothing is saved.
 #[inline(always)]
 pub(super) fn leaves_out_first_angle<const N: usize>(arm: &Arm<N>) -> bool {
     N % 2 == 1 && arm.gravity() == 0.0
 }
 
-/// The state that a step of `h` \[s\] from `state` leads to under an `acceleration`, which does not depend on time. Its
-/// `carry` is the rest of rounding, for the next step.
+/// The state after a step of `h` \[s\] from `state` under an `acceleration` that does not depend on time. `carry` is
+/// the rounding error, for the next step.
 #[inline(always)]
 pub(super) fn stepped<T: Number, const N: usize>(
     acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
@@ -87,7 +86,7 @@ pub(super) fn stepped<T: Number, const N: usize>(
     h: T,
 ) -> (State<N, T>, State<N, T>) {
     let State { position, velocity } = state;
-    // The motion does not depend on the time, so none is computed for the stages.
+    // The motion does not depend on time, so the stages have no time.
     let (dq, dv) = increment(method, acceleration, h.like(0.0), position, velocity, h);
     let (position, position_carry) = add_carried(position, &carry.position, &dq);
     let (velocity, velocity_carry) = add_carried(velocity, &carry.velocity, &dv);
@@ -98,7 +97,7 @@ pub(super) fn stepped<T: Number, const N: usize>(
     (State { position, velocity }, carry)
 }
 
-/// `value + carry + increment`, and the carry that rounding leaves for the next step.
+/// `value + carry + increment`, and its rounding error, the carry of the next step.
 #[inline(always)]
 pub(crate) fn add_carried<T: Number, const N: usize>(
     value: &[T; N],

@@ -1,13 +1,13 @@
-//! Everything from outside that a step depends on: one value per kind of change.
+//! The external inputs of the steps: one variant per kind of change.
 //!
-//! **Invariant:** a simulation that is given the same inputs before the same steps takes the same steps, bit for bit.
+//! **Invariant:** a simulation with the same inputs before the same steps takes the same steps, bit for bit.
 
 use super::{ControlPeriod, Simulation};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 
-/// A change from outside, in force from the next step on.
+/// An external change, effective from the next step on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ArmInput<const N: usize> {
     /// The method that takes the steps.
@@ -20,29 +20,29 @@ pub enum ArmInput<const N: usize> {
     Gains(Gains<N>),
     /// The controller on or off.
     Enabled(bool),
-    /// The setpoint at which the arm is to be held.
+    /// The setpoint of the controller.
     Setpoint(Setpoint<N>),
-    /// An effort that is added for a while.
+    /// An effort that is added for some time.
     Disturbance {
         /// \[N m\].
         effort: [f64; N],
         /// Simulation time \[s\], greater than 0.
         duration: f64,
     },
-    /// When the control law runs.
+    /// The control period.
     Period(ControlPeriod),
     /// Positions and velocities of the joints.
     State(State<N>),
     /// An effort that is applied while the controller is off \[N m\].
     Command([f64; N]),
-    /// An effort that is applied instead of all others but a disturbance, or the end of that \[N m\].
+    /// An effort \[N m\] that replaces all others except a disturbance; `None` ends it.
     Drive(Option<[f64; N]>),
-    /// Takes the arm back to the starting pose.
+    /// Returns the arm to the starting pose.
     Reset,
 }
 
 impl<const N: usize> Simulation<N> {
-    /// Has `input` take effect.
+    /// Applies `input`.
     pub fn apply(&mut self, input: ArmInput<N>) {
         match input {
             ArmInput::Method(method) => self.set_method(method),

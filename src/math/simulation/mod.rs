@@ -3,16 +3,17 @@
 //! One step, from the state `(q, q̇)` at its start:
 //!
 //! 1. with the controller on, the control law runs ([`Pid::control`]) if a control period begins ([`ControlPeriod`]),
-//!    else its effort is held; off, the effort is what was commanded; a disturbance that has not ended
-//!    ([`Disturbance`]) is added to it;
-//! 2. that effort is held while the method's stages evaluate the dynamics ([`step_under`]);
-//! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
+//!    else its effort is held. With the controller off, the effort is the commanded one. An active disturbance
+//!    ([`Disturbance`]) is added to it.
+//! 2. That effort is held while the method's stages evaluate the dynamics ([`step_under`]).
+//! 3. The increments are added with their rounding errors carried. `(q, q̇)` and the integral are replaced
+//!    together.
 //!
-//! The arm's actor, the study, the benchmarks and the tests all step through here, so that the arm that is studied is
-//! the live one, bit for bit. This may use the rest of `math`, and knows no time but that of its steps.
+//! The arm's actor, the study, the benchmarks and the tests all use these steps, so the studied arm is the live one,
+//! bit for bit. The only time here is that of the steps.
 //!
-//! **Invariant:** state and time are finite. A step after which they would not be is not taken, in whole or in part,
-//! and nothing steps after it until [`Simulation::reset`].
+//! **Invariant:** state and time are finite. A step with another result is not taken, not even in part, and no step
+//! follows it until [`Simulation::reset`].
 
 #![allow(
     clippy::indexing_slicing,
@@ -40,19 +41,19 @@ use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
-/// Timestep until another is set \[s\]. A third of what the default gains are stable to.
+/// Default timestep \[s\]: a third of the stability limit of the default gains.
 pub const DEFAULT_TIMESTEP: f64 = 0.001;
 
-/// The step that a simulation did not take, since state or time would not have been finite after it.
+/// The step that a simulation did not take, because state or time would not be finite after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divergence {
-    /// Number of the step, since the reset, that was not taken; the first step is 1.
+    /// Number of the step that was not taken, counted from 1 since the reset.
     pub step: u64,
-    /// Simulation time at which that step began, and at which the clock stands \[s\].
+    /// Simulation time at the start of that step, where the clock stopped \[s\].
     pub time: f64,
 }
 
-/// An effort from outside, added to that of every step that begins before it ends.
+/// An external effort, added to that of every step that begins before its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbance<const N: usize> {
     /// Effort per joint \[N m\].
@@ -62,11 +63,11 @@ pub struct Disturbance<const N: usize> {
 }
 
 impl<const N: usize> Disturbance<N> {
-    /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
-    /// timestep` steps, rounded up, so that at least one takes it.
+    /// `effort` \[N m\] for `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
+    /// timestep` steps, rounded up, and so at least one.
     ///
-    /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, and
-    /// by far less than a timestep. So 1.1 s in steps of 0.1 s are eleven steps, not twelve.
+    /// The end is earlier by more than the rounding errors of the sum and of the compared times, and by far less than
+    /// a timestep. So 1.1 s in steps of 0.1 s are eleven steps, not twelve.
     fn new(effort: [f64; N], start: f64, duration: f64) -> Self {
         let ends = (start + duration) * (1.0 - 4.0 * f64::EPSILON);
         Self {
@@ -103,7 +104,7 @@ pub struct Simulation<const N: usize> {
     effort: [f64; N],
     /// The disturbance that is added to the effort of the next step.
     disturbance: Option<Disturbance<N>>,
-    /// Simulation time when this timestep came into force \[s\].
+    /// Simulation time at which this timestep was set \[s\].
     base: f64,
     /// Steps taken since then.
     steps_since_base: u64,
@@ -138,13 +139,13 @@ impl<const N: usize> Simulation<N> {
         self.advance(1) == 1
     }
 
-    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged.
+    /// Takes up to `steps` steps and returns their number: all of them, unless the simulation diverges or has diverged.
     pub fn advance(&mut self, steps: u64) -> u64 {
         self.advance_with(steps, |_| ControlFlow::Continue(()))
     }
 
-    /// Does what [`Simulation::advance`] does, and shows `observe` the state after every step. `observe` may end the
-    /// advance there. A judge of every physics step hooks in here.
+    /// Does the same as [`Simulation::advance`], and calls `observe` with the state after every step. `observe` may
+    /// stop the advance there. Goals use it to check every physics step.
     pub fn advance_with(
         &mut self,
         steps: u64,
@@ -154,7 +155,7 @@ impl<const N: usize> Simulation<N> {
             return 0;
         }
         let with_time = self.steps_with_time(steps);
-        // Asked once for all steps.
+        // Evaluated once for all steps.
         let taken = if leaves_out_first_angle(&self.arm) {
             self.take_steps::<false>(with_time, observe)
         } else {
@@ -171,13 +172,13 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// Takes `steps` steps. Breaks with the number of steps taken where the run ends early.
+    /// Takes `steps` steps. Breaks with the number of taken steps if the run ends early.
     fn take_steps<const HAS_GRAVITY: bool>(
         &mut self,
         steps: u64,
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> ControlFlow<u64> {
-        // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
+        // The match on method and control stays inside the loop: hoisting it gave no measured speedup.
         for taken in 0..steps {
             if !self.take_step::<HAS_GRAVITY>() {
                 self.diverge();
@@ -190,7 +191,7 @@ impl<const N: usize> Simulation<N> {
         ControlFlow::Continue(())
     }
 
-    /// Notes that the next step is not taken, nor any after it.
+    /// Records the divergence: neither the next step nor any after it is taken.
     fn diverge(&mut self) {
         self.divergence = Some(Divergence {
             step: self.steps + 1,
@@ -244,7 +245,7 @@ impl<const N: usize> Simulation<N> {
         true
     }
 
-    /// The effort that the next step would be taken with \[N m\]: the controller's and the disturbance's together.
+    /// The effort of the next step \[N m\]: the controller's plus the disturbance's.
     #[must_use]
     pub fn effort_of_next_step(&self) -> [f64; N] {
         let controlled = self.hold.begin_step(&self.pid, &self.state).0.effort;
@@ -256,7 +257,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// The control of a step in whose period there are others.
+    /// The control of a step whose period has several steps.
     #[inline(never)]
     fn begin_held_step(&self, after: &mut Option<Held<N>>) -> Control<N> {
         let (control, held) = self.hold.begin_step(&self.pid, &self.state);
@@ -264,7 +265,7 @@ impl<const N: usize> Simulation<N> {
         control
     }
 
-    /// Adds the disturbance to the effort of the step that begins now, or ends it if its time is over.
+    /// Adds the disturbance to the effort of the step that begins now, or ends the disturbance if its time is over.
     #[cold]
     fn add_disturbance(&mut self, effort: &mut [f64; N]) {
         match self.disturbance {
@@ -276,15 +277,15 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation
-    /// time from now. A disturbance that still acts ends here. With the controller off, this is all the effort there
-    /// is.
+    /// time from now. A disturbance that still acts ends here. With the controller off, it is the only effort besides
+    /// commands.
     pub fn disturb(&mut self, effort: [f64; N], duration: f64) {
         self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
     }
 
-    /// Goes back to the starting pose at rest, at time 0. Setpoint and integral follow, all efforts are zero,
-    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period, and
-    /// whether the controller is on, stay.
+    /// Returns to the starting pose at rest, at time 0. Setpoint and integral are reset, all efforts are zero,
+    /// disturbance and divergence end, and a control period begins. Gains, arm, method, timestep, control period and
+    /// the controller's on/off state do not change.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
@@ -302,14 +303,15 @@ impl<const N: usize> Simulation<N> {
         &self.state
     }
 
-    /// Puts the arm into another state, which must be finite, and ends a divergence; clock and controller stay.
+    /// Puts the arm into another state, which must be finite, and ends a divergence. Clock and controller do
+    /// not change.
     pub fn set_state(&mut self, state: State<N>) {
         self.state = state;
         self.carry = State::rest();
         self.divergence = None;
     }
 
-    /// Effort of the latest step \[N m\], the controller's and the disturbance's together; zeros at once when the
+    /// Effort of the latest step \[N m\], the controller's plus the disturbance's. It is zero as soon as the
     /// controller is turned off, and after a reset.
     #[must_use]
     pub fn effort(&self) -> &[f64; N] {
@@ -345,19 +347,19 @@ impl<const N: usize> Simulation<N> {
         &self.arm
     }
 
-    /// Changes the arm's parameters; positions and velocities of the joints stay.
+    /// Changes the arm's parameters. Positions and velocities of the joints do not change.
     pub fn set_arm(&mut self, arm: Arm<N>) {
         self.arm = arm;
     }
 
-    /// The controller, to be read.
+    /// The controller, read only.
     #[must_use]
     pub fn pid(&self) -> &Pid<N> {
         &self.pid
     }
 
     /// Turns the controller on or off ([`Pid::enable`]). Off, the effort is zero at once. A change begins a control
-    /// period; commands end in either case, unless what is on is turned on.
+    /// period. Commands end, unless the controller is already on and is turned on.
     pub fn enable(&mut self, on: bool) {
         if on && self.pid.is_enabled() {
             return;
@@ -375,8 +377,8 @@ impl<const N: usize> Simulation<N> {
         self.hold.held.period
     }
 
-    /// Changes the time between two runs of the control law, which must be finite and not negative; a period begins
-    /// with the next step. A value that is in force already changes nothing.
+    /// Changes the time between two runs of the control law, which must be finite and not negative. A period begins
+    /// with the next step. The present value changes nothing.
     pub fn set_control_period(&mut self, period: ControlPeriod) {
         if period != self.hold.held.period {
             let change = |held: &mut Held<N>| held.period = period;
@@ -384,20 +386,20 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// The effort that was commanded last \[N m\]; zeros while the controller is on.
+    /// The last commanded effort \[N m\]; zeros while the controller is on.
     #[must_use]
     pub fn command(&self) -> &[f64; N] {
         &self.hold.held.command
     }
 
-    /// Applies `effort` \[N m\] from the next step on, while the controller is off, until it is switched or the
-    /// simulation reset.
+    /// Applies `effort` \[N m\] from the next step on, while the controller is off, until the controller is
+    /// switched or the simulation is reset.
     pub fn set_command(&mut self, effort: [f64; N]) {
         self.hold.set_command(effort, self.timestep);
     }
 
-    /// Applies `effort` \[N m\] instead of the controller's and of commands from the next step on, or no longer. The
-    /// controller is paused meanwhile; a control period begins afterwards.
+    /// Applies `effort` \[N m\] from the next step on, in place of the controller's and of commands; `None` ends
+    /// this. The controller does not run meanwhile. A control period begins afterwards.
     pub fn drive(&mut self, effort: Option<[f64; N]>) {
         let change = |held: &mut Held<N>| held.driven = effort;
         self.hold.begin_period(self.timestep, change);
@@ -413,7 +415,7 @@ impl<const N: usize> Simulation<N> {
         self.pid.set_setpoint(setpoint);
     }
 
-    /// The first step since the reset that was not taken, since state or time would not have been finite after it.
+    /// The first step since the reset that was not taken, because state or time would not be finite after it.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence

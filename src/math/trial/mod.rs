@@ -1,9 +1,8 @@
 //! A timed trial: one random target after another, counted as the arm reaches them.
 //!
-//! A [`Trial`] gets events and returns a list of [`TrialCommand`]s; the actor around it
-//! only carries messages. It knows no arm. Targets come from a closure (usually around [`sample`]), and goals are
-//! known by their ids. The time is the simulation time that [`Trial::tick`] gets, before anything else that happened
-//! at that time.
+//! A [`Trial`] gets events and returns a list of [`TrialCommand`]s. The actor around it only passes messages. A
+//! trial does not depend on the arm: targets come from a closure (usually around [`sample`]), and ids identify
+//! goals. [`Trial::tick`] gets the simulation time, before any other event of that time.
 //!
 //! ```text
 //!                    start                       accepted                    concluded: reached
@@ -12,7 +11,7 @@
 //!     └────────────────────────────────┴───────────────────────────┘ stop, or the duration is over
 //! ```
 //!
-//! **Invariant:** only the result of the goal in flight counts: news of an older goal change nothing.
+//! **Invariant:** only the result of the active goal counts. News of an older goal change nothing.
 
 mod sampling;
 mod terms;
@@ -25,17 +24,18 @@ pub use terms::{
     ActionStatus, Changes, Conclusion, DURATION, Rejection, Settings, Status, TrialCommand,
 };
 
-/// How often a target that was refused is replaced before the trial waits. A sampled target is refused only when the
-/// lengths change between sampling and solving, so that a second refusal in a row is rare already.
+/// The number of refused targets in a row after which the trial waits. A sampled target is refused only if the
+/// lengths change between sampling and solving, so two refusals in a row are rare.
 pub const ATTEMPTS: u32 = 8;
 
-/// Most results that are kept until the answer says whether they are ours. No more than two wait if news come in order.
+/// Most results that are kept until the answer shows which goal is the trial's own. At most two wait if news arrive in
+/// order.
 const EARLY_RESULTS: usize = 4;
 
-/// Simulation time since a start, added up over resets of the simulation clock.
+/// Simulation time since a start, summed over resets of the simulation clock.
 #[derive(Debug, Clone, Copy)]
 struct TrialClock {
-    /// Time before the clock was last set back \[s\].
+    /// Time before the last reset of the clock \[s\].
     carried: f64,
     origin: f64,
     latest: f64,
@@ -50,7 +50,7 @@ impl TrialClock {
         }
     }
 
-    /// This is a difference, not a running sum, so rounding does not grow with the number of questions.
+    /// This is a difference, not a running sum, so the rounding error does not grow with the number of calls.
     fn elapsed(&self) -> f64 {
         self.carried + (self.latest - self.origin)
     }
@@ -64,7 +64,7 @@ impl TrialClock {
     }
 }
 
-/// The goal that the trial pursues.
+/// The goal of the trial.
 #[derive(Debug, Clone, PartialEq)]
 enum Pursuit {
     Nothing,
@@ -73,7 +73,7 @@ enum Pursuit {
         ticket: u64,
         target: Target,
         attempt: u32,
-        /// Results heard since; one may be this goal's.
+        /// Results since then; one of them may belong to this goal.
         early: Vec<Conclusion>,
     },
     InFlight {
@@ -101,7 +101,7 @@ impl View {
     }
 }
 
-/// A trial harness: at most one trial at a time, none before the first start.
+/// The state of trials: at most one at a time, and none before the first start.
 #[derive(Debug, Clone)]
 pub struct Trial {
     settings: Settings,
@@ -111,7 +111,7 @@ pub struct Trial {
     targets_reached: u64,
     pursuit: Pursuit,
     view: View,
-    /// Goals sent so far; never starts over, so that an answer to an older start is known as such.
+    /// The number of goals sent so far. It never restarts, so an answer to an older start is recognised.
     tickets: u64,
 }
 
@@ -152,7 +152,7 @@ impl Trial {
         })
     }
 
-    /// The settings in force.
+    /// The present settings.
     #[must_use]
     pub const fn settings(&self) -> Settings {
         self.settings
@@ -164,16 +164,16 @@ impl Trial {
         self.running
     }
 
-    /// Simulation time that a running trial has left \[s\]; none when no trial runs.
+    /// Remaining simulation time of a running trial \[s\]; none when no trial runs.
     #[must_use]
     pub fn remaining(&self) -> Option<f64> {
         let clock = self.clock.filter(|_| self.running)?;
         Some((self.settings.duration - clock.elapsed()).max(0.0))
     }
 
-    /// Tells the simulation time \[s\]; ends the trial when its duration is over.
+    /// Sets the simulation time \[s\], and ends the trial when its duration is over.
     ///
-    /// A time before the last one told means that the simulation clock was reset: it adds nothing.
+    /// A time before the previous one means that the simulation clock was reset. It adds nothing.
     #[must_use]
     pub fn tick(&mut self, now: f64) -> Vec<TrialCommand> {
         let Some(clock) = self.clock.as_mut().filter(|_| self.running) else {
@@ -183,15 +183,15 @@ impl Trial {
         if clock.elapsed() + rounding(now) < self.settings.duration {
             return Vec::new();
         }
-        // The trial is over, or the clock has run so far that it tells nothing.
+        // The trial is over, or the clock is too large for a useful resolution.
         self.end()
     }
 
-    /// Starts a trial at simulation time `now` \[s\], in place of one that may be running.
+    /// Starts a trial at simulation time `now` \[s\]. It replaces a running one.
     ///
     /// # Errors
     ///
-    /// [`Rejection::NoTarget`] if `sample` has none; settings and running trial are as before.
+    /// [`Rejection::NoTarget`] if `sample` finds none. Settings and a running trial do not change.
     pub fn start(
         &mut self,
         now: f64,
@@ -206,11 +206,12 @@ impl Trial {
         Ok(self.replace(target))
     }
 
-    /// Abandons the target in flight, uncounted, for a new one.
+    /// Replaces the present target by a new one, without counting it.
     ///
     /// # Errors
     ///
-    /// [`Rejection::NotRunning`] when no trial runs, [`Rejection::NoTarget`] if `sample` has none.
+    /// [`Rejection::NotRunning`] when no trial runs, [`Rejection::NoTarget`] if `sample` finds
+    /// none.
     pub fn skip(
         &mut self,
         sample: impl FnOnce() -> Option<Target>,
@@ -261,7 +262,7 @@ impl Trial {
                 commands
             }
             other => {
-                // Nobody wants this goal any more, and the arm must not go on pursuing it.
+                // This goal is no longer needed, so the arm must not continue to it.
                 self.pursuit = other;
                 vec![TrialCommand::CancelGoal {
                     goal_id: goal_id.to_owned(),
@@ -295,7 +296,7 @@ impl Trial {
         vec![TrialCommand::PublishStatus]
     }
 
-    /// Takes feedback on any goal: the end effector's `distance` from its target \[m\], and the `positions` it commands
+    /// Takes feedback on any goal: the end effector's `distance` from its target \[m\], and the commanded `positions`
     /// \[rad\].
     pub fn feedback(&mut self, goal_id: &str, distance: f64, positions: &[f64]) {
         if self.is_in_flight(goal_id) {
@@ -306,7 +307,7 @@ impl Trial {
         }
     }
 
-    /// Takes the end of any goal. The one in flight is counted if it was reached, and the next target is wanted.
+    /// Takes the end of any goal. If the active goal was reached, it is counted, and the next target is sampled.
     #[must_use]
     pub fn concluded(
         &mut self,
@@ -327,7 +328,7 @@ impl Trial {
         match conclusion.outcome {
             Outcome::Reached => {
                 self.targets_reached += 1;
-                // This is shown until the next goal is accepted, so that it is seen at all.
+                // The status shows this until the next goal is accepted, so that clients can see it.
                 self.view.action_status = ActionStatus::Reached;
                 self.view.error = Some(conclusion.final_distance);
                 let next = sample().map(|target| self.ask(target, 1));
@@ -348,10 +349,10 @@ impl Trial {
 
     /// Drops the present goal and pursues `target`.
     fn replace(&mut self, target: Target) -> Vec<TrialCommand> {
-        // The new goal would preempt the old one, but not if it is refused.
+        // The new goal preempts the old one only if it is accepted, so the old one is cancelled first.
         let mut commands = self.abandon();
         commands.push(self.ask(target, 1));
-        // The target is shown once its goal has been accepted, with that goal's setpoint.
+        // The status shows the target once its goal has been accepted, with that goal's setpoint.
         self.view = View::of(None, ActionStatus::Idle);
         commands
     }
@@ -367,7 +368,7 @@ impl Trial {
     fn abandon(&mut self) -> Vec<TrialCommand> {
         match std::mem::replace(&mut self.pursuit, Pursuit::Nothing) {
             Pursuit::InFlight { goal_id } => vec![TrialCommand::CancelGoal { goal_id }],
-            // A goal without an id is cancelled when it gets one.
+            // A goal without an id is cancelled as soon as it has one.
             Pursuit::Asked { .. } | Pursuit::Nothing => Vec::new(),
         }
     }

@@ -1,6 +1,7 @@
 //! Random targets that an arm can reach.
 //!
-//! **Invariant:** every target has been solved, and a seed makes the targets repeatable.
+//! **Invariant:** inverse kinematics has a solution for every target. The same seed gives the same
+//! targets.
 
 use std::f64::consts::TAU;
 
@@ -8,24 +9,22 @@ use glam::DVec2;
 
 use crate::math::kinematics::{Reach, Target, heading, solve};
 
-/// Draws that [`sample`] makes before it gives up; the first one is reachable but for lengths at the end of the number
-/// range.
+/// Most draws of [`sample`]. The first one is reachable, except for lengths near the limits of `f64`.
 const DRAWS: u32 = 8;
 
-/// Share of the reach's width that [`sample`] leaves free at each of its two edges.
+/// Share of the reach's width that [`sample`] omits at each of its two edges.
 const MARGIN: f64 = 0.05;
 
-/// A random target that an arm with these `lengths` \[m\] can reach; `None` if there is none to be found, as for
-/// lengths whose sum is beyond the number range.
+/// A random target that an arm with these `lengths` \[m\] can reach. `None` if none is found, as for lengths
+/// whose sum overflows.
 ///
-/// `random` gives numbers from 0 to 1, each as likely as any other.
+/// `random` returns uniformly distributed numbers from 0 to 1.
 ///
-/// Every part of the reachable plane is as likely as any other of the same area: uniform in bearing and in the square
-/// of the distance from the base. (Uniform distances or joint angles would crowd around the base.) One twentieth of the
-/// reach's width is left free at either edge. There the arm is stretched or folded, and the end effector is slow to
-/// follow the joints. Part of the epsilon around the target can't be entered, and a small change of the lengths would
-/// put the target out of reach. Three links get an orientation too: one of which each is as likely as any other, or
-/// where the arm can't have that, the nearest that it can have.
+/// Targets are uniform over the area: uniform in bearing and in the square of the distance from the base. (With uniform
+/// distances or joint angles, most targets would be near the base.) One twentieth of the reach's width is omitted at
+/// each edge. There the arm is stretched or folded, and the end effector moves little with the joints. Part of the
+/// circle of radius epsilon around the target would be out of reach. A small change of the lengths could put the target
+/// itself out of reach. Three links get a uniform orientation too, or the nearest possible one.
 pub fn sample<const N: usize>(
     lengths: &[f64; N],
     mut random: impl FnMut() -> f64,
@@ -33,7 +32,7 @@ pub fn sample<const N: usize>(
     let Reach { inner, outer } = Reach::of(lengths);
     let margin = MARGIN * (outer - inner);
     let (least, greatest) = (inner + margin, outer - margin);
-    // Shares of the greatest distance, whose squares neither overflow nor vanish.
+    // Distances relative to the greatest one, so their squares neither overflow nor underflow.
     let hole = (least / greatest).min(1.0).powi(2);
     (0..DRAWS).find_map(|_| {
         let distance = greatest * (hole + random() * (1.0 - hole)).sqrt();

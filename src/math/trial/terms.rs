@@ -1,21 +1,21 @@
-//! The terms of a trial: settings, actions, rejections, status.
+//! The types of a trial: settings, actions, rejections, status.
 //!
-//! **Invariant:** plain values; the rules are all in [`Trial`](super::Trial).
+//! **Invariant:** these are plain values. All rules are in [`Trial`](super::Trial).
 
 use std::fmt;
 
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
 
-/// `duration` where no start has given one \[s\]: time for a few dozen targets.
+/// Default of `duration` \[s\]: time for a few dozen targets.
 pub const DURATION: f64 = 60.0;
 
 /// The settings of a trial; kept from start to start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Simulation time that a trial lasts \[s\], greater than 0.
+    /// Duration of a trial in simulation time \[s\], greater than 0.
     pub duration: f64,
-    /// When a target counts as reached.
+    /// The condition for a reached target.
     pub criteria: Criteria,
 }
 
@@ -28,7 +28,7 @@ impl Default for Settings {
     }
 }
 
-/// The settings that a start names, all valid; the others stay as they are.
+/// The settings in a start request, all valid. The others do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Changes {
     /// \[s\], greater than 0.
@@ -40,7 +40,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// `settings` with these changes made.
+    /// `settings` with these changes.
     pub(super) fn to(self, settings: Settings) -> Settings {
         Settings {
             duration: self.duration.unwrap_or(settings.duration),
@@ -52,48 +52,48 @@ impl Changes {
     }
 }
 
-/// A thing that the trial wants done; several are done in order.
+/// An action for the actor of the trial. Several actions are executed in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TrialCommand {
-    /// Cancel this goal, by its id, so that nobody else's is hit; a rejection means that it is over already.
+    /// Cancel this goal. The id prevents cancelling another client's goal. A rejection means that it has already ended.
     CancelGoal {
         /// The goal's id.
         goal_id: String,
     },
     /// Send a goal, and answer with [`accepted`](super::Trial::accepted) or [`refused`](super::Trial::refused).
     SendGoal {
-        /// Names this request in the answer.
+        /// Identifies this request in the answer.
         ticket: u64,
         /// The target.
         target: Target,
         /// When it counts as reached.
         criteria: Criteria,
     },
-    /// The [`status`](super::Trial::status) has changed and is to be shown.
+    /// Publish the [`status`](super::Trial::status), which has changed.
     PublishStatus,
 }
 
-/// Why a request to the trial is rejected; it has changed nothing.
+/// Why a request to the trial is rejected. A rejected request changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Rejection {
-    /// Skip and stop are for a running trial.
+    /// Skip or stop without a running trial.
     #[error("no trial is running")]
     NotRunning,
-    /// The sampler found nothing.
+    /// The sampler found no target.
     #[error("no reachable target could be sampled for the arm's present lengths")]
     NoTarget,
 }
 
-/// The trial's view of the goal that it tracks.
+/// The state of the trial's goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ActionStatus {
-    /// Nothing in flight.
+    /// No goal is active.
     Idle,
     /// A goal is being pursued.
     Active,
-    /// The latest goal was reached; the next one is being asked for.
+    /// The latest goal was reached; the next one is requested.
     Reached,
-    /// Somebody else ended the latest goal; the trial waits.
+    /// Another client ended the latest goal; the trial waits.
     Preempted,
 }
 
@@ -127,13 +127,13 @@ pub struct Status {
     pub duration: f64,
     /// Targets reached since the start.
     pub targets_reached: u64,
-    /// The target being pursued, or the last one; none once the trial has ended.
+    /// The present target, or the last one; none once the trial has ended.
     pub target: Option<Target>,
-    /// The end effector's distance from the target \[m\], as last heard.
+    /// The end effector's distance from the target \[m\], from the latest feedback.
     pub error: Option<f64>,
-    /// The setpoint that the goal commands \[rad\], as last heard.
+    /// The setpoint of the goal \[rad\], from the latest feedback.
     pub desired_positions: Option<Vec<f64>>,
-    /// How the goal stands.
+    /// The state of the goal.
     pub action_status: ActionStatus,
 }
 

@@ -1,7 +1,7 @@
-//! The actions: one row each. Goals with progress and an end, as rosbridge has them beside topics and services.
+//! The actions, one row each: goals with feedback and a result, as in rosbridge.
 //!
-//! **Invariant:** an action has the fields of the services and topics that do the same; without such, it has those of
-//! ROS 2.
+//! **Invariant:** an action has the fields of the services and topics with the same effect. Without such services, it
+//! has those of ROS 2.
 
 use super::entry::{Field, Type, message, optional, required};
 use super::node::Node;
@@ -31,7 +31,7 @@ table! {
             result: message("tf2_web_republisher_interfaces/action/TFSubscription_Result", &[]),
             feedback: message("tf2_web_republisher_interfaces/action/TFSubscription_Feedback", &TRANSFORMS),
         },
-        /// Leads the arm along a path.
+        /// Moves the arm along a path.
         FollowJointTrajectory = ActionEntry {
             name: "/joint_trajectory_controller/follow_joint_trajectory",
             type_name: "control_msgs/action/FollowJointTrajectory",
@@ -55,7 +55,7 @@ table! {
                 required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
-                // These are in ROS 2's definition. JSON leaves them out, since compas_fab fails at unknown fields.
+                // These are in ROS 2's definition. JSON omits them, because compas_fab rejects unknown fields.
                 optional("multi_dof_joint_names", "string[]", ""),
                 optional("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
                 optional("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
@@ -100,7 +100,7 @@ impl Action {
         self.entry().owner
     }
 
-    /// Whether a goal may be as long as a frame, since it is read where it holds up nobody.
+    /// Whether a goal may be as long as a frame. It is then read on a worker thread.
     #[must_use]
     pub const fn takes_long_goals(self) -> bool {
         matches!(self, Self::FollowJointTrajectory)

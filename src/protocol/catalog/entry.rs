@@ -1,6 +1,6 @@
 //! The rows of the catalog's tables: fields, message types, topics and services, each written in one expression.
 //!
-//! **Invariant:** a row is a constant: nothing of the catalog is made or changed while the program runs.
+//! **Invariant:** a row is a constant. The catalog does not change while the program runs.
 
 use super::node::Node;
 
@@ -9,28 +9,28 @@ use super::node::Node;
 pub struct Field {
     /// Its key.
     pub name: &'static str,
-    /// Its type as ROS writes it: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`. ROS does not know
-    /// `float64[][]`, one array per sample.
+    /// Its type in ROS notation: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`. `float64[][]`,
+    /// one array per sample, is not a ROS type.
     pub kind: &'static str,
-    /// Its unit: empty where it has none, `SI` where it differs from joint to joint or depends on the controller.
+    /// Its unit: empty if it has none, `SI` if it differs between joints or depends on the controller.
     pub unit: &'static str,
-    /// Whether a request must have it. In messages and responses every field is there.
+    /// Whether a request must have it. Messages and responses always have every field.
     pub required: bool,
 }
 
-/// How many values of its type a field has.
+/// The number of values in a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Count {
     /// One.
     One,
-    /// Any number, perhaps up to a bound: `float64[]`, `float64[<=3]`.
+    /// Any number, possibly up to a bound: `float64[]`, `float64[<=3]`.
     Any,
-    /// This many: `uint8[16]`.
+    /// A fixed number: `uint8[16]`.
     Exactly(usize),
 }
 
 impl Field {
-    /// The field's type without brackets, and how many values it has.
+    /// The field's type without brackets, and its number of values.
     #[must_use]
     pub fn element(&self) -> (&'static str, Count) {
         let array = self.kind.strip_suffix(']');
@@ -54,7 +54,7 @@ pub(super) const fn required(name: &'static str, kind: &'static str, unit: &'sta
     }
 }
 
-/// A field that a request may leave out.
+/// An optional field of a request.
 pub(super) const fn optional(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
     Field {
         required: false,
@@ -65,7 +65,7 @@ pub(super) const fn optional(name: &'static str, kind: &'static str, unit: &'sta
 /// A message type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Type {
-    /// Its name, as ROS writes it: `std_msgs/msg/Header`.
+    /// Its name in ROS notation: `std_msgs/msg/Header`.
     pub name: &'static str,
     /// Its fields, in the order of the definition.
     pub fields: &'static [Field],
@@ -112,9 +112,9 @@ impl Type {
 /// The publisher of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
-    /// The runtime publishes; clients subscribe, and may neither advertise nor publish.
+    /// The runtime publishes. Clients can subscribe, but neither advertise nor publish.
     Published,
-    /// The runtime subscribes; anybody may publish, without an advertisement too.
+    /// The runtime subscribes. Any client may publish, also without an advertisement.
     Subscribed,
 }
 
@@ -186,7 +186,7 @@ pub(super) struct ServiceEntry {
     pub(super) supersedes: &'static [&'static str],
 }
 
-/// A service with nothing in its request and nothing in its response.
+/// A service with an empty request and an empty response.
 pub(super) const fn service(
     name: &'static str,
     type_name: &'static str,
@@ -231,7 +231,7 @@ impl ServiceEntry {
         }
     }
 
-    /// An answer makes earlier messages of these topics old: none of them may follow it.
+    /// After an answer, no earlier message of these topics may follow.
     pub(super) const fn supersedes(self, topics: &'static [&'static str]) -> Self {
         Self {
             supersedes: topics,

@@ -1,10 +1,10 @@
-//! THE list: every node, topic, service and action of the runtime, with its name, type, direction, owner and fields.
+//! The catalog: every node, topic, service and action of the runtime, with its name, type, direction, owner and fields.
 //!
-//! The registry, the tables of docs/protocol.md and the tests are checked against it; nothing else spells
-//! `/joint_states`. Fields stand in documented order, which is the order in which a positional `args` array is read.
+//! The registry, the tables of docs/protocol.md and the tests are checked against it. No other file has names such
+//! as `/joint_states`. Fields are in documented order, which is also the order of a positional `args` array.
 //!
-//! **Invariant:** each thing is one row of one table. A served entry is listed: the compiler asks, since a table is an
-//! enum. A listed entry is served: `tests/actors/rosapi.rs` asks.
+//! **Invariant:** each entry is one row of one table. A served entry is listed: the compiler checks this, because a
+//! table is an enum. A listed entry is served: `tests/actors/rosapi.rs` checks this.
 
 mod actions;
 mod entry;

@@ -1,6 +1,6 @@
 //! The types that are inside requests and responses alone.
 //!
-//! **Invariant:** their members are the fields of the service that sets them.
+//! **Invariant:** the members are the fields of the service that sets them.
 
 use super::entry::{Field, Type, message, optional, required};
 
@@ -34,8 +34,7 @@ pub(super) const TYPES: [Type; 3] = [
 ];
 
 impl Field {
-    /// The members of a field that is an object in a request or a response, in documented order; empty for every other
-    /// field.
+    /// The members of an object field of a request or a response, in documented order; empty for every other field.
     #[must_use]
     pub fn members(&self) -> &'static [Self] {
         match self.kind {

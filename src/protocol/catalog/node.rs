@@ -1,6 +1,6 @@
 //! The nodes: one row each.
 //!
-//! **Invariant:** a name stands here without a slash; its reader adds one.
+//! **Invariant:** a name here has no slash. Its reader adds one.
 
 use super::table::table;
 
@@ -13,19 +13,19 @@ table! {
         Ik = "ik",
         /// Drives the arm to a goal.
         IkAction = "ik_action",
-        /// Leads the arm along paths.
+        /// Moves the arm along paths.
         JointTrajectoryController = "joint_trajectory_controller",
         /// Timed trials.
         IkTrial = "ik_trial",
         /// Predictions and offline runs.
         Study = "study",
-        /// Puts frames together for web viewers.
+        /// Combines frames for web viewers.
         TfRepublisher = "tf2_web_republisher",
         /// The rosbridge side: connections and registry.
         Gateway = "gateway",
-        /// Tells what there is.
+        /// Introspection: lists topics, services and types.
         Rosapi = "rosapi",
-        /// Runs on record.
+        /// Records runs.
         Recorder if "record" = "recorder",
     }
 }

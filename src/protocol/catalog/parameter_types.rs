@@ -1,11 +1,10 @@
-//! The types of `rcl_interfaces` that every node of ROS 2 has its parameters told and set by.
+//! The types of `rcl_interfaces` in the parameter services of every ROS 2 node.
 //!
-//! **Invariant:** fields stand as in the definitions of ROS 2; parts that a parameter here never has are empty
-//! there.
+//! **Invariant:** fields are those of ROS 2's definitions. Parts that no parameter here has are empty.
 
 use super::entry::{Type, message, required};
 
-/// The types, each behind those that have it inside.
+/// The types. A type follows the types that contain it.
 pub(super) const TYPES: [Type; 7] = [
     message(
         "rcl_interfaces/msg/Parameter",

@@ -1,11 +1,11 @@
-//! The types of which ROS 2 makes the parts of services and actions, and types that are inside a standard action and of
-//! no use to this arm.
+//! The types of which ROS 2 builds services and actions, and the types inside a standard action that this arm does not
+//! use.
 //!
-//! **Invariant:** fields stand as in the definitions of ROS 2.
+//! **Invariant:** fields are those of ROS 2's definitions.
 
 use super::entry::{Type, message, required};
 
-/// The types, each behind those that have it inside.
+/// The types. A type follows the types that contain it.
 pub(super) const TYPES: [Type; 9] = [
     message(
         "action_msgs/msg/GoalStatusArray",

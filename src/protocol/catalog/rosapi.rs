@@ -1,21 +1,21 @@
-//! The questions of rosapi: how clients of the ROS web world find out what there is. One row each.
+//! The services of rosapi, by which ROS web clients list topics, services and types. One row each.
 //!
-//! Each is served under `/rosapi/` and, as newer versions have it, under `/rosapi_node/`.
+//! Each is served under `/rosapi/` and, as in newer versions, under `/rosapi_node/`.
 //!
-//! **Invariant:** every row is named under [`PREFIX`]; the other spelling is made of it.
+//! **Invariant:** every row has a name under [`PREFIX`]. The other spelling is derived from it.
 
 use super::entry::{Field, ServiceEntry, optional, required, service};
 use super::node::Node;
 use super::table::{fields, table};
 use super::topics::ARM_STATE;
 
-/// The questions' names begin with this.
+/// The prefix of the services' names.
 pub const PREFIX: &str = "/rosapi/";
-/// Their other names begin with this.
+/// The prefix of their other names.
 pub const PRIVATE_PREFIX: &str = "/rosapi_node/";
 
 table! {
-    /// One question.
+    /// One service.
     pub enum Rosapi of ServiceEntry {
         /// Every topic and its type.
         Topics = question("/rosapi/topics", "rosapi_msgs/srv/Topics")
@@ -129,7 +129,7 @@ table! {
             ])
             .response(&DONE)
             .supersedes(ARM_STATE),
-        /// Whether there is such a parameter.
+        /// Whether the parameter exists.
         HasParam = question("/rosapi/has_param", "rosapi_msgs/srv/HasParam")
             .request(fields![required("name", "string", "")])
             .response(fields![required("exists", "bool", "")]),
@@ -143,7 +143,7 @@ table! {
         /// The simulation time.
         GetTime = question("/rosapi/get_time", "rosapi_msgs/srv/GetTime")
             .response(fields![required("time", "builtin_interfaces/msg/Time", "s, ns")]),
-        /// The ROS that this looks like.
+        /// The ROS version that this runtime reports.
         GetRosVersion = question("/rosapi/get_ros_version", "rosapi_msgs/srv/GetROSVersion")
             .response(fields![
                 required("version", "uint8", ""),
@@ -163,14 +163,14 @@ const DONE: [Field; 2] = [
 ];
 
 impl Rosapi {
-    /// The question without a prefix: `topics`.
+    /// The service without a prefix: `topics`.
     #[must_use]
     pub fn short_name(self) -> &'static str {
         let name = self.entry().name;
         name.strip_prefix(PREFIX).unwrap_or(name)
     }
 
-    /// The question of that service, under either prefix.
+    /// The row of that service, under either prefix.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let short = name

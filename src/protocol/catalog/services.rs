@@ -1,6 +1,6 @@
 //! The services: one row each.
 //!
-//! **Invariant:** a service that a client can call is a row here, and a row that no node serves fails
+//! **Invariant:** every service that a client can call is a row here. A row that no node serves fails
 //! `tests/actors/rosapi.rs`.
 
 use super::entry::{Field, ServiceEntry, optional, required, service};
@@ -14,7 +14,7 @@ use crate::protocol::names;
 table! {
     /// A service of the runtime's own.
     pub enum Service of ServiceEntry {
-        /// Integrates a particle of one degree of freedom, apart from the arm.
+        /// Integrates a particle of one degree of freedom, without the arm.
         IntegrationStep = of_arm("/arm_sim/integration_step", "pendularm_interfaces/srv/IntegrationStep")
             .request(fields![
                 required("function", "string", "m/s^2, of t in s"),
@@ -44,7 +44,7 @@ table! {
             .request(&SWITCH)
             .response(&SWITCH)
             .supersedes(ARM_STATE_AND_FEEDBACK),
-        /// Back to the starting pose at time 0.
+        /// Returns to the starting pose at time 0.
         Reset = of_arm("/arm_sim/reset", "pendularm_interfaces/srv/Reset")
             .response(&STATE)
             .supersedes(ARM_STATE_AND_FEEDBACK),
@@ -69,7 +69,7 @@ table! {
                 required("effort", "float64[]", "N m"),
             ])
             .all_or_nothing(),
-        /// Pushes the arm for a while.
+        /// Adds an effort for some time.
         Disturb = changes("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb")
             .request(&DISTURBANCE)
             .response(&DISTURBANCE)
@@ -110,7 +110,7 @@ table! {
         SetGains = changes("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains")
             .request(&GAINS)
             .response(&GAINS),
-        /// How often the control law runs.
+        /// The control period.
         SetPeriod = changes("/pid_controller/set_period", "pendularm_interfaces/srv/SetPeriod")
             .request(fields![
                 optional("period", "float64", "s"),
@@ -145,16 +145,16 @@ table! {
         CancelGoal = service("/ik_action/cancel_goal", "pendularm_interfaces/srv/CancelGoal", Node::IkAction)
             .request(fields![optional("goal_id", "string", "")])
             .all_or_nothing(),
-        /// Starts a timed trial afresh.
+        /// Starts a new timed trial.
         TrialStart = service("/ik_trial/start", "pendularm_interfaces/srv/TrialStart", Node::IkTrial)
             .request(&TRIAL)
             .response(&TRIAL)
             .all_or_nothing(),
-        /// Abandons the trial's present target for a new one.
+        /// Replaces the trial's present target by a new one.
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
         TrialStop = service("/ik_trial/stop", "pendularm_interfaces/srv/TrialStop", Node::IkTrial),
-        /// The topic that has the frames which web viewers want.
+        /// The topic with the frames for web viewers.
         RepublishTfs = service("/republish_tfs", "tf2_web_republisher/srv/RepublishTFs", Node::TfRepublisher)
             .request(fields![
                 optional("source_frames", "string[]", ""),
@@ -289,7 +289,7 @@ table! {
                 required("dropped", "uint64", ""),
             ]),
     }
-    /// A question of rosapi, under either of its prefixes.
+    /// A service of rosapi, under either of its prefixes.
     Rosapi(Rosapi),
 }
 
@@ -298,7 +298,7 @@ const fn of_arm(name: &'static str, type_name: &'static str) -> ServiceEntry {
     service(name, type_name, Node::ArmSim)
 }
 
-/// A service that changes the arm, so that states from before are old.
+/// A service that changes the arm, after which earlier states are outdated.
 const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
     of_arm(name, type_name).supersedes(ARM_STATE)
 }
@@ -323,7 +323,7 @@ const TRIAL: [Field; 3] = [
     optional("success_hold", "float64", "s"),
 ];
 
-/// A viewer's wish: frames, as seen from another.
+/// A viewer's request: frames relative to another frame.
 pub(super) const WISH: [Field; 5] = [
     required("source_frames", "string[]", ""),
     required("target_frame", "string", ""),
@@ -339,7 +339,7 @@ impl Service {
         self.entry().name
     }
 
-    /// The service of that name, if it is the runtime's own; the leading slash may be left out.
+    /// The service of that name, if it is the runtime's own. The leading slash is optional.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let name = names::absolute(name);
@@ -347,7 +347,7 @@ impl Service {
         own.or_else(|| Rosapi::from_name(&name).map(Self::Rosapi))
     }
 
-    /// The service type, as ROS writes it.
+    /// The service type in ROS notation.
     #[must_use]
     pub const fn type_name(self) -> &'static str {
         self.entry().type_name
@@ -359,7 +359,7 @@ impl Service {
         self.entry().owner
     }
 
-    /// Whether it is a pure computation: answered when it is done, perhaps out of order, from a queue of its own.
+    /// Whether it is a pure computation. It has its own queue, and may answer late and out of order.
     #[must_use]
     pub const fn is_computation(self) -> bool {
         self.entry().is_computation
@@ -371,7 +371,7 @@ impl Service {
         self.entry().is_all_or_nothing
     }
 
-    /// Topics, as clients spell them. An older message of theirs may not follow the answer.
+    /// Topics, in clients' spelling. No earlier message of them may follow the answer.
     #[must_use]
     pub const fn supersedes(self) -> &'static [&'static str] {
         self.entry().supersedes

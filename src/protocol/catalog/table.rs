@@ -1,9 +1,9 @@
-//! How a table of the catalog is written: rows, and the fields in them.
+//! The macros that define a table of the catalog: rows and their fields.
 //!
-//! **Invariant:** a table is an enum, so that the compiler asks what a row is for wherever rows are told apart.
+//! **Invariant:** a table is an enum, so a `match` on rows must handle every row.
 
-/// Makes an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which gives the row. A
-/// variant behind the rows carries another table. A row with `if` and a feature is there only with that feature.
+/// Defines an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which returns the row. A
+/// variant after the rows holds another table. A row with `if` and a feature exists only with that feature.
 macro_rules! table {
     (
         $(#[$about:meta])*
@@ -35,7 +35,7 @@ macro_rules! table {
 }
 pub(in crate::protocol) use table;
 
-/// A list of fields in a row. It is a constant of its own: a row is an expression, and borrows its lists for ever.
+/// A list of fields in a row. It is a separate constant, because a row borrows its lists for `'static`.
 macro_rules! fields {
     ($($field:expr),* $(,)?) => { const { &[$($field),*] } };
 }

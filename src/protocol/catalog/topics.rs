@@ -1,6 +1,6 @@
 //! The topics: one row each.
 //!
-//! **Invariant:** a row carries the whole type of its messages, so that no topic is without a definition.
+//! **Invariant:** a row has the whole type of its messages, so every topic has a definition.
 
 use super::entry::{
     Constant, Direction, Field, TopicEntry, Type, byte, optional, published, required, subscribed,
@@ -49,7 +49,7 @@ table! {
             required("distance_remaining", "float64", "m"),
             required("elapsed", "float64", "s"),
         ]),
-        /// How a goal ended.
+        /// The result of a goal.
         IkResult = published("/ik_action/result", Node::IkAction, "pendularm_interfaces/msg/IkResult", fields![
             required("goal_id", "string", ""),
             required("outcome", "string", ""),
@@ -72,20 +72,20 @@ table! {
         /// The end effector's pose on its link.
         TfStatic = published("/tf_static", Node::ArmSim, "tf2_msgs/msg/TFMessage", &TRANSFORMS)
             .latched(),
-        /// Every frame as seen from the world, 30 Hz: for web viewers.
+        /// Every frame relative to `world`, 30 Hz, for web viewers.
         TfWeb = published(
             "/tf2_web_republisher/frames", Node::TfRepublisher, "tf2_web_republisher/msg/TFArray", &TRANSFORMS),
-        /// A viewer's wish for frames, as roslib 1 sends it.
+        /// A viewer's request for frames, as roslib 1 sends it.
         TfWebGoal = subscribed("/tf2_web_republisher/goal", Node::TfRepublisher,
             "tf2_web_republisher/msg/TFSubscriptionActionGoal", fields![
             required("header", "std_msgs/msg/Header", ""),
             required("goal_id", "actionlib_msgs/msg/GoalID", ""),
             required("goal", "tf2_web_republisher/msg/TFSubscriptionGoal", ""),
         ]),
-        /// Its end.
+        /// The end of such a request.
         TfWebCancel = subscribed(
             "/tf2_web_republisher/cancel", Node::TfRepublisher, "actionlib_msgs/msg/GoalID", &GOAL_ID),
-        /// The frames that were wished for.
+        /// The requested frames.
         TfWebFeedback = published("/tf2_web_republisher/feedback", Node::TfRepublisher,
             "tf2_web_republisher/msg/TFSubscriptionActionFeedback", fields![
             required("header", "std_msgs/msg/Header", ""),
@@ -97,7 +97,7 @@ table! {
             required("data", "string", ""),
         ])
             .latched(),
-        /// The arm as planners want it beside that: SRDF.
+        /// The arm as SRDF, for planners.
         RobotSemantics = published("/robot_description_semantic", Node::ArmSim, "std_msgs/msg/String", fields![
             required("data", "string", ""),
         ])
@@ -151,9 +151,10 @@ macro_rules! spellings {
     ($($topic:ident),*) => { &[$(Topic::$topic.name(), Topic::$topic.short_name()),*] };
 }
 
-/// Topics of the arm's state. `/diagnostics` is not among them: its news of a change come before the answer, and stay.
+/// Topics of the arm's state. `/diagnostics` is not among them: its message about a change is sent before the answer,
+/// and stays valid.
 pub(super) const ARM_STATE: &[&str] = spellings![JointStates, Clock, Tf];
-/// The same, and feedback of a goal: after a pause and a reset none is due.
+/// The same, and the feedback of a goal: after a pause and a reset none is due.
 pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = spellings![JointStates, Clock, Tf, IkFeedback];
 
 impl Topic {
@@ -169,27 +170,26 @@ impl Topic {
         self.entry().name.split_at(1).1
     }
 
-    /// The topic of that name, if it is the runtime's own; the leading slash may be left out.
+    /// The topic of that name, if it is the runtime's own. The leading slash is optional.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let name = names::absolute(name);
         Self::ALL.into_iter().find(|topic| topic.name() == name)
     }
 
-    /// The message type, as ROS writes it.
+    /// The message type in ROS notation.
     #[must_use]
     pub const fn type_name(self) -> &'static str {
         self.entry().message.name
     }
 
-    /// Whether the runtime sends or takes these messages.
+    /// Whether the runtime publishes or subscribes to these messages.
     #[must_use]
     pub const fn direction(self) -> Direction {
         self.entry().direction
     }
 
-    /// The node that publishes the topic, or that takes what is published there. The arm owns `/diagnostics`, to which
-    /// the gateway adds.
+    /// The node that publishes the topic or subscribes to it. The arm owns `/diagnostics`; the gateway adds a status.
     #[must_use]
     pub const fn owner(self) -> Node {
         self.entry().owner
@@ -218,8 +218,7 @@ mod tests {
     use super::ARM_STATE;
     use crate::protocol::catalog::{Rosapi, Service};
 
-    /// A question answered, a listing or a computation leaves the arm as it is: messages that wait for a
-    /// client stay.
+    /// A query, a listing or a computation does not change the arm, so waiting messages stay valid.
     #[test]
     fn the_arms_state_grows_old_by_what_changes_the_arm_and_by_nothing_else() {
         let questions = Rosapi::ALL.into_iter().map(Service::Rosapi);

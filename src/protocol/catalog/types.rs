@@ -1,7 +1,6 @@
-//! The message types of the runtime's own topics, and the types inside.
+//! The message types of the runtime's own topics, and the types inside them.
 //!
-//! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its
-//! end.
+//! **Invariant:** the type of every field of a known type is known too, so every definition is complete.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -13,10 +12,10 @@ use super::topics::{TRANSFORMS, Topic};
 use super::{Action, nested, parameter_types, ros2_types};
 use crate::protocol::names;
 
-/// Stands between the definitions of a type and of the types in it: 80 of these in a line.
+/// The separator between the definitions of a type and of the types in it: a line of 80.
 const SEPARATOR: &str = "=";
 
-/// All message types: first of the topics, then those inside.
+/// All message types: first those of the topics, then the types inside them.
 pub fn all() -> impl Iterator<Item = Type> {
     let topics = Topic::ALL.into_iter().map(Topic::message);
     topics
@@ -26,7 +25,7 @@ pub fn all() -> impl Iterator<Item = Type> {
         .chain(ros2_types::TYPES)
 }
 
-/// The types by their names, and by these without their middle part: a question about types looks up hundreds.
+/// The types by name, and by name without the middle part. One query about types looks up hundreds.
 static BY_NAME: LazyLock<HashMap<String, Type>> = LazyLock::new(|| {
     let parts = || Action::ALL.into_iter().flat_map(Action::parts);
     let mut by_name = HashMap::new();
@@ -39,8 +38,8 @@ static BY_NAME: LazyLock<HashMap<String, Type>> = LazyLock::new(|| {
     by_name
 });
 
-/// The type of that name, which may be that of an action's goal, result or feedback too; its middle part may be left
-/// out.
+/// The type of that name, including the types of an action's goal, result and feedback. The middle part of the name
+/// is optional.
 #[must_use]
 pub fn find(name: &str) -> Option<Type> {
     let found = BY_NAME.get(name);
@@ -50,7 +49,7 @@ pub fn find(name: &str) -> Option<Type> {
         .filter(|one| names::same_type(one.name, name))
 }
 
-/// `first`, and every type inside it, each once, in the order of first mention.
+/// `first` and every type inside it, each once, in the order of first use.
 #[must_use]
 pub fn with_parts(first: Type) -> Vec<Type> {
     let mut found = vec![first];
@@ -69,13 +68,13 @@ pub fn with_parts(first: Type) -> Vec<Type> {
     found
 }
 
-/// The text that defines a type and all types in it, as `.msg` files have it, units in comments.
+/// The text that defines a type and all types in it, in the format of `.msg` files, with units in comments.
 #[must_use]
 pub fn full_text(name: &str) -> Option<String> {
     find(name).map(definition)
 }
 
-/// The same for a type that need not be of the catalog.
+/// The same for a type that may be outside the catalog.
 #[must_use]
 pub fn definition(first: Type) -> String {
     let mut text = String::new();
@@ -111,7 +110,7 @@ const TIME: [Field; 2] = [
     required("nanosec", "uint32", "ns"),
 ];
 
-/// The types inside others.
+/// The types inside other types.
 const PARTS: [Type; 18] = [
     message(
         "std_msgs/msg/MultiArrayLayout",

@@ -1,22 +1,22 @@
 //! Messages of the nodes `ik`, `ik_action` and `ik_trial`: solutions, feedback, results, the status of a trial, and the
 //! trajectory that carries a goal's setpoint.
 //!
-//! **Invariant:** the fields are the catalog's, in its order; a missing value is `null`, except a target's `phi`, which
-//! is left out.
+//! **Invariant:** the fields are the catalog's, in its order. A missing value is `null`, except `phi` of a target,
+//! which is omitted.
 
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use crate::protocol::messages::{Header, JointTrajectory, JointTrajectoryPoint, Stamp};
 
-/// A place for the end effector.
+/// A target position of the end effector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TargetMessage {
     /// \[m\].
     pub x: f64,
     /// \[m\].
     pub y: f64,
-    /// Orientation of the last link \[rad\], where one was asked for.
+    /// Orientation of the last link \[rad\], if one was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<f64>,
 }
@@ -31,7 +31,7 @@ pub struct SolutionValues<'a> {
 /// `values` of `/ik_action/send_goal`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct GoalValues<'a> {
-    /// Names the goal in feedback, result and cancellation.
+    /// Identifies the goal in feedback, result and cancellation.
     pub goal_id: &'a str,
 }
 
@@ -51,7 +51,7 @@ pub struct TrialValues {
 pub struct IkFeedback {
     /// The goal.
     pub goal_id: String,
-    /// A place for the end effector.
+    /// A target position of the end effector.
     pub target: TargetMessage,
     /// The setpoint that the goal commanded \[rad\].
     pub positions: Vec<f64>,
@@ -68,7 +68,7 @@ pub struct IkResult {
     pub goal_id: String,
     /// `reached` or `preempted`.
     pub outcome: &'static str,
-    /// The place that the end effector was sent to.
+    /// The target position of the end effector.
     pub target: TargetMessage,
     /// Distance between end effector and target at the end \[m\].
     pub final_distance: f64,
@@ -85,9 +85,9 @@ pub struct TrialStatus {
     pub duration: f64,
     /// Targets reached since the start.
     pub targets_reached: u64,
-    /// The target being pursued.
+    /// The present target.
     pub target: Option<TargetMessage>,
-    /// Distance between end effector and target \[m\], as last heard.
+    /// Distance between end effector and target \[m\], from the latest feedback.
     pub error: Option<f64>,
     /// The setpoint that the goal commanded \[rad\].
     pub desired_positions: Option<Vec<f64>>,
@@ -95,7 +95,7 @@ pub struct TrialStatus {
     pub action_status: &'static str,
 }
 
-/// A trajectory of one point: the arm is to be at `positions` \[rad\], at rest, as soon as possible.
+/// A trajectory of one point: `positions` \[rad\], at rest, as soon as possible.
 #[must_use]
 pub fn setpoint_trajectory(joint_names: &[&str], positions: &[f64]) -> Box<RawValue> {
     let velocities = vec![0.0; positions.len()];

@@ -1,7 +1,7 @@
 //! The messages that the runtime sends: their types, and encoders that end each frame with a newline.
 //!
-//! Numbers that are not finite are written as `null`, in our own messages (`serde_json` does that) and in payloads that
-//! only pass through ([`Payload`]).
+//! Numbers that are not finite are written as `null`, in the runtime's own messages (by `serde_json`) and in forwarded
+//! payloads ([`Payload`]).
 //!
 //! **Invariant:** one frame is one line of valid JSON.
 
@@ -21,22 +21,22 @@ pub use self::telemetry::{
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series;
 
-/// Room for a frame before it grows: the state of a 3-link arm and any status of ours fit.
+/// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
 
-/// How serious a status is.
+/// The severity of a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Level {
-    /// All is well.
+    /// Information.
     Info,
-    /// Something was not as it should be, and was done all the same.
+    /// Something was unexpected, but the operation was done.
     Warning,
-    /// Something was not done.
+    /// The operation was not done.
     Error,
 }
 
 impl Level {
-    /// All levels, the least serious first.
+    /// All levels, the lowest severity first.
     pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Error];
 
     /// The level's name on the wire.
@@ -53,10 +53,10 @@ impl Level {
 /// The form in which `values` of a response with `result: false` gives the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ErrorForm {
-    /// An object, like that of any other response. It holds over raw TCP until the client says otherwise.
+    /// An object, as in any other response. This is the default over raw TCP.
     #[default]
     Object,
-    /// The text of `status`, as in `rosbridge_suite`. It holds over WebSocket until the client says otherwise.
+    /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
     Text,
 }
 
@@ -83,10 +83,11 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
         .end()
 }
 
-/// A message that a client sent, which only passes through; `msg` is valid JSON.
+/// A forwarded message of a client; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
-    // The capacity is exact: outboxes of slow subscribers keep ten thousands of these, and count their text alone.
+    // The capacity is exact, because outboxes of slow subscribers hold ten thousands of these and count only their
+    // text.
     let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
     Encoder::with_room("publish", head + topic.len() + msg.line().len())
         .text("topic", topic)
@@ -94,7 +95,8 @@ pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
         .end()
 }
 
-/// A frame that [`publish`] has made for `topic`, or a [series] of them, for those who know it by another spelling.
+/// A frame of [`publish`] for `topic`, or a [series] of them, rewritten for subscribers with another spelling of
+/// the name.
 #[must_use]
 pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
     if topic == spelling {
@@ -112,7 +114,7 @@ pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
     Bytes::from(text)
 }
 
-/// The message within a frame that [`publish`] has made for `topic`, as JSON.
+/// The message in a frame of [`publish`] for `topic`, as JSON.
 #[must_use]
 pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
     let quoted = serde_json::to_string(topic).map_or(0, |quoted| quoted.len());
@@ -122,8 +124,8 @@ pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
     msg.unwrap_or(b"null")
 }
 
-/// The answer to a service call; `values` is an object, `status` empty on success. Another client's `values` only pass
-/// through.
+/// The answer to a service call. `values` is an object, and `status` is empty on success. `values` of another client
+/// are forwarded.
 #[must_use]
 pub fn response(
     service: &str,
@@ -141,7 +143,7 @@ pub fn response(
         .end()
 }
 
-/// The answer to a call that failed: `values` is `{}` or says why, `status` says why.
+/// The answer to a failed call. `status` has the reason; `values` is `{}` or has the reason.
 #[must_use]
 pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorForm) -> Bytes {
     match form {
@@ -150,7 +152,7 @@ pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorFor
     }
 }
 
-/// Progress of a goal.
+/// Feedback of a goal.
 #[must_use]
 pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Serialize) -> Bytes {
     Encoder::op("action_feedback")
@@ -160,7 +162,8 @@ pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Seriali
         .end()
 }
 
-/// The end of a goal; `status` as `action_msgs/msg/GoalStatus` counts. Where `result` is false, `values` says why.
+/// The end of a goal. `status` is a value of `action_msgs/msg/GoalStatus`. If `result` is false, `values` has the
+/// reason.
 #[must_use]
 pub fn action_result(
     action: &str,
@@ -178,7 +181,7 @@ pub fn action_result(
         .end()
 }
 
-/// A goal that goes on to its action server, a client, under an id of the runtime's own; `args` only pass through.
+/// A goal for an action server that is a client, under an id of the runtime. `args` are forwarded.
 #[must_use]
 pub fn action_goal(
     action: &str,
@@ -215,7 +218,7 @@ pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
         .end()
 }
 
-/// A call that goes on to an external provider under an id of the runtime's own; `args` only pass through.
+/// A call for a provider that is a client, under an id of the runtime. `args` are forwarded.
 #[must_use]
 pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
     Encoder::with_room("call_service", args.line().len() + USUAL_FRAME)
@@ -229,7 +232,7 @@ pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Empty {}
 
-/// A frame under construction; members come in the order in which they are written.
+/// A frame under construction. Its members are in the order of the calls.
 struct Encoder {
     text: Vec<u8>,
 }
@@ -243,7 +246,7 @@ impl Encoder {
         Self::after(Vec::with_capacity(bytes), op)
     }
 
-    /// A frame behind what is there.
+    /// Appends a frame to the bytes.
     fn after(mut text: Vec<u8>, op: &str) -> Self {
         text.extend_from_slice(b"{\"op\":\"");
         text.extend_from_slice(op.as_bytes());
@@ -265,7 +268,8 @@ impl Encoder {
         self.key(key);
         let start = self.text.len();
         if serde_json::to_writer(&mut self.text, value).is_err() {
-            // A `Vec` takes every byte, and none of our types fails to serialise; should one, the frame stays valid.
+            // Writing to a `Vec` cannot fail, and all types here can be serialised. Otherwise the frame would still
+            // be valid.
             debug_assert!(false, "{key} can't be written as JSON");
             self.text.truncate(start);
             self.text.extend_from_slice(b"null");
@@ -282,7 +286,7 @@ impl Encoder {
 
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
-        // The frame may wait for long, and only its bytes are counted: its spare room is given back.
+        // The frame may wait for long, and only its bytes are counted, so its spare capacity is freed.
         self.text.shrink_to_fit();
         Bytes::from(self.text)
     }

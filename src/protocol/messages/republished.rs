@@ -1,7 +1,6 @@
-//! Frames as seen from another frame, for web viewers, which have `tf2_web_republisher` put chains of frames together.
+//! Frames relative to another frame, for web viewers that do not combine chains of frames themselves.
 //!
-//! **Invariant:** a frame that the arm has is found with and without a leading slash, and comes under the name that was
-//! asked for.
+//! **Invariant:** a frame of the arm is found with and without a leading slash, and is sent under the requested name.
 
 use super::scene::{
     END_EFFECTOR, OwnedHeader, Quaternion, TfMessage, Transform, TransformStamped, Vector3, WORLD,
@@ -21,7 +20,7 @@ struct FramePose {
 }
 
 impl FramePose {
-    /// The same as seen from `other`.
+    /// The same relative to `other`.
     fn seen_from(self, other: Self) -> Self {
         let (sin, cos) = other.angle.sin_cos();
         let (x, y) = (self.x - other.x, self.y - other.y);
@@ -50,7 +49,7 @@ impl FramePose {
     }
 }
 
-/// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], and where it is in the world.
+/// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], with its pose in the world.
 fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePose)> {
     let mut at = FramePose {
         x: 0.0,
@@ -80,7 +79,7 @@ fn without_slash(name: &str) -> &str {
     name.strip_prefix('/').unwrap_or(name)
 }
 
-/// The frames `sources` as seen from `target`. Frames that the arm does not have are left out.
+/// The frames `sources` relative to `target`. Unknown frames are omitted.
 #[must_use]
 pub fn seen_from<'a>(
     stamp: Stamp,
@@ -141,7 +140,7 @@ mod tests {
     fn a_frame_is_where_the_links_put_it() {
         let right = std::f64::consts::FRAC_PI_2;
         let end_effector = seen("world", "/hand", [right, -right]);
-        // A sine and a cosine, each good to an ulp.
+        // A sine and a cosine, each accurate to one ulp.
         assert!(
             (end_effector.translation.x - 0.5).abs() < 1e-15
                 && (end_effector.translation.y - 1.0).abs() < 1e-15

@@ -1,7 +1,6 @@
 //! Messages for 3D tools and log viewers: frames, the arm's description, warnings.
 //!
-//! **Invariant:** the frames are those of the [description](crate::protocol::ros::urdf), and a frame's parent is the
-//! one it has there.
+//! **Invariant:** frames and their parents are those of the [description](crate::protocol::ros::urdf).
 
 use serde::Serialize;
 
@@ -38,11 +37,11 @@ pub struct TransformStamped {
     pub header: OwnedHeader,
     /// The frame.
     pub child_frame_id: String,
-    /// Its place.
+    /// Its pose.
     pub transform: Transform,
 }
 
-/// `std_msgs/msg/Header` with a name of its own.
+/// `std_msgs/msg/Header` with its own frame name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct OwnedHeader {
     /// Simulation time.
@@ -146,7 +145,7 @@ pub fn moving_frames(stamp: Stamp, lengths: &[f64], positions: &[f64]) -> TfMess
     }
 }
 
-/// The frame of the end effector, which the last link carries.
+/// The frame of the end effector, fixed to the last link.
 #[must_use]
 pub fn fixed_frames(stamp: Stamp, lengths: &[f64]) -> TfMessage {
     let last = lengths.len().saturating_sub(1);

@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-/// The frame that everything stands in.
+/// The fixed frame.
 pub const WORLD: &str = "world";
 /// Nanoseconds in a second.
 const NANOSECONDS: u32 = 1_000_000_000;
@@ -19,13 +19,13 @@ pub struct Stamp {
 }
 
 impl Stamp {
-    /// The last time that a stamp can hold.
+    /// The largest stamp.
     pub const MAX: Self = Self {
         sec: i32::MAX,
         nanosec: NANOSECONDS - 1,
     };
 
-    /// `seconds` \[s\] to the nearest nanosecond. Saturates at [`Stamp::MAX`]; 0 for what is negative or no number.
+    /// `seconds` \[s\] to the nearest nanosecond. Saturates at [`Stamp::MAX`]; 0 for negative numbers and NaN.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
@@ -53,7 +53,7 @@ impl Stamp {
 pub struct Header<'a> {
     /// Simulation time.
     pub stamp: Stamp,
-    /// [`WORLD`] in what the arm publishes.
+    /// [`WORLD`] in all messages of the arm.
     pub frame_id: &'a str,
 }
 
@@ -90,7 +90,7 @@ pub struct JointTrajectory<'a> {
     pub header: Header<'a>,
     /// Joint names.
     pub joint_names: &'a [&'a str],
-    /// The points; the last is held.
+    /// The points. The last one is held.
     pub points: &'a [JointTrajectoryPoint<'a>],
 }
 
@@ -103,7 +103,7 @@ pub struct JointTrajectoryPoint<'a> {
     pub velocities: &'a [f64],
     /// Accelerations \[rad/s²\]; empty: not prescribed.
     pub accelerations: &'a [f64],
-    /// When to be there; 0: at once.
+    /// Time of the point; 0 means at once.
     pub time_from_start: Stamp,
 }
 
@@ -126,7 +126,7 @@ pub struct DiagnosticArray<'a> {
 /// `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct DiagnosticStatus<'a> {
-    /// 0 all is well, 1 warning, 2 error.
+    /// 0 is OK, 1 a warning, 2 an error.
     pub level: u8,
     /// The part of the runtime.
     pub name: &'a str,

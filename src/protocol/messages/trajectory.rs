@@ -1,6 +1,6 @@
-//! Reads what comes in on `/joint_trajectory`: the last point is the setpoint.
+//! Reads messages on `/joint_trajectory`: the last point is the setpoint.
 //!
-//! **Invariant:** a setpoint that is given has one finite position and one finite velocity for each joint of the arm.
+//! **Invariant:** a returned setpoint has one finite position and one finite velocity for each joint of the arm.
 
 use serde_json::value::RawValue;
 
@@ -9,12 +9,12 @@ use crate::protocol::wire::json::Entries;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::text;
 
-/// A message as the runtime's own listener hears it, without the points of a long trajectory that do not count.
+/// A message for the runtime itself. Unused points of a long trajectory are removed.
 #[derive(Debug, Clone)]
 pub struct NodeMessage {
     /// The message.
     pub msg: Payload,
-    /// How many points of it were left out, all of them before its first.
+    /// The number of removed points, all of them before its first.
     pub left_out: usize,
 }
 
@@ -26,7 +26,7 @@ impl From<Payload> for NodeMessage {
 }
 
 impl NodeMessage {
-    /// Reads the setpoint as [`joint_trajectory`] does, and names its fields as they were in the whole message.
+    /// Reads the setpoint with [`joint_trajectory`], and names fields by their index in the whole message.
     ///
     /// # Errors
     /// The errors of [`joint_trajectory`].
@@ -53,20 +53,20 @@ pub enum TrajectoryError {
         /// The field's path in the message.
         field: String,
     },
-    /// A field is not what it has to be.
+    /// A field has the wrong type or value.
     #[error("{field} must be {expected}, got {found}")]
     Mistyped {
         /// The field's path in the message.
         field: String,
-        /// The kind of value that it has to be.
+        /// The expected kind of value.
         expected: &'static str,
-        /// The value that came, shortened.
+        /// The received value, shortened.
         found: String,
     },
     /// There is no point.
     #[error("points must have at least one entry")]
     NoPoints,
-    /// The positions are not one per joint.
+    /// The number of positions differs from the number of joints.
     #[error("{field} must have {expected} entries, got {got}{}", lacking(.missing))]
     Length {
         /// The field's path in the message.
@@ -75,10 +75,10 @@ pub enum TrajectoryError {
         expected: usize,
         /// Entries in the message.
         got: usize,
-        /// Joints that the message's `joint_names` leave out, where they are some of the arm's.
+        /// Joints missing in `joint_names`, if all its names are joints of the arm.
         missing: Vec<String>,
     },
-    /// A position is infinite or no number.
+    /// A position is not finite.
     #[error("{field} must be a finite number")]
     NotFinite {
         /// The entry's path in the message.
@@ -95,11 +95,11 @@ fn lacking(missing: &[String]) -> String {
 
 /// Reads the setpoint in a `trajectory_msgs/msg/JointTrajectory` for an arm with these joints.
 ///
-/// Only the last point counts. Where `joint_names` is a permutation of `joints` its values are taken by name, otherwise
-/// by position. Velocities that are missing, too few, too many or not finite are zeros.
+/// Only the last point counts. If `joint_names` is a permutation of `joints`, its values are matched by name, otherwise
+/// by position. Velocities that are missing, too few, too many or not finite count as zeros.
 ///
 /// # Errors
-/// Where there is no point, or the positions are not one finite number per joint.
+/// If there is no point, or the positions are not one finite number per joint.
 pub fn joint_trajectory(
     msg: &RawValue,
     joints: &[&str],
@@ -147,8 +147,8 @@ fn read(
     })
 }
 
-/// The message with its last point alone, and how many points were left out. It gives the same setpoint, or the same
-/// complaint. `None` if there are no points.
+/// The message with only its last point, and the number of removed points. It gives the same setpoint or the same
+/// error. `None` if there are no points.
 pub(crate) fn condensed(msg: &RawValue) -> Option<(String, usize)> {
     let [names, points] = json::members(msg.get(), &["joint_names", "points"]).ok()?;
     let points = json::entries(points?, 0)?;
@@ -208,7 +208,7 @@ fn read_positions(
         .collect()
 }
 
-/// The joints that `names` leaves out, if it names some of them and nothing else.
+/// The joints missing in `names`, if all its names are joints.
 fn left_out(names: &Entries<'_>, joints: &[&str]) -> Vec<String> {
     if names.count == 0 || names.count != names.first.len() {
         return Vec::new();
@@ -228,7 +228,7 @@ fn left_out(names: &Entries<'_>, joints: &[&str]) -> Vec<String> {
     missing.map(|(_, joint)| (*joint).to_owned()).collect()
 }
 
-/// The place in the message of each joint of the arm; `None` unless `names` is a permutation of `joints`.
+/// The index in the message of each joint of the arm; `None` unless `names` is a permutation of `joints`.
 fn permutation(names: &Entries<'_>, joints: &[&str]) -> Option<Vec<usize>> {
     if names.count != joints.len() {
         return None;

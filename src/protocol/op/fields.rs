@@ -1,10 +1,10 @@
-//! Reads a request field by field and collects what it rejects, by name.
+//! Reads a request field by field and collects the rejections by name.
 //!
-//! Every field is read alone: a bad one is left out and remembered, the others still count. The catalog says which
-//! fields a service has, in which order a positional array gives them, and which must be there. A field that is an
-//! object is read member by member in the same way; its members are named `gains.kp`.
+//! Every field is read alone: a bad one is rejected and recorded, and the others still count. The catalog has the
+//! fields of a service, their order in a positional array, and which are required. A field that is an object is
+//! read member by member in the same way. Its members have names such as `gains.kp`.
 //!
-//! **Invariant:** each rejected field is named once, or once for each entry of an array that is at fault.
+//! **Invariant:** each rejected field is named once, or once for each wrong entry of an array.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -25,9 +25,9 @@ pub struct Fields<'a> {
     fields: &'static [Field],
     /// Whether `null` in an optional field means absent.
     null_is_absent: bool,
-    /// The text before the names: empty, or the name of the object and a full stop.
+    /// The prefix of the names: empty, or the name of the object and a full stop.
     prefix: String,
-    /// The values that came, in the order of the catalog.
+    /// The received values, in the order of the catalog.
     values: Vec<Option<&'a RawValue>>,
     rejections: Rejections,
 }
@@ -36,7 +36,7 @@ impl<'a> Fields<'a> {
     /// Sorts the arguments of a call into the fields of the service. Unknown fields are ignored.
     ///
     /// # Errors
-    /// Where a positional array has more entries than the service has fields.
+    /// If a positional array has more entries than the service has fields.
     pub fn read(args: &'a Arguments, service: Service) -> Result<Self, RejectedField> {
         Self::of(service).filled(args)
     }
@@ -44,7 +44,7 @@ impl<'a> Fields<'a> {
     /// Sorts the fields of a goal. One bad field rejects the whole goal.
     ///
     /// # Errors
-    /// Where a positional array has more entries than a goal has fields.
+    /// If a positional array has more entries than a goal has fields.
     pub fn of_goal(args: &'a Arguments, action: Action) -> Result<Self, RejectedField> {
         Self::with(action.goal_fields(), true).filled(args)
     }
@@ -52,7 +52,7 @@ impl<'a> Fields<'a> {
     /// Sorts the fields of a message. One bad field rejects the whole message.
     ///
     /// # Errors
-    /// Where it is no message.
+    /// If it is not a message.
     pub fn of_message(msg: &'a Arguments, topic: Topic) -> Result<Self, RejectedField> {
         Self::with(topic.fields(), true).filled(msg)
     }
@@ -95,8 +95,8 @@ impl<'a> Fields<'a> {
         Ok(read)
     }
 
-    /// Sorts the arguments of a call. If they are rejected as a whole they count as none, so that the answer can echo
-    /// the values as they are.
+    /// Sorts the arguments of a call. If they are rejected as a whole, all fields count as missing, so the answer can
+    /// echo the present values.
     #[must_use]
     pub fn read_or_none(args: &'a Arguments, service: Service) -> Self {
         Self::read(args, service).unwrap_or_else(|rejection| Self {
@@ -105,7 +105,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The fields of a request that gives one field alone.
+    /// The fields of a request with only one field.
     #[must_use]
     pub fn single(service: Service, name: &str, value: &'a RawValue) -> Self {
         let mut fields = Self::of(service);
@@ -116,7 +116,7 @@ impl<'a> Fields<'a> {
         fields
     }
 
-    /// The fields of a request that gives none.
+    /// The fields of an empty request.
     fn of(service: Service) -> Self {
         Self::with(service.fields(), service.all_or_nothing())
     }
@@ -191,7 +191,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The value as it came.
+    /// The raw value.
     pub fn raw(&mut self, name: &'static str) -> Option<&'a RawValue> {
         self.take(name)
     }
@@ -258,8 +258,8 @@ impl<'a> Fields<'a> {
         self.mistyped(name, format!("one of {}", names.join(", ")), raw)
     }
 
-    /// An object, whose members `read` reads as it would the fields of a request; `None` if it is absent or no object.
-    /// Which members there are is up to the field's type.
+    /// An object. `read` reads its members like the fields of a request. `None` if it is absent or not an object. The
+    /// field's type defines the members.
     pub fn object<T>(
         &mut self,
         name: &'static str,
@@ -285,7 +285,7 @@ impl<'a> Fields<'a> {
         Some(value)
     }
 
-    /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
+    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
         self.rejections
             .refuse(&format!("{}{name}", self.prefix), reason);
@@ -297,13 +297,13 @@ impl<'a> Fields<'a> {
         self.rejections.as_slice()
     }
 
-    /// Returns the rejections once all has been read.
+    /// Returns the rejections after the whole request has been read.
     #[must_use]
     pub fn finish(self) -> Rejections {
         self.rejections
     }
 
-    /// Whether every field that was read so far was good: the `result` of the response.
+    /// Whether every field read so far was valid: the `result` of the response.
     #[must_use]
     pub fn accepted(&self) -> bool {
         self.rejections.is_empty()
@@ -315,7 +315,7 @@ impl<'a> Fields<'a> {
         self.rejections.status()
     }
 
-    /// Takes the value that came under that name. A required field that is absent is rejected.
+    /// Takes the value of that name. A missing required field is rejected.
     fn take(&mut self, name: &'static str) -> Option<&'a RawValue> {
         let index = self.fields.iter().position(|field| field.name == name);
         debug_assert!(index.is_some(), "{name} is not in the catalog");

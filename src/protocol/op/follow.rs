@@ -1,7 +1,7 @@
 //! Reads the goal of `control_msgs/action/FollowJointTrajectory`: points with times, and tolerances.
 //!
-//! **Invariant:** a goal that is given has in every point a finite position of each joint, in the arm's order, and
-//! velocities of all joints or none. Anything wrong is refused by name.
+//! **Invariant:** every point of a returned goal has a finite position of each joint, in the arm's order, and
+//! velocities of all joints or none. Every error names its field.
 
 use serde_json::value::RawValue;
 
@@ -10,7 +10,8 @@ use super::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::catalog::Action;
 use crate::protocol::wire::{json, text};
 
-/// Points of a path: more than any planner makes for a few joints; each takes a hundred bytes while the goal lasts.
+/// Most points of a path: more than a planner needs for a few joints. Each takes a hundred bytes while the goal is
+/// active.
 pub const MAX_POINTS: usize = 4096;
 /// Most entries of a list of tolerances: enough for each joint several times over.
 const MAX_TOLERANCES: usize = 16;
@@ -20,18 +21,18 @@ const MAX_TOLERANCES: usize = 16;
 pub struct FollowGoal {
     /// The points, at least one.
     pub points: Vec<FollowPoint>,
-    /// How far off joints may be on the way.
+    /// Tolerances on the way.
     pub path_tolerance: Vec<JointTolerance>,
-    /// How far off joints may be at the end.
+    /// Tolerances at the end.
     pub goal_tolerance: Vec<JointTolerance>,
-    /// How long after the end joints may take to get there \[s\]; 0 for the default, negative for no limit.
+    /// Time after the end in which the joints must arrive \[s\]; 0 for the default, negative for no limit.
     pub goal_time_tolerance: f64,
 }
 
 /// A point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FollowPoint {
-    /// When, from the start \[s\]; not negative.
+    /// Time from the start \[s\], not negative.
     pub time: f64,
     /// Positions \[rad\].
     pub position: Vec<f64>,
@@ -39,7 +40,7 @@ pub struct FollowPoint {
     pub velocity: Option<Vec<f64>>,
 }
 
-/// How far off a joint may be: 0 for the default, negative for any distance.
+/// The tolerance of a joint: 0 for the default, negative for no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointTolerance {
     /// Index of the joint.
@@ -54,7 +55,7 @@ impl FollowGoal {
     /// Reads a goal for an arm with these joints.
     ///
     /// # Errors
-    /// All that is wrong with it, or with the first point that is no good.
+    /// All errors of the goal, or of the first invalid point.
     pub fn read(args: &Arguments, joints: &[&str]) -> Result<Self, Rejections> {
         let mut fields = Fields::of_goal(args, Action::FollowJointTrajectory)?;
         let trajectory = fields.raw("trajectory");
@@ -115,7 +116,7 @@ fn points(trajectory: &RawValue, joints: &[&str]) -> Result<Vec<FollowPoint>, Re
         .collect()
 }
 
-/// The place in the message of each joint of the arm.
+/// The index in the message of each joint of the arm.
 fn order(names: Option<&RawValue>, joints: &[&str]) -> Result<Vec<usize>, RejectedField> {
     let field = "trajectory.joint_names";
     let expected = format!("must name {}, each once", joints.join(", "));
@@ -149,7 +150,7 @@ fn point(raw: &RawValue, field: &str, order: &[usize]) -> Result<FollowPoint, Re
     })
 }
 
-/// Whether it is an array without entries, which in a message of ROS means that there is none.
+/// Whether it is an empty array, which counts as missing in a ROS message.
 fn is_empty(raw: &RawValue) -> bool {
     json::entries(raw, 0).is_some_and(|entries| entries.count == 0)
 }
@@ -194,7 +195,7 @@ fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedFiel
 /// A duration in seconds, under the names of ROS 2 or of ROS 1: the sum of its parts, each within `bound`.
 ///
 /// # Errors
-/// If it is none; the reason names `field`.
+/// If it is not a duration. The reason names `field`.
 pub fn seconds(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedField> {
     let names = ["sec", "nanosec", "secs", "nsecs"];
     let [sec, nanosec, secs, nsecs] = json::members(raw.get(), &names)

@@ -2,15 +2,15 @@
 //!
 //! **Invariant:** the numbers are those of `action_msgs/msg/GoalStatus`.
 
-/// How a goal stands at its end, as `action_msgs/msg/GoalStatus` counts.
+/// The final status of a goal, as in `action_msgs/msg/GoalStatus`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GoalStatus {
     /// Never accepted.
     Unknown = 0,
     /// Reached.
     Succeeded = 4,
-    /// Ended because somebody asked for it.
+    /// Cancelled by a client.
     Canceled = 5,
-    /// Ended because another goal or a reset took its place.
+    /// Replaced by another goal or ended by a reset.
     Aborted = 6,
 }

@@ -1,10 +1,9 @@
 //! Every rosbridge operation that a client may send, read from a frame.
 //!
-//! Payloads (`msg`, `args`, `values`) stay raw: a payload that only passes through is never parsed further than
-//! its syntax.
+//! Payloads (`msg`, `args`, `values`) stay raw. Only the syntax of a forwarded payload is parsed.
 //!
-//! **Invariant:** every frame gives exactly one operation or exactly one error that names what is wrong with it, and
-//! its `id` either way.
+//! **Invariant:** every frame gives exactly one operation or exactly one error that names the fault, and its `id` in
+//! both cases.
 
 pub mod fields;
 pub mod follow;
@@ -27,22 +26,21 @@ use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
 pub use reader::{OPS, read, read_start};
 
-/// Longest `args` and trajectory for a node of ours, without the members that it has no use for: the gateway's thread
-/// reads them, within some tenth of a millisecond. For computations, which workers read, and for other clients they may
-/// be as long as a frame.
+/// Longest `args` and trajectory for a node of the runtime, without unused members. The gateway's thread reads them
+/// within some tenths of a millisecond. For computations, which workers read, and for other clients they may be as long
+/// as a frame.
 pub const MAX_ARGS: usize = 16 * 1024;
-/// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
+/// Longest `throttle_rate`: a year, longer than any connection.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
-/// Largest `queue_length`: the [outbox](super::outbox) bounds what is held back by bytes, and no message is shorter
-/// than 40.
+/// Largest `queue_length`. The [outbox](super::outbox) bounds held messages by bytes, and no message has fewer than 40.
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
 /// Longest `timeout` of a forwarded call: a day.
 pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
 
-/// A frame, read.
+/// A parsed frame.
 #[derive(Debug)]
 pub struct Incoming {
-    /// The sender's `id`, as it came; there also where the operation is in error.
+    /// The sender's `id`, unchanged, also if the operation has an error.
     pub id: Option<Payload>,
     /// The operation.
     pub op: Result<Op, OpError>,
@@ -58,7 +56,7 @@ pub enum Op {
         /// Message type, if given.
         type_name: Option<String>,
     },
-    /// Withdraws that.
+    /// Ends this registration.
     Unadvertise {
         /// Topic name.
         topic: String,
@@ -69,10 +67,10 @@ pub enum Op {
         topic: String,
         /// The message, an object.
         msg: Payload,
-        /// The part of it that the runtime's own listener needs, where the message is long.
+        /// The part that the runtime itself needs, if the message is long.
         heard: Option<NodeMessage>,
     },
-    /// Delivers messages that go out as they have come in.
+    /// Delivers messages that are forwarded unchanged.
     PublishLines(Series),
     /// Registers the sender as a subscriber.
     Subscribe(Subscribe),
@@ -88,7 +86,7 @@ pub enum Op {
         /// Service type, if given.
         type_name: Option<String>,
     },
-    /// Withdraws that.
+    /// Ends this registration.
     UnadvertiseService {
         /// Service name.
         service: String,
@@ -102,7 +100,7 @@ pub enum Op {
         /// Action name.
         action: String,
     },
-    /// An operation of an action server: a client that carries out the goals of an action.
+    /// An operation of an action server: a client that executes the goals of an action.
     ServeAction {
         /// Action name.
         action: String,
@@ -118,9 +116,9 @@ pub enum Op {
         /// The form of errors, if it is to change.
         errors: Option<ErrorForm>,
     },
-    /// Shows who the sender is, where the runtime asks for that.
+    /// Authenticates the sender, if the runtime requires it.
     Auth {
-        /// The token that it shows; a command of this program has none where none was given.
+        /// The token. A command of this program may have none.
         token: Option<String>,
         /// Whether the sender is a command of this program, which may use a kept place.
         is_command: bool,
@@ -136,7 +134,8 @@ pub enum Op {
         /// The provider's own `status`, if it is a string.
         status: Option<String>,
     },
-    /// An answer that cannot be passed on. Its call or goal fails; without an id, the only one of its sender.
+    /// An answer that cannot be forwarded. Its call or goal fails. Without an id, it is the only one that its
+    /// sender has.
     BadAnswer {
         /// Whether it is for a goal.
         of_goal: bool,
@@ -147,17 +146,17 @@ pub enum Op {
     },
 }
 
-/// The least serious status that a client wants; `None` for no status at all.
+/// The lowest severity of statuses that a client gets; `None` for no status at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verbosity(pub Option<Level>);
 
 impl Verbosity {
-    /// Every status: the level over raw TCP until the client says otherwise.
+    /// Every status: the default over raw TCP.
     pub const ALL: Self = Self(Some(Level::Info));
-    /// No status: the level over WebSocket until the client says otherwise.
+    /// No status: the default over WebSocket.
     pub const NONE: Self = Self(None);
 
-    /// Whether a status of that level is wanted.
+    /// Whether the client gets a status of that level.
     #[must_use]
     pub fn wants(self, level: Level) -> bool {
         self.0.is_some_and(|least| level >= least)
@@ -173,27 +172,26 @@ pub struct Subscribe {
     pub type_name: Option<String>,
     /// Least time between deliveries; zero for no throttling; at most [`MAX_THROTTLE`].
     pub throttle: Duration,
-    /// How many messages may wait, and be held back by throttling; 0 where it is not given; at most
-    /// [`MAX_QUEUE_LENGTH`].
+    /// Most messages that may wait or be held by throttling; 0 if it is not given; at most [`MAX_QUEUE_LENGTH`].
     pub queue_length: usize,
-    /// How messages are to be written.
+    /// The form of its messages.
     pub encoding: Encoding,
 }
 
-/// The form in which a subscriber wants its messages.
+/// The form of a subscriber's messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Encoding {
     /// The encoding.
     pub compression: Compression,
-    /// Longest piece of a message in JSON, in bytes, a power of two; longer messages come in fragments. With none, a
-    /// message always comes in one piece, as binary messages do.
+    /// Longest piece of a message in JSON, in bytes, a power of two. Longer messages are sent in fragments. Without
+    /// it, and for binary messages, a message is one piece.
     pub fragment_size: Option<usize>,
-    /// Whether stamps have the names of ROS 1 too. The registry decides it by the topic.
+    /// Whether stamps also have the names of ROS 1. The registry sets it by the topic's type.
     pub ros1_stamps: bool,
 }
 
 impl Encoding {
-    /// Joins two subscriptions of one client: the denser encoding, the smaller pieces, more names.
+    /// Combines two subscriptions of one client: the denser encoding, the smaller pieces, and all names of stamps.
     #[must_use]
     pub fn merged(self, other: Self) -> Self {
         let compression = self.compression.max(other.compression);
@@ -206,10 +204,10 @@ impl Encoding {
     }
 }
 
-/// The encoding of a message. If a client asked for several, the last in this order counts.
+/// The encoding of a message. If a client requests several, the last one in this order applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Compression {
-    /// JSON. It is used for `png` too, which saves nothing on messages as short as ours.
+    /// JSON. It is also used for `png`, which saves nothing on short messages.
     #[default]
     None,
     /// CBOR, with typed arrays.
@@ -225,7 +223,7 @@ pub struct CallService {
     pub service: String,
     /// Its arguments.
     pub args: Arguments,
-    /// How long an external provider may take, if given; at most [`MAX_TIMEOUT`].
+    /// The timeout for a provider that is a client, if given; at most [`MAX_TIMEOUT`].
     pub timeout: Option<Duration>,
 }
 
@@ -238,11 +236,11 @@ pub struct ActionGoal {
     pub type_name: Option<String>,
     /// Its fields.
     pub args: Arguments,
-    /// Whether feedback is wanted.
+    /// Whether the client gets feedback.
     pub feedback: bool,
 }
 
-/// An operation of an action server; where it is about one goal, the frame's id says which.
+/// An operation of an action server. If it concerns one goal, the frame's id identifies the goal.
 #[derive(Debug, Clone)]
 pub enum ActionServerOp {
     /// The sender serves the action from now on.
@@ -250,20 +248,20 @@ pub enum ActionServerOp {
         /// Action type, if given.
         type_name: Option<String>,
     },
-    /// Withdraws that.
+    /// Ends this registration.
     Unadvertise,
-    /// Passes on the progress of a goal.
+    /// Forwards feedback of a goal.
     Feedback {
         /// Any value.
         values: Payload,
     },
-    /// Passes on how a goal has ended.
+    /// Forwards the result of a goal.
     End {
         /// Any value.
         values: Payload,
-        /// The status, as `action_msgs/msg/GoalStatus` counts.
+        /// The status, a value of `action_msgs/msg/GoalStatus`.
         status: u8,
-        /// Whether it has come to a result.
+        /// Whether the goal has a result.
         result: bool,
     },
 }
@@ -271,11 +269,11 @@ pub enum ActionServerOp {
 /// The arguments of a call.
 #[derive(Debug, Clone)]
 pub enum Arguments {
-    /// Fields by name; `{}` where `args` was absent or `null`.
+    /// Fields by name; `{}` if `args` was absent or `null`.
     Object(Payload),
     /// Fields in documented order.
     Positional(Payload),
-    /// Something else. The node that takes the call refuses it, since some services echo their values even then.
+    /// Any other value. The node that serves the call refuses it, because some services echo their values even then.
     Neither(Payload),
 }
 
@@ -299,13 +297,13 @@ impl Arguments {
     }
 }
 
-/// Why a frame is no operation, and the form of the answer.
+/// Why a frame is not a valid operation, and the form of the answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpError {
-    /// A fault that is answered by an error `status`.
+    /// A fault that gets an error `status`.
     #[error(transparent)]
     Status(#[from] Problem),
-    /// A call whose service is known; it is answered by `service_response` with `result: false`.
+    /// A faulty call of a known service. It gets a `service_response` with `result: false`.
     #[error("{problem}")]
     Call {
         /// The service that was called.
@@ -313,10 +311,10 @@ pub enum OpError {
         /// The fault.
         problem: Problem,
     },
-    /// A goal of a named action; it is answered by an error `status`, and by `action_result` with `result: false`.
+    /// A faulty goal of a named action. It gets an error `status` and an `action_result` with `result: false`.
     #[error("{problem}")]
     Goal {
-        /// The action that it is for.
+        /// The action of the goal.
         action: String,
         /// The fault.
         problem: Problem,
@@ -326,19 +324,19 @@ pub enum OpError {
 /// A fault of an operation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
-    /// Not a frame; says why.
+    /// Not a frame; holds the reason.
     #[error("{0}")]
     NotAFrame(String),
-    /// Not a JSON object; holds the parser's complaint, shortened.
+    /// Not a JSON object; holds the parser's message, shortened.
     #[error("malformed frame: {0}")]
     NotJson(String),
     /// There is no `op`.
     #[error("malformed frame: op is required")]
     NoOp,
-    /// `op` is no string; holds what it is.
+    /// `op` is not a string; holds its value.
     #[error("malformed frame: op must be a string, got {0}")]
     OpNotText(String),
-    /// No operation of ours; holds its name, shortened.
+    /// An unknown operation; holds its name, shortened.
     #[error("unknown op \"{0}\"")]
     UnknownOp(String),
     /// A required field is absent.
@@ -356,21 +354,21 @@ pub enum Problem {
         op: &'static str,
         /// The field.
         field: &'static str,
-        /// The kind of value that it has to be.
+        /// The expected kind of value.
         expected: &'static str,
-        /// The value that came, shortened.
+        /// The received value, shortened.
         found: String,
     },
-    /// A field is longer than it may be: [`MAX_NAME`], [`MAX_ARGS`].
+    /// A field is longer than its limit: [`MAX_NAME`] or [`MAX_ARGS`].
     #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
     TooLong {
         /// The operation.
         op: &'static str,
         /// The field.
         field: &'static str,
-        /// How long it may be, in bytes.
+        /// Its limit in bytes.
         limit: usize,
-        /// How long it is, in bytes.
+        /// Its length in bytes.
         length: usize,
     },
 }

@@ -1,6 +1,6 @@
 //! Reads an operation from a frame.
 //!
-//! **Invariant:** a member is looked at only for the operations that have it; for all others only its syntax counts.
+//! **Invariant:** a member is read only for operations that have it. For all others only its syntax is checked.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -21,10 +21,10 @@ use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::{json, text};
 
-/// Characters of the JSON parser's complaint that go into a message: it may quote the client.
+/// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
 const MAX_COMPLAINT: usize = 160;
 
-/// The members of a frame that mean something to us.
+/// The members of a frame that the runtime reads.
 const KEYS: [&str; 25] = [
     "op",
     "id",
@@ -75,7 +75,7 @@ pub const OPS: [&str; 18] = [
     "action_result",
 ];
 
-/// Reads a frame. Unknown members are ignored; of a repeated one the last counts.
+/// Reads a frame. Unknown members are ignored. Of a repeated member the last one counts.
 #[must_use]
 pub fn read(frame: &str) -> Incoming {
     let mut members = [None; KEYS.len()];
@@ -113,7 +113,7 @@ impl<'a> OpReader<'a> {
             .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
     }
 
-    /// A call. As soon as its service is known any other fault is answered as a call.
+    /// A call. Once its service is known, every other fault gets a `service_response`.
     fn call(&self) -> Result<Op, OpError> {
         let service = self.name("service").map_err(OpError::Status)?;
         let fields = Service::from_name(&service)
@@ -181,7 +181,7 @@ impl<'a> OpReader<'a> {
             type_name: self.optional_text("type")?,
             throttle: self.throttle()?,
             queue_length: self.queue_length()?,
-            // Merging it with the default drops the fragment size of a binary encoding, which is not cut up.
+            // Merging with the default removes the fragment size of a binary encoding, which is never split.
             encoding: Encoding::default().merged(Encoding {
                 compression: self.compression()?,
                 fragment_size: self.fragment_size()?,
@@ -210,7 +210,7 @@ impl<'a> OpReader<'a> {
                 _ => json::integer(raw).filter(|size| *size > 0).map(Some),
             }
         })?;
-        // With powers of two alone a message is cut up in few ways, however many subscribers there are.
+        // With only powers of two, a message is split in few ways, for any number of subscribers.
         let size = size.flatten().map(|size| 1 << size.ilog2());
         Ok(size.and_then(|size: u64| usize::try_from(size).ok()))
     }
@@ -218,7 +218,7 @@ impl<'a> OpReader<'a> {
     fn piece(&self) -> Result<Piece, Problem> {
         let id = self.required("id")?;
         self.short("id", id.get())?;
-        // A number that does not fit is refused as too large a little later.
+        // A number that does not fit is refused as too large below.
         let index = |field| {
             let number = self.typed(field, "an integer, at least 0", json::integer)?;
             Ok(usize::try_from(number).unwrap_or(usize::MAX))
@@ -249,8 +249,8 @@ impl<'a> OpReader<'a> {
         })
     }
 
-    /// Reads the token that a client shows. A complaint about it does not repeat it.
-    /// A command of this program marks itself, and shows a token only if it got one.
+    /// Reads a client's token. An error does not repeat the token. A command of this program marks
+    /// itself, and sends a token only if it has one.
     fn auth(&self) -> Result<Op, Problem> {
         let is_command = self.get("command").is_some() && self.boolean("command")?;
         let has_none = is_command && self.get("token").is_none();
@@ -270,7 +270,7 @@ impl<'a> OpReader<'a> {
         Ok(token.into_owned())
     }
 
-    /// The member of that name; it is one of [`KEYS`].
+    /// The member of that name, which must be one of [`KEYS`].
     fn get(&self, field: &'static str) -> Option<&'a RawValue> {
         let index = KEYS.iter().position(|key| *key == field)?;
         self.members.get(index).copied().flatten()
@@ -280,7 +280,7 @@ impl<'a> OpReader<'a> {
         self.typed(field, "", Some)
     }
 
-    /// A member as `read` reads it, if it is there. `None` from that means that it is not what was `expected`.
+    /// An optional member, read by `read`. If `read` returns `None`, the value is not the `expected` one.
     fn optional<T>(
         &self,
         field: &'static str,
@@ -299,7 +299,7 @@ impl<'a> OpReader<'a> {
         read(raw).map(Some).ok_or_else(mistyped)
     }
 
-    /// The same for a member that must be there.
+    /// The same for a required member.
     fn typed<T>(
         &self,
         field: &'static str,
@@ -384,7 +384,7 @@ fn duration(seconds: f64, longest: Duration) -> Duration {
 // ---- actions: goals and cancellations from those who send them, the rest from action servers ------------------------
 
 impl OpReader<'_> {
-    /// A goal. As soon as its action is known any other fault is answered as a goal.
+    /// A goal. Once its action is known, every other fault gets an `action_result`.
     fn goal(&self) -> Result<Op, OpError> {
         let action = self.name("action").map_err(OpError::Status)?;
         match self.goal_for(&action) {
@@ -429,7 +429,7 @@ impl OpReader<'_> {
                 let is_good = self.boolean("result")?;
                 let values = self.get("values").filter(|raw| raw.get() != "null");
                 ActionServerOp::End {
-                    // The values of a failure may be a text that says why.
+                    // The values of a failure may be a text with the reason.
                     values: match values {
                         Some(_) if is_good => self.object("values")?,
                         values => Payload::from(values.unwrap_or(RawValue::NULL)),
@@ -458,7 +458,7 @@ impl OpReader<'_> {
 
 // ---- answers: where one is bad, the op says which call or goal it is for --------------------------------------------
 
-/// Reads the start of a frame that is refused for the reason `why`: it may be the answer to a call, which then fails.
+/// Reads the start of a frame that is refused for the reason `why`. It may be the answer to a call, which then fails.
 #[must_use]
 pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
     let text = start.utf8_chunks().next();
@@ -469,7 +469,7 @@ pub fn read_start(start: &[u8], why: &impl ToString) -> Incoming {
 }
 
 impl OpReader<'_> {
-    /// A frame that cannot be read to its end. Members before the fault count for an answer only.
+    /// A frame that cannot be read to its end. Members before the fault count only for an answer.
     fn refused(self, problem: Problem) -> Incoming {
         let op = self.known_op().unwrap_or_default();
         let reader = OpReader { op, ..self };
@@ -478,7 +478,7 @@ impl OpReader<'_> {
         Incoming { id, op }
     }
 
-    /// Makes an op of a fault in the answer to a call or goal: that call or goal ends.
+    /// Converts a fault in the answer to a call or goal to an op that ends this call or goal.
     fn or_bad_answer(&self, read: Result<Op, Problem>) -> Result<Op, OpError> {
         let (of_goal, name) = match self.op {
             "service_response" => (false, "service"),
@@ -497,7 +497,7 @@ impl OpReader<'_> {
         let (service, result) = (self.name("service")?, self.boolean("result")?);
         Ok(Op::ServiceResponse {
             service,
-            // The values of a failure may be a text that says why.
+            // The values of a failure may be a text with the reason.
             values: if result {
                 self.object("values")?
             } else {
@@ -511,11 +511,11 @@ impl OpReader<'_> {
 
 // ---- for the runtime's own nodes: only the members that they have a use for, at most `MAX_ARGS` bytes ---------------
 
-/// Arguments and messages longer than this are searched for members that no node of ours uses.
+/// Longer arguments and messages are reduced to the members that the runtime's nodes use.
 const USUAL: usize = 4 * 1024;
 
 impl OpReader<'_> {
-    /// The arguments: of long ones for a node of ours the `fields` that it has, which must not be long.
+    /// The arguments. Long ones for a node of the runtime are reduced to its `fields`, which must not be too long.
     fn args(&self, fields: Option<&'static [Field]>) -> Result<Arguments, Problem> {
         let Some(raw) = self.get("args") else {
             return Ok(Arguments::none());
@@ -536,7 +536,7 @@ impl OpReader<'_> {
         })
     }
 
-    /// Returns the part of a long message that the runtime itself needs, where it listens to the topic.
+    /// Returns the part of a long message that the runtime itself needs, if it subscribes to the topic.
     fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<NodeMessage>, Problem> {
         let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
         if !is_ours || msg.get().len() <= USUAL {
@@ -552,7 +552,7 @@ impl OpReader<'_> {
     }
 }
 
-/// The object `raw` without members that are not among `fields`; `None` if it is no object.
+/// The object `raw`, reduced to the members in `fields`; `None` if it is not an object.
 fn only(raw: &RawValue, fields: &[Field]) -> Option<Box<RawValue>> {
     let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
     let mut values = vec![None; names.len()];

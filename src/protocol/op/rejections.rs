@@ -1,4 +1,4 @@
-//! Why fields of a request were not taken, by name.
+//! The rejected fields of a request, with reasons.
 //!
 //! **Invariant:** they are reported in one line of bounded length.
 
@@ -9,10 +9,10 @@ use crate::protocol::wire::text;
 
 /// Longest `status` in characters: room for every field of the largest service.
 const MAX_STATUS: usize = 2048;
-/// Longest reason, in characters, that another layer gives.
+/// Longest reason from another layer, in characters.
 const MAX_REASON: usize = 256;
 
-/// The range in which a number must be, besides finite.
+/// The required range of a finite number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {
     /// Any finite number.
@@ -43,28 +43,28 @@ impl fmt::Display for Bound {
     }
 }
 
-/// A field that was not taken, and why. Reads as a sentence: `masses[1] must be greater than 0, got -2`.
+/// A rejected field with its reason. It reads as a sentence: `masses[1] must be greater than 0, got -2`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field} {reason}")]
 pub struct RejectedField {
-    /// The field, with the index of the entry where one entry is at fault.
+    /// The field, with the index of the wrong entry if there is one.
     pub field: String,
     /// The fault.
     pub reason: Reason,
 }
 
-/// Why a field was not taken.
+/// Why a field was rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
-    /// A field that has to be there is absent.
+    /// A required field is missing.
     #[error("is required")]
     Missing,
     /// Another type or value was expected.
     #[error("must be {expected}, got {found}")]
     Mistyped {
-        /// The kind of value that it must be.
+        /// The expected kind of value.
         expected: Cow<'static, str>,
-        /// The value that came, shortened.
+        /// The received value, shortened.
         found: String,
     },
     /// `NaN`, infinite, or a literal that overflows.
@@ -89,25 +89,25 @@ pub enum Reason {
     /// An array of the wrong length.
     #[error("must have {expected} entries, got {got}")]
     Length {
-        /// How many it must have.
+        /// The expected number of entries.
         expected: usize,
-        /// How many it has.
+        /// The received number of entries.
         got: usize,
     },
-    /// An array with more entries than it may have: a positional one has one for each field of the service.
+    /// An array with too many entries. A positional array has at most one for each field of the service.
     #[error("must have at most {limit} entries, got {got}")]
     TooMany {
-        /// Entries that it may have.
+        /// Most entries.
         limit: usize,
         /// Entries of the array.
         got: usize,
     },
-    /// The layer that was to use the value refuses it, in these words.
+    /// Another layer refuses the value, for this reason.
     #[error("{0}")]
     Refused(String),
 }
 
-/// The fields of a request that were not taken, in the order in which they were read.
+/// The rejected fields of a request, in the order of reading.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Rejections(Vec<RejectedField>);
 
@@ -118,7 +118,7 @@ impl From<RejectedField> for Rejections {
 }
 
 impl Rejections {
-    /// Whether every field was taken.
+    /// Whether no field was rejected.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -137,7 +137,7 @@ impl Rejections {
         text::shortened(&sentences.join("; "), MAX_STATUS)
     }
 
-    /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
+    /// Rejects a field for a reason from another layer. The reason continues the sentence after the field's name.
     pub fn refuse(&mut self, field: &str, reason: &impl fmt::Display) {
         self.push(RejectedField::refused(field, reason));
     }
@@ -146,14 +146,14 @@ impl Rejections {
         self.0.push(rejection);
     }
 
-    /// Gives a field the sender's name for it.
+    /// Replaces a field's name by the sender's name for it.
     pub fn rename(&mut self, field: &str, name: &str) {
         for rejection in self.0.iter_mut().filter(|one| one.field == field) {
             name.clone_into(&mut rejection.field);
         }
     }
 
-    /// Adds the rejections of `later` behind these.
+    /// Appends the rejections of `later`.
     pub fn append(&mut self, mut later: Self) {
         self.0.append(&mut later.0);
     }
@@ -166,7 +166,7 @@ impl fmt::Display for Rejections {
 }
 
 impl RejectedField {
-    /// A field that the layer which was to use it does not take; `reason` reads on from the field's name.
+    /// A field that another layer rejects. `reason` continues the sentence after the field's name.
     #[must_use]
     pub fn refused(field: &str, reason: &impl fmt::Display) -> Self {
         Self {

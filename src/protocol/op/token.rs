@@ -1,23 +1,22 @@
-//! The token: a secret that a runtime asks of every client if other machines can reach it.
+//! The token: a secret that every client must send if other machines can reach the runtime.
 //!
-//! **Invariant:** the time of a comparison tells nothing about the secret but its length, and no log or message shows
-//! it.
+//! **Invariant:** the time of a comparison depends only on the length of the secret. No log and no message contains
+//! the secret.
 
 use std::fmt;
 
 use subtle::ConstantTimeEq;
 
-/// Shortest token in bytes: 16 random letters and digits are more than anybody can guess, however fast the answers
-/// come.
+/// Shortest token in bytes: 16 random letters and digits cannot be guessed.
 pub const MIN_TOKEN: usize = 16;
-/// Longest token in bytes: it has to fit into a request's head with room to spare.
+/// Longest token in bytes: it must fit into the head of an HTTP request.
 pub const MAX_TOKEN: usize = 256;
 
-/// A token: printable ASCII without spaces, so that it survives a command line, an address and a cookie.
+/// A token: printable ASCII without spaces, so it can be in a command line, a URL and a cookie.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(Box<str>);
 
-/// Why a text can't be a token. The text itself is not repeated.
+/// Why a text is not a valid token. The text itself is not repeated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TokenError {
     /// Fewer than [`MIN_TOKEN`] bytes.
@@ -26,16 +25,16 @@ pub enum TokenError {
     /// More than [`MAX_TOKEN`] bytes.
     #[error("must be at most {MAX_TOKEN} bytes long, got {0}")]
     TooLong(usize),
-    /// A space, a control character, or anything beyond ASCII.
+    /// A space, a control character, or a character beyond ASCII.
     #[error("must be printable ASCII without spaces")]
     Unprintable,
 }
 
 impl Token {
-    /// Takes a text as a token.
+    /// Converts a text to a token.
     ///
     /// # Errors
-    /// [`TokenError`] where it can't be one.
+    /// [`TokenError`] if it is not valid.
     pub fn new(text: &str) -> Result<Self, TokenError> {
         if !text.bytes().all(|byte| byte.is_ascii_graphic()) {
             Err(TokenError::Unprintable)
@@ -54,7 +53,7 @@ impl Token {
         self.0.as_bytes().ct_eq(presented.as_bytes()).into()
     }
 
-    /// The secret itself, for a client that has just shown it.
+    /// The secret itself, for a client that has just sent it.
     #[must_use]
     pub fn reveal(&self) -> &str {
         &self.0

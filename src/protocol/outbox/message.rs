@@ -1,6 +1,6 @@
 //! A topic message that waits in the outbox, or a series of them.
 //!
-//! **Invariant:** a message that was part of a series keeps none of the others in memory.
+//! **Invariant:** a message from a series does not keep the others in memory.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,11 +13,11 @@ use crate::protocol::wire::series::messages;
 /// A topic message that waits, or a series of them.
 #[derive(Debug)]
 pub(super) struct QueuedMessage {
-    /// Where it stands in the order of production.
+    /// Its number in the order of production.
     pub(super) number: u64,
     /// When it was produced.
     pub(super) since: Instant,
-    /// Its topic; feedback of a goal has none.
+    /// Its topic. Feedback of a goal has none.
     pub(super) topic: Option<Arc<str>>,
     pub(super) frame: Bytes,
 }
@@ -32,18 +32,18 @@ impl QueuedMessage {
         now.saturating_duration_since(self.since) > age
     }
 
-    /// How many messages it has.
+    /// The number of messages.
     pub(super) fn count(&self) -> u64 {
         messages(self.frame.clone()).count() as u64
     }
 }
 
-/// Bytes of a message, or of a series, that count.
+/// The counted bytes of a message or a series.
 pub(super) fn counted(frame: &Bytes) -> usize {
     frame.len().min(MEDIUM)
 }
 
-/// A message that is queued without the series that it is part of, if it is: it keeps none of the others in memory.
+/// A copy of a message from a series, which does not keep the others in memory.
 pub(super) fn by_itself(frame: Bytes, is_part: bool) -> Bytes {
     if is_part {
         Bytes::copy_from_slice(&frame)

@@ -1,17 +1,17 @@
-//! The outbox of one connection holds what waits to be written: bounded, in order, throttled where the client asked
-//! for it.
+//! The outbox of one connection: the queue of messages to be written. It is bounded, in order, and throttled if the
+//! client requested that.
 //!
-//! Topic messages may be lost, oldest first; responses may not. Both leave in the order in which they were produced.
-//! A message that `throttle_rate` holds back takes its place in that order when its time comes.
+//! Topic messages may be dropped, the oldest first. Responses are never dropped. Both leave in the order in which
+//! they were produced. A message that `throttle_rate` holds back enters that order when it is due.
 //!
-//! A [series](crate::protocol::wire::series) is queued as one piece, and dropped and held back message by message.
+//! A [series](crate::protocol::wire::series) is queued as one piece, but dropped and held back message by message.
 //!
 //! A message that has waited for longer than [`MAX_AGE`] is dropped, except the newest of its topic.
 //!
-//! Its caller gives the time; it has no socket and no clock.
+//! The caller passes the time. The outbox has no socket and no clock.
 //!
-//! **Invariant:** dropping removes whole messages, never reorders; of topic messages, held back ones included, at most
-//! [`MAX_TOPIC_BYTES`] wait.
+//! **Invariant:** dropping removes whole messages and never reorders. At most [`MAX_TOPIC_BYTES`] of topic messages
+//! wait, including those held back.
 
 mod message;
 mod throttle;
@@ -29,16 +29,17 @@ use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
-/// own. A longer message than [`MEDIUM`] has room elsewhere, and counts as one of these: no two of them wait.
+/// own. A message longer than [`MEDIUM`] uses the shared pool and counts as [`MEDIUM`] here, so at most one of them
+/// waits.
 pub const MAX_TOPIC_BYTES: usize = 304 * 1024;
-/// The longest topic message: the longest that a client may send, and the newline behind it.
+/// The longest topic message: the longest frame of a client, and the newline after it.
 pub const MAX_MESSAGE: usize = MAX_FRAME + 1;
-/// How long a topic message may wait before it is dropped, unless it is the newest of its topic.
+/// Largest age of a waiting topic message. Older ones are dropped, except the newest of its topic.
 pub const MAX_AGE: Duration = Duration::from_secs(1);
-/// The same once a message has been too old, until nothing waits any more. The client is slower than its topics, and
-/// its reading is late by this and by its unread bytes.
+/// The same after a message has been too old, until the queue is empty. The client is then slower than its topics.
+/// Its messages are late by this time and by its unread bytes.
 const MAX_AGE_BEHIND: Duration = Duration::from_millis(500);
-/// Bytes that a waiting message counts beside its own: its reference count, its place, and the allocator's share.
+/// Bytes counted for a waiting message besides its own: reference count, queue entry, and the allocator's overhead.
 pub const MESSAGE_BYTES: usize = 160;
 
 /// The outgoing queue of one connection.
@@ -46,24 +47,24 @@ pub const MESSAGE_BYTES: usize = 160;
 pub struct Outbox {
     /// Topic messages in order.
     topics: VecDeque<QueuedMessage>,
-    /// Number of messages at the front that are too old. Each is the newest of its topic.
+    /// The number of messages at the front that are too old. Each is the newest of its topic.
     kept_old: usize,
     /// Whether a message has been too old since the queue was last empty.
     is_behind: bool,
-    /// Bytes of topic messages that may be taken, unless a response is behind them; none for any number.
+    /// Bytes of topic messages that may be taken, unless a response follows them; `None` means no limit.
     room: Option<usize>,
-    /// How old a topic message may be that is taken only because a response is behind it.
+    /// Largest age of a topic message that is taken only because a response follows it.
     fresh: Duration,
-    /// Responses and statuses in order, each with its number.
+    /// Responses and statuses in order, with their numbers.
     responses: VecDeque<(u64, Bytes)>,
-    /// What the client has asked for, by topic.
+    /// The client's limits, by topic.
     limits: HashMap<Arc<str>, TopicLimits>,
     held: HeldBack,
     /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
     produced: u64,
-    /// Bytes of queued topic messages that count, without those held back.
+    /// Counted bytes of queued topic messages, without held ones.
     topic_bytes: usize,
-    /// Bytes of responses that are queued or being written, and those of the short ones among them.
+    /// Bytes of responses that are queued or being written, and the bytes of the short ones.
     response_bytes: usize,
     short_bytes: usize,
     /// The frames that are being written.
@@ -74,10 +75,10 @@ pub struct Outbox {
 /// A frame that is being written.
 #[derive(Debug)]
 struct Writing {
-    /// The bytes of it that have not been written.
+    /// Its bytes that have not been written.
     rest: Bytes,
     is_response: bool,
-    /// Bytes of the whole.
+    /// Bytes of the whole frame.
     length: usize,
 }
 
@@ -88,8 +89,8 @@ impl Outbox {
         Self::default()
     }
 
-    /// Adds a message on a topic, or a series: queued, or held back if the topic is throttled. If it does not fit,
-    /// the oldest go.
+    /// Adds a message on a topic, or a series. It is queued, or held back if the topic is throttled. If it does
+    /// not fit, the oldest messages are dropped.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
         if !self.may_fit(&frame) {
@@ -110,8 +111,8 @@ impl Outbox {
         self.keep_bounded();
     }
 
-    /// Adds feedback of a goal. It may be lost as a message may, but no throttle holds it back, not even that of a
-    /// topic with the action's name.
+    /// Adds feedback of a goal. It may be dropped like a message, but no throttle holds it back, not even that of
+    /// a topic with the action's name.
     pub fn push_feedback(&mut self, frame: Bytes, now: Instant) {
         if self.may_fit(&frame) {
             self.enqueue(None, now, frame);
@@ -119,14 +120,13 @@ impl Outbox {
         }
     }
 
-    /// Whether messages are held back.
+    /// Whether any message is held back.
     #[must_use]
     pub const fn holds_back(&self) -> bool {
         self.held.count > 0
     }
 
-    /// Adds a response or a status. Messages of the topics in `supersedes` that throttling holds back are older, and
-    /// are discarded.
+    /// Adds a response or a status. Held messages of the topics in `supersedes` are outdated by it, and are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
             self.take_held(topic);
@@ -139,15 +139,15 @@ impl Outbox {
         self.responses.push_back((number, frame));
     }
 
-    /// Sets how many bytes of topic messages may be taken from now on. Messages ahead of a response are taken all
-    /// the same, unless they are older than `fresh`. Then they are dropped, except the newest of its topic.
+    /// Sets how many bytes of topic messages may be taken from now on. Messages before a response are taken in
+    /// any case, unless they are older than `fresh`. Older ones are dropped, except the newest of each topic.
     pub const fn allow(&mut self, room: usize, fresh: Duration) {
         self.room = Some(room);
         self.fresh = fresh;
     }
 
-    /// Moves the next frames to [those being written](Self::writing), at least one if any waits, as many as
-    /// `max_frames` and `max_bytes` allow. A series counts as one, unless one frame is all that is asked for.
+    /// Moves the next frames to [those being written](Self::writing): as many as `max_frames` and `max_bytes`
+    /// allow, and at least one if any waits. A series counts as one frame, unless `max_frames` is 1.
     pub fn take_frames(&mut self, now: Instant, max_frames: usize, max_bytes: usize) {
         self.release(now);
         self.drop_old(now);
@@ -208,12 +208,12 @@ impl Outbox {
         self.is_behind &= !self.topics.is_empty();
     }
 
-    /// The frames that are being written, without the bytes that have been.
+    /// The unwritten bytes of the frames that are being written.
     pub fn writing(&self) -> impl ExactSizeIterator<Item = &Bytes> {
         self.writing.iter().map(|frame| &frame.rest)
     }
 
-    /// Notes that the next `bytes` of what was taken have been written.
+    /// Records that the next `bytes` of the taken frames have been written.
     pub fn written(&mut self, mut bytes: usize) {
         while let Some(frame) = self.writing.front_mut() {
             let done = bytes.min(frame.rest.len());
@@ -241,50 +241,50 @@ impl Outbox {
             || writing.any(|frame| frame.length > MEDIUM && !frame.is_response)
     }
 
-    /// Whether there is nothing to be taken now (held back messages that are not due do not count).
+    /// Whether no frame can be taken now. Held messages that are not due do not count.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.topics.is_empty() && self.responses.is_empty()
     }
 
-    /// Whether a response is to be taken.
+    /// Whether a response waits.
     #[must_use]
     pub fn has_responses(&self) -> bool {
         !self.responses.is_empty()
     }
 
-    /// Bytes of responses that wait, those being written included.
+    /// Bytes of waiting responses, including those being written.
     #[must_use]
     pub const fn response_bytes(&self) -> usize {
         self.response_bytes
     }
 
-    /// The same without those that take a permit.
+    /// The same without responses that have a permit.
     #[must_use]
     pub const fn short_bytes(&self) -> usize {
         self.short_bytes
     }
 
-    /// How many topic messages, or series of them, wait, those held back included.
+    /// The number of waiting topic messages or series, including held ones.
     #[must_use]
     pub fn topic_count(&self) -> usize {
         self.topics.len() + self.held.count
     }
 
-    /// Bytes of topic messages that wait, as they count, those held back included.
+    /// Counted bytes of waiting topic messages, including held ones.
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
         self.topic_bytes + self.held.bytes
     }
 
-    /// Topic messages dropped so far for want of room. A message that throttling replaces by a newer one is not
-    /// counted.
+    /// Topic messages dropped so far because of the limits. A message that throttling replaces by a newer one
+    /// is not counted.
     #[must_use]
     pub const fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// Whether topic messages wait, without those held back.
+    /// Whether topic messages wait, without held ones.
     #[must_use]
     pub fn has_topics(&self) -> bool {
         !self.topics.is_empty()
@@ -317,8 +317,8 @@ impl Outbox {
 // ---- throttles ------------------------------------------------------------------------------------------------------
 
 impl Outbox {
-    /// Sets the limits of a topic, or forgets the topic after an unsubscription. Queued messages still leave. Where the
-    /// throttle is lifted, messages held back count as produced now.
+    /// Sets the limits of a topic, or removes them after an unsubscription. Queued messages are still sent. If the
+    /// throttle ends, held messages count as produced now.
     pub fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
         let Some(throttle) = throttle else {
             self.take_held(topic);
@@ -391,21 +391,20 @@ impl Outbox {
         held
     }
 
-    /// When the next held back message is due, if any is held back: the time to take frames again.
+    /// When the next held message is due, if any is held: the time to take frames again.
     #[must_use]
     pub fn next_release(&self) -> Option<Instant> {
         self.next_due().map(|(due, _)| due)
     }
 
-    /// The topic of which a message is due first, and when. A client has at most some 200 topics.
+    /// The topic with the earliest due message, and its time. A client has at most about 200 topics.
     fn next_due(&self) -> Option<(Instant, &Arc<str>)> {
         let limits = self.limits.iter();
         let due = limits.filter_map(|(topic, limits)| Some((limits.due()?, topic)));
         due.min()
     }
 
-    /// Queues the held back messages whose time has come. The client has asked for that wait: their age counts from
-    /// now.
+    /// Queues the held messages that are due. The client requested this delay, so their age counts from now.
     fn release(&mut self, now: Instant) {
         if !self.holds_back() {
             return;
@@ -428,15 +427,15 @@ impl Outbox {
 // ---- dropping: the oldest messages go first, whole ------------------------------------------------------------------
 
 impl Outbox {
-    /// Whether there is room for a message once all else has gone; if not, it counts as dropped.
+    /// Whether a message fits into an empty outbox. If not, it counts as dropped.
     fn may_fit(&mut self, frame: &Bytes) -> bool {
         let fits = frame.len() <= MAX_MESSAGE;
         self.dropped += u64::from(!fits);
         fits
     }
 
-    /// Drops the oldest messages of a topic of which more wait than the client wants, while it does not take all that
-    /// it is offered.
+    /// Drops the oldest messages of a topic with more waiting messages than the client's `queue_length`, while the
+    /// client is slow.
     fn keep_to_queue_length(&mut self, topic: &Arc<str>) {
         if self.writing.is_empty() && self.room != Some(0) {
             return;
@@ -462,7 +461,7 @@ impl Outbox {
         self.kept_old -= before;
     }
 
-    /// Drops the messages that have waited for too long, except the newest of each topic.
+    /// Drops messages that have waited too long, except the newest of each topic.
     fn drop_old(&mut self, now: Instant) {
         while let Some(next) = self.topics.get(self.kept_old) {
             let age = if self.is_behind {
@@ -481,14 +480,14 @@ impl Outbox {
         }
     }
 
-    /// Drops the first topic message if it is too old to be taken only because a response is behind it; false if it is
-    /// not.
+    /// Drops the first topic message if it is too old to be taken only because a response follows it. Returns `false`
+    /// if it is not too old.
     fn drop_stale(&mut self, now: Instant) -> bool {
         let is_stale = |first: &QueuedMessage| first.is_older(self.fresh, now);
         self.topics.front().is_some_and(is_stale) && self.drop_but_newest(0)
     }
 
-    /// Drops a message, or all of a series, except the newest of the topic; true if nothing is left.
+    /// Drops a message, or a whole series, except the newest of the topic. Returns `true` if nothing is left.
     fn drop_but_newest(&mut self, index: usize) -> bool {
         let mut rest = self.topics.range_mut(index..);
         let Some(message) = rest.next() else {
@@ -499,7 +498,7 @@ impl Outbox {
             self.drop_message(index);
             return true;
         }
-        // The pieces of a message stay together.
+        // The pieces of a message are dropped together.
         if first_message(&message.frame) < message.frame.len() {
             let newest = by_itself(last_messages(message.frame.clone(), 1), true);
             self.dropped += message.count() - 1;
@@ -510,7 +509,7 @@ impl Outbox {
         false
     }
 
-    /// Drops the message, or all of the series, at that place.
+    /// Drops the message or the whole series at that index.
     fn drop_message(&mut self, index: usize) {
         if let Some(message) = self.take_out(index) {
             self.dropped += message.count();
@@ -526,8 +525,8 @@ impl Outbox {
         Some(message)
     }
 
-    /// Drops topic messages, the oldest first, until what is left takes at most [`MAX_TOPIC_BYTES`]. The oldest is the
-    /// queue's first or the one that was held back first. A series loses as many messages at once as have to go.
+    /// Drops topic messages, the oldest first, until at most [`MAX_TOPIC_BYTES`] are left. The oldest is the first in
+    /// the queue or the first held one. A series loses as many messages at once as necessary.
     fn keep_bounded(&mut self) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;

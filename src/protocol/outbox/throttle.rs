@@ -1,26 +1,25 @@
-//! A client's `throttle_rate` and `queue_length` of a topic, and the messages that are held back for that.
+//! A client's `throttle_rate` and `queue_length` of a topic, and the held messages.
 //!
-//! **Invariant:** at least the interval lies between two released messages of a topic, and the newest messages are
-//! held back.
+//! **Invariant:** two released messages of a topic are at least the interval apart, and the newest messages are
+//! held.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use super::message::{QueuedMessage, counted};
 
-/// How long a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) may be held back: it takes room that
-/// others wait for.
+/// Longest time for which a message of more than [`MEDIUM`](crate::protocol::limits::MEDIUM) is held, because it
+/// uses the shared pool.
 const MAX_HELD_BACK: Duration = Duration::from_secs(20);
 
-/// The throttling that a connection's subscriptions to one topic ask for together: the smallest of each value.
+/// The combined throttling of a connection's subscriptions to one topic: the smallest of each value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Throttle {
-    /// Least time between two deliveries; zero is no limit.
+    /// Least time between two deliveries; zero means no limit.
     pub interval: Duration,
-    /// How many messages that may hold back, newest kept; at least 1.
+    /// Most messages that are held, the newest; at least 1.
     pub held_back: usize,
-    /// How many messages may wait while the client does not take all that it is offered, newest kept, if a subscription
-    /// limits that.
+    /// Most messages that wait for a slow client, the newest, if a subscription limits them.
     pub queue_length: Option<usize>,
 }
 
@@ -56,9 +55,9 @@ impl HeldBack {
 #[derive(Debug)]
 pub(super) struct TopicLimits {
     pub(super) throttle: Throttle,
-    /// When the last message was released.
+    /// Time of the last released message.
     pub(super) last: Option<Instant>,
-    /// Messages that the throttle holds back.
+    /// The held messages.
     pub(super) held: VecDeque<QueuedMessage>,
 }
 
@@ -78,12 +77,12 @@ impl TopicLimits {
         !self.throttle.interval.is_zero()
     }
 
-    /// The number of the message that was held back first.
+    /// The number of the first held message.
     pub(super) fn first_held(&self) -> Option<u64> {
         self.held.front().map(|held| held.number)
     }
 
-    /// When the next message that is held back is due, if there is one.
+    /// When the next held message is due, if there is one.
     pub(super) fn due(&self) -> Option<Instant> {
         self.next().filter(|_| !self.held.is_empty())
     }
@@ -97,12 +96,12 @@ impl TopicLimits {
         }
     }
 
-    /// When the next message may go; `None`: at once.
+    /// When the next message may be sent; `None` means at once.
     fn next(&self) -> Option<Instant> {
         self.last?.checked_add(self.throttle.interval)
     }
 
-    /// Whether a long message may wait for the next time.
+    /// Whether a long message may wait until the next release.
     pub(super) fn may_hold_long(&self, now: Instant) -> bool {
         self.next().is_none_or(|next| next <= now + MAX_HELD_BACK)
     }

@@ -1,9 +1,9 @@
 //! Messages as binary: `cbor` (the message itself) and `cbor-raw` (its CDR bytes), for subscribers over WebSocket.
 //!
-//! Arrays of numbers are typed arrays (RFC 8746), little-endian, which clients read without looking at each entry. A
-//! number that is not finite was `null` as JSON and is NaN here, where the type says that it is a number.
+//! Arrays of numbers are typed arrays (RFC 8746), little-endian, which clients read without parsing each entry. A
+//! number that is not finite is `null` in JSON, and NaN here if the type says that it is a number.
 //!
-//! **Invariant:** a frame begins with a byte that no JSON frame begins with.
+//! **Invariant:** no JSON frame begins with the first byte of a frame here.
 
 use super::cdr;
 use super::sink::Sink;
@@ -13,7 +13,7 @@ use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
 
-/// Major types of CBOR (RFC 8949), in place: the upper three bits.
+/// Major types of CBOR (RFC 8949), in the upper three bits.
 const UNSIGNED: u8 = 0x00;
 const NEGATIVE: u8 = 0x20;
 const BYTES: u8 = 0x40;
@@ -70,7 +70,7 @@ pub fn publish_raw(
     out.finish()
 }
 
-/// The time that a message tells of itself; 0 if it tells none.
+/// The time in the message's header; 0 if it has none.
 fn stamp(msg: Branch<'_, '_>) -> (u64, u64) {
     let places = [
         "/header/stamp",
@@ -97,7 +97,7 @@ fn head(topic: &str, most: usize) -> Sink {
     out
 }
 
-/// A head: the major type and a number, in as few bytes as may be.
+/// A head: the major type and a number, in as few bytes as possible.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "each arm has just seen that the number fits"
@@ -131,8 +131,8 @@ fn float(out: &mut Sink, value: f64) {
     out.extend(&value.to_be_bytes());
 }
 
-/// Writes every field that is there, in the type's order. Members that the type does not have are left out, but for the
-/// names of ROS 1 beside those of ROS 2.
+/// Writes every present field, in the type's order. Members that the type does not have are omitted, except the ROS 1
+/// names of stamps.
 fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
     let has = |name: &str| msg.get(name).is_some();
     if msg.members().is_none() || (has("sec") && has("secs")) {
@@ -144,7 +144,7 @@ fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
     for (field, value) in there {
         text(out, field.name);
         let (kind, count) = field.element();
-        // The type is looked up once, however many entries there are.
+        // The type is looked up once for all entries.
         let inner = cdr::message_type(kind);
         match count {
             Count::One => single(out, kind, inner, value),
@@ -153,7 +153,7 @@ fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
     }
 }
 
-/// A value of type `kind`, which has fields if it is a message: then it is `inner`.
+/// A value of type `kind`. If it is a message, `inner` is its type.
 fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
     match (kind, value.kind()) {
         ("float64" | "float32", BranchKind::Null) => float(out, f64::NAN),
@@ -196,7 +196,7 @@ fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) 
     }
 }
 
-/// Writes any JSON value. It goes as deep as a frame may be nested, which the frame's reader has checked.
+/// Writes any JSON value. The recursion is as deep as a frame may be nested, which the frame's reader has checked.
 fn untyped(out: &mut Sink, value: Branch<'_, '_>) {
     match value.kind() {
         BranchKind::Null => out.push(NULL),

@@ -1,8 +1,8 @@
-//! Messages as ROS 2 itself writes them: CDR, little-endian, read from their JSON by their type.
+//! Messages in the encoding of ROS 2: CDR, little-endian, converted from JSON by their type.
 //!
-//! A field that is absent or of another type gets its zero; a number that is `null` becomes NaN.
+//! A field that is absent or of another type becomes zero. A number that is `null` becomes NaN.
 //!
-//! **Invariant:** every primitive stands at a multiple of its own size, counted from behind the four bytes of the
+//! **Invariant:** the offset of every primitive is a multiple of its size, counted from the end of the 4-byte
 //! header.
 
 use serde_json::Value;
@@ -15,7 +15,7 @@ use crate::protocol::catalog::types::{Count, Type};
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
-/// A field that is not there: it stands for the zero of a number, a text, an array or a message.
+/// An absent field: the zero of a number, a text, an array or a message.
 const ABSENT: Branch<'_, '_> = Branch::FALSE;
 
 /// The bytes of a message of that type.
@@ -24,14 +24,14 @@ pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
     encode_tree(one, MessageTree::from(msg).root())
 }
 
-/// The bytes of a message that has been read otherwise.
+/// The bytes of a message that has been parsed already.
 #[must_use]
 pub fn encode_tree(one: Type, msg: Branch<'_, '_>) -> Vec<u8> {
-    // A message can't have more bytes than that.
+    // No message has more bytes than that.
     encode_within(one, msg, usize::MAX).unwrap_or_default()
 }
 
-/// The bytes of a message, unless there are more than `most`: two bytes of JSON (`{}`) may become a hundred.
+/// The bytes of a message, unless there are more than `most`. Two bytes of JSON (`{}`) may become a hundred.
 #[must_use]
 pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<u8>> {
     let mut writer = Writer {
@@ -42,7 +42,7 @@ pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<
     writer.sink.finish()
 }
 
-/// The type of that name, if it is a message's: such a name has a package in front.
+/// The type of that name, if it is a message. Such a name begins with a package.
 pub(super) fn message_type(kind: &str) -> Option<Type> {
     kind.contains('/').then(|| types::find(kind)).flatten()
 }
@@ -56,7 +56,7 @@ impl Writer {
         for field in one.fields {
             let value = member(msg, field.name).unwrap_or(ABSENT);
             let (kind, count) = field.element();
-            // The type is looked up once, however many entries there are.
+            // The type is looked up once for all entries.
             let inner = message_type(kind);
             match count {
                 Count::One => self.single(kind, inner, value),
@@ -70,7 +70,7 @@ impl Writer {
                         self.single(kind, inner, entry);
                     }
                 }
-                // No count is in front, since the type gives it.
+                // No count is written, because the type gives it.
                 Count::Exactly(count) => {
                     let mut entries = value.entries().into_iter().flatten();
                     for _ in 0..count {
@@ -83,7 +83,7 @@ impl Writer {
 
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "a float32 is as exact as it can be"
+        reason = "a float32 is the nearest one"
     )]
     fn single(&mut self, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
         let unsigned = || value.as_u64().unwrap_or_default();
@@ -120,14 +120,14 @@ impl Writer {
             "float64" => self.aligned(float().to_le_bytes()),
             "string" => self.string(value.as_str().unwrap_or_default()),
             other => match inner {
-                // No type has itself inside, so this comes to an end.
+                // No type contains itself, so this recursion ends.
                 Some(one) => self.message(one, value),
                 None => debug_assert!(false, "{other} is not a type that this writes"),
             },
         }
     }
 
-    /// Puts a primitive at a multiple of its size.
+    /// Writes a primitive at a multiple of its size.
     fn aligned<const SIZE: usize>(&mut self, bytes: [u8; SIZE]) {
         self.sink.align(HEADER.len(), SIZE);
         self.sink.extend(&bytes);
@@ -137,7 +137,7 @@ impl Writer {
         self.aligned(u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes());
     }
 
-    /// Length with the final NUL, the text, the NUL.
+    /// The length including the final NUL, the text, the NUL.
     fn string(&mut self, text: &str) {
         self.count(text.len() + 1);
         self.sink.extend(text.as_bytes());
@@ -151,8 +151,8 @@ mod tests {
 
     use super::*;
 
-    /// Written out by hand: seconds and nanoseconds, a string of 5 + 1 bytes, then a sequence whose count is aligned to
-    /// 4 and whose numbers to 8.
+    /// Encoded by hand: seconds and nanoseconds, a string of 5 + 1 bytes, then a sequence. Its count is aligned to 4
+    /// and its numbers to 8.
     #[test]
     fn a_joint_state_is_written_as_the_rules_say() {
         let one = types::find("sensor_msgs/msg/JointState").unwrap();
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(encode(one, &msg), expected);
     }
 
-    /// Written out by hand: no count in front of the 16 bytes, a byte with a sign behind them.
+    /// Encoded by hand: no count before the 16 bytes, and a signed byte after them.
     #[test]
     fn an_array_of_a_fixed_length_has_no_count() {
         let one = types::find("action_msgs/msg/GoalStatus").unwrap();
@@ -184,11 +184,7 @@ mod tests {
         let expected = [&HEADER[..], &uuid, &[3, 0, 0, 0, 4, 0, 0, 0, 255]].concat();
         assert_eq!(encode(one, &msg), expected);
         let cut = json!({"goal_info": {"goal_id": {"uuid": [7]}}});
-        assert_eq!(
-            encode(one, &cut)[4..8],
-            [7, 0, 0, 0],
-            "what is not there is 0"
-        );
+        assert_eq!(encode(one, &cut)[4..8], [7, 0, 0, 0], "absent fields are 0");
     }
 
     #[test]

@@ -1,37 +1,37 @@
-//! Reads what [`cdr`](super::cdr) writes: a message's bytes by its type, back to JSON.
+//! Decodes the bytes of [`cdr`](super::cdr) to JSON, by the message's type.
 //!
-//! **Invariant:** bytes that do not fit the type are refused, and no more is allocated than some multiple of their
-//! length.
+//! **Invariant:** bytes that do not match the type are refused. The allocated memory is at most a fixed multiple
+//! of their length.
 
 use serde_json::{Map, Value};
 
 use super::cdr::message_type;
 use crate::protocol::catalog::types::{Count, Type};
 
-/// Bytes in front of a message.
+/// Bytes of the header before a message.
 const HEADER: usize = 4;
 /// The second byte of little-endian plain CDR; the first is 0.
 const LITTLE_ENDIAN: u8 = 1;
 
-/// Why bytes are no message of a type.
+/// Why bytes are not a message of a type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CdrError {
-    /// Another encoding, or too few bytes to say which.
+    /// Another encoding, or too few bytes for a header.
     #[error("not little-endian plain CDR")]
     Header,
     /// The bytes end within the message.
     #[error("the message ends at byte {0}")]
     Short(
-        /// How many there are.
+        /// The number of bytes.
         usize,
     ),
-    /// A text that is not UTF-8, or has no NUL behind it.
+    /// A text that is not UTF-8, or has no NUL after it.
     #[error("no text at byte {0}")]
     Text(
         /// Position of its first byte.
         usize,
     ),
-    /// A type that is not known here.
+    /// An unknown type.
     #[error("no type {0}")]
     Type(
         /// Its name.
@@ -66,7 +66,7 @@ impl<'a> CdrReader<'a> {
                 Count::One => self.single(kind, inner)?,
                 Count::Any => {
                     let count = u32::from_le_bytes(self.aligned()?);
-                    // Each entry takes a byte at least, so a false count ends with the bytes.
+                    // Each entry has at least one byte, so a false count ends with the bytes.
                     let entries = (0..count).map(|_| self.single(kind, inner));
                     Value::Array(entries.collect::<Result<_, _>>()?)
                 }
@@ -97,7 +97,7 @@ impl<'a> CdrReader<'a> {
         })
     }
 
-    /// A primitive, which stands at a multiple of its size.
+    /// A primitive at a multiple of its size.
     fn aligned<const SIZE: usize>(&mut self) -> Result<[u8; SIZE], CdrError> {
         let start = self.at.next_multiple_of(SIZE);
         let bytes = self.body.get(start..).and_then(<[u8]>::first_chunk);
@@ -105,7 +105,7 @@ impl<'a> CdrReader<'a> {
         bytes.copied().ok_or(self.short())
     }
 
-    /// Length with the final NUL, the text, the NUL.
+    /// The length including the final NUL, the text, the NUL.
     fn text(&mut self) -> Result<&'a str, CdrError> {
         let length = u32::from_le_bytes(self.aligned()?);
         let start = self.at;
@@ -172,9 +172,9 @@ mod tests {
     fn a_count_beyond_all_bounds_costs_nothing() {
         let one = types::find("sensor_msgs/msg/JointState").unwrap();
         let mut bytes = cdr::encode(one, &json!({}));
-        // The header's stamp, the empty frame_id with its padding; then the number of names.
+        // The header's stamp, the empty frame_id with its padding, and the number of names.
         bytes[4 + 16..4 + 20].copy_from_slice(&u32::MAX.to_le_bytes());
-        // The first of these names has no room for its NUL.
+        // The first of these names has no space for its NUL.
         assert_eq!(decode(one, &bytes), Err(CdrError::Text(24)));
     }
 }

@@ -1,6 +1,6 @@
 //! The formats and names of ROS: rosapi, CDR, CBOR, URDF, parameters.
 //!
-//! **Invariant:** names and types that ROS fixes stand here and in the catalogue, nowhere else.
+//! **Invariant:** names and types defined by ROS are only here and in the catalog.
 
 pub mod cbor;
 pub mod cdr;

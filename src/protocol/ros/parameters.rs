@@ -1,6 +1,6 @@
-//! The parameters, as `get_param` and `set_param` know them: the fields of the arm's services, by name. One row each.
+//! The parameters of `get_param` and `set_param`: fields of the arm's services, by name. One row each.
 //!
-//! **Invariant:** a parameter has no value of its own: it is a field of the service that sets it.
+//! **Invariant:** a parameter has no separate value. It is a field of the service that sets it.
 
 use crate::protocol::catalog::{Node, Service, table};
 use crate::protocol::names;
@@ -32,18 +32,18 @@ table! {
             name: "control_period",
             ..field_of(Service::SetPeriod, "period")
         },
-        /// The arm as URDF, made from lengths and masses; can't be set.
+        /// The arm as URDF, computed from lengths and masses; read only.
         RobotDescription = ParameterEntry { name: "robot_description", field: None },
     }
 }
 
-/// The answer about a parameter that is none.
+/// The answer for an unknown parameter.
 pub const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
 
-/// Parameters that one call of a parameter service may name: each several times over.
+/// Most parameters in one call of a parameter service: each of them several times.
 pub const MAX_NAMED: usize = 64;
 
-/// The type of a parameter, as `rcl_interfaces/msg/ParameterType` counts.
+/// The type of a parameter, a value of `rcl_interfaces/msg/ParameterType`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterType {
     /// A number.
@@ -66,13 +66,13 @@ impl ParameterType {
     }
 }
 
-/// A row: the parameter's name, and the field that is its value.
+/// A row: the parameter's name, and the field with its value.
 pub(super) struct ParameterEntry {
     name: &'static str,
     field: Option<(Service, &'static str)>,
 }
 
-/// A parameter that goes by the name of its field.
+/// A parameter with the name of its field.
 const fn field_of(service: Service, name: &'static str) -> ParameterEntry {
     ParameterEntry {
         name,
@@ -82,7 +82,7 @@ const fn field_of(service: Service, name: &'static str) -> ParameterEntry {
 
 /// The node that has the parameters.
 const NODE: Node = Node::ArmSim;
-/// The node to which the description belongs elsewhere, and which tools therefore ask.
+/// The node that has the description in other systems, so tools query it.
 const DESCRIBING_NODE: &str = "robot_state_publisher";
 
 impl Parameter {
@@ -92,7 +92,7 @@ impl Parameter {
         self.entry().name
     }
 
-    /// The name as `get_param_names` lists it: `/arm_sim:gravity`.
+    /// The name in `get_param_names`: `/arm_sim:gravity`.
     #[must_use]
     pub fn full_name(self) -> String {
         format!("/{}:{}", NODE.name(), self.name())
@@ -130,7 +130,7 @@ impl Parameter {
         }
     }
 
-    /// Unit and type of the field that is its value, as the catalogue has them; empty for what is made from others.
+    /// Unit and type of the field with its value, from the catalog; empty for a computed parameter.
     fn unit_and_kind(self) -> (&'static str, &'static str) {
         let field = self.field().and_then(|(service, name)| {
             let mut fields = service.fields().iter();
@@ -139,7 +139,7 @@ impl Parameter {
         field.map_or(("", ""), |field| (field.unit, field.kind))
     }
 
-    /// The service that answers for the parameter, and the field that is its value; none for what is made from others.
+    /// The service of the parameter, and the field with its value; none for a computed parameter.
     #[must_use]
     pub const fn field(self) -> Option<(Service, &'static str)> {
         self.entry().field

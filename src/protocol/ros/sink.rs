@@ -1,6 +1,6 @@
-//! Bytes that are written one behind the other, up to a limit.
+//! A byte buffer with a limit.
 //!
-//! **Invariant:** no more than the limit is kept; bytes beyond it are dropped.
+//! **Invariant:** bytes beyond the limit are discarded.
 
 /// The bytes so far.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl Sink {
         }
     }
 
-    /// Zeros up to a multiple of `size`, counted from `start`.
+    /// Appends zeros up to a multiple of `size`, counted from `start`.
     pub(super) fn align(&mut self, start: usize, size: usize) {
         let written = self.bytes.len().saturating_sub(start);
         let zeros = written.next_multiple_of(size) - written;
@@ -39,12 +39,12 @@ impl Sink {
         }
     }
 
-    /// Whether more has been written than there may be: to go on writing is pointless.
+    /// Whether more than the limit has been written, so writing can stop.
     pub(super) const fn is_over(&self) -> bool {
         self.is_over
     }
 
-    /// All of it, without spare room; `None` if it was more than there may be.
+    /// All bytes, without spare capacity; `None` if the limit was exceeded.
     pub(super) fn finish(mut self) -> Option<Vec<u8>> {
         self.bytes.shrink_to_fit();
         (!self.is_over).then_some(self.bytes)

@@ -1,6 +1,6 @@
-//! The arm as planners know it, beside its URDF: SRDF with one group of all joints.
+//! The arm for planners, in addition to its URDF: SRDF with one group of all joints.
 //!
-//! **Invariant:** every link and joint that is named is one of the [description](super::urdf).
+//! **Invariant:** every named link and joint exists in the [description](super::urdf).
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::protocol::messages::scene::{END_EFFECTOR, WORLD, link_name};
 /// The name of the group.
 const GROUP: &str = "arm";
 
-/// The semantic description of an arm with these joints. Links pass through one another: no collision is looked for.
+/// The semantic description of an arm with these joints. Links can pass through each other, so no collision is checked.
 #[must_use]
 pub fn describe_semantics(joint_names: &[&str]) -> String {
     let mut xml = format!(

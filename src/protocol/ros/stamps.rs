@@ -1,24 +1,25 @@
-//! Stamps and durations under the names that ROS 1 has for their members too. They are written for clients that know a
-//! topic by its type of ROS 1, and read from every client.
+//! Stamps and durations with the member names of ROS 1. They are written for clients that use a topic's ROS 1 type,
+//! and read from every client.
 //!
-//! **Invariant:** the members of ROS 2 stay as they are: some clients use ROS 1's name of a type for ROS 2's messages.
+//! **Invariant:** the members of ROS 2 do not change, because some clients use the ROS 1 name of a type for ROS 2
+//! messages.
 
 use bytes::Bytes;
 
 use super::tree::Branch;
 use crate::protocol::names;
 
-/// How a stamp of ours begins, between its two numbers, and what the two are called in ROS 1.
+/// The text of a stamp before and between its two numbers, and the ROS 1 names of the two.
 const SECONDS: &[u8] = b"\"sec\":";
 const NANOSECONDS: &[u8] = b",\"nanosec\":";
 
-/// Whether `asked` is ROS 1's name of a type of ROS 2: `std_msgs/Header` of `std_msgs/msg/Header`.
+/// Whether `asked` is the ROS 1 name of a ROS 2 type: `std_msgs/Header` for `std_msgs/msg/Header`.
 #[must_use]
 pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
     asked != type_name && asked == names::short_type(type_name)
 }
 
-/// The member of a message for a field of its type in ROS 2. Seconds and nanoseconds may have their names of ROS 1.
+/// The member of a message for a field of its ROS 2 type. Seconds and nanoseconds may have their ROS 1 names.
 pub(super) fn member<'t, 'a>(msg: Branch<'t, 'a>, field: &str) -> Option<Branch<'t, 'a>> {
     let ros1_name = match field {
         "sec" => "secs",
@@ -28,8 +29,8 @@ pub(super) fn member<'t, 'a>(msg: Branch<'t, 'a>, field: &str) -> Option<Branch<
     msg.get(field).or_else(|| msg.get(ros1_name))
 }
 
-/// A frame of ours in which every stamp has `secs` and `nsecs` beside `sec` and `nanosec`. A text can't look like a
-/// stamp: its quotes are escaped.
+/// A frame of the runtime in which every stamp has `secs` and `nsecs` besides `sec` and `nanosec`. A text cannot
+/// look like a stamp, because its quotes are escaped.
 #[must_use]
 pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     let mut text = Vec::with_capacity(2 * frame.len());
@@ -78,7 +79,7 @@ fn next_stamp(text: &[u8]) -> Option<StampText<'_>> {
     }
 }
 
-/// The number that a text begins with, and what is behind it.
+/// The number at the start of a text, and the rest.
 fn number(text: &[u8]) -> (&[u8], &[u8]) {
     let is_part = |byte: &u8| byte.is_ascii_digit() || *byte == b'-';
     let end = text.iter().position(|byte| !is_part(byte));

@@ -1,10 +1,11 @@
-//! A JSON message that is to be written in another form: all its values in one piece of memory, one behind the other.
+//! A JSON message for conversion to another encoding. All its values are in one array, in order.
 //!
-//! A node takes [`NODE_BYTES`], one at most for every two bytes of text (`1,1,1,`, `[[[[`): the longest message takes
-//! 48 MiB at worst. Texts lie where they were read; with escapes they are made anew, 8 bytes more for every 5.
+//! A node takes [`NODE_BYTES`], and there is at most one for every two bytes of text (`1,1,1,`, `[[[[`). So the
+//! longest message takes at most 48 MiB. Texts are borrowed from the input. Texts with escapes are copied: 8 more
+//! bytes for every 5.
 //!
-//! **Invariant:** a value is followed by all that is in it, and then by the next value. Nothing points at anything, and
-//! dropping a tree is a loop.
+//! **Invariant:** a value is followed by its contents, and then by the next value. There are no pointers between nodes,
+//! so dropping a tree is a loop.
 
 use std::borrow::Cow;
 use std::cmp::Reverse;
@@ -13,11 +14,11 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Number, Value};
 
-/// Bytes of memory for each value, and for each name in front of one.
+/// Bytes of memory for each value, and for each member's name.
 pub const NODE_BYTES: usize = size_of::<TreeNode<'_>>();
 const _: () = assert!(NODE_BYTES <= 24, "the documents say so");
 
-/// A JSON value that has been read, with all that is in it.
+/// A parsed JSON value with its contents.
 #[derive(Debug, Clone)]
 pub struct MessageTree<'a> {
     nodes: Vec<TreeNode<'a>>,
@@ -30,7 +31,7 @@ enum TreeNode<'a> {
     Number(Number),
     Text(Cow<'a, str>),
     Array(Extent),
-    /// The members: each is a text, its name, and then its value.
+    /// The members. Each is a name, as a text, followed by its value.
     Object(Extent),
 }
 
@@ -39,17 +40,17 @@ enum TreeNode<'a> {
 struct Extent {
     /// Entries or members.
     count: usize,
-    /// Nodes, its own included.
+    /// Nodes, including its own.
     nodes: usize,
 }
 
 impl<'a> MessageTree<'a> {
-    /// Bytes of memory that the tree of a JSON text takes at most. One of four characters stands in front of every
-    /// value but the first. Within texts they mean nothing, but are counted too.
+    /// Upper bound on the memory of the tree of a JSON text, in bytes. One of four characters precedes every value
+    /// except the first. Such characters inside texts are counted too.
     #[must_use]
     pub fn room(text: &[u8]) -> usize {
         let is_in_front = |byte: &u8| u8::from(matches!(byte, b',' | b':' | b'[' | b'{'));
-        // Sums in bytes, many at a time: no chunk has more of them than a byte can say.
+        // The counts of a chunk are sums in bytes, so many are added at a time. No chunk has more than 255 of them.
         let chunks = text.chunks(usize::from(u8::MAX));
         let counts = chunks.map(|chunk| chunk.iter().map(is_in_front).sum::<u8>());
         let in_front: usize = counts.map(usize::from).sum();
@@ -59,7 +60,7 @@ impl<'a> MessageTree<'a> {
     /// Reads a JSON text.
     ///
     /// # Errors
-    /// If it is none, nested deeper than 127 levels, or has a number beyond all doubles.
+    /// If it is not JSON, is nested deeper than 127 levels, or has a number beyond the range of doubles.
     pub fn read(text: &'a [u8]) -> Result<Self, serde_json::Error> {
         let mut nodes = Vec::with_capacity(Self::room(text) / NODE_BYTES);
         let mut reader = serde_json::Deserializer::from_slice(text);
@@ -74,7 +75,7 @@ impl<'a> MessageTree<'a> {
         Branch { nodes: &self.nodes }
     }
 
-    /// Bytes of memory taken, without those of texts that had escapes.
+    /// Bytes of used memory, without texts that had escapes.
     #[must_use]
     pub fn allocated(&self) -> usize {
         self.nodes.capacity() * NODE_BYTES
@@ -90,11 +91,11 @@ impl<'a> From<&'a Value> for MessageTree<'a> {
     }
 }
 
-/// Puts the value that comes, with all that is in it, behind the nodes that are there.
+/// Appends the next value with its contents to the nodes.
 struct TreeReader<'t, 'a>(&'t mut Vec<TreeNode<'a>>);
 
 impl<'a> TreeReader<'_, 'a> {
-    /// Makes the array or object that began at node `at` one of `count` entries.
+    /// Sets the number of entries of the array or object at node `at` to `count`.
     fn close<E>(self, at: usize, kind: fn(Extent) -> TreeNode<'a>, count: usize) -> Result<(), E> {
         let nodes = self.0.len() - at;
         if let Some(node) = self.0.get_mut(at) {
@@ -174,13 +175,13 @@ impl<'a> Visitor<'a> for TreeReader<'_, 'a> {
     }
 }
 
-/// A value within a tree: its node, and those of all that is in it.
+/// A value in a tree: its node, and the nodes of its contents.
 #[derive(Debug, Clone, Copy)]
 pub struct Branch<'t, 'a> {
     nodes: &'t [TreeNode<'a>],
 }
 
-/// The kinds of values, as another form has to tell them apart.
+/// The kinds of values.
 #[derive(Debug, Clone)]
 pub enum BranchKind<'t, 'a> {
     /// `null`.
@@ -225,14 +226,14 @@ impl<'t, 'a> Branch<'t, 'a> {
         }
     }
 
-    /// The object's member of that name, the last if there are more.
+    /// The object's member of that name; the last one if there are several.
     #[must_use]
     pub fn get(self, name: &str) -> Option<Self> {
         let found = self.members()?.filter(|(one, _)| *one == name);
         found.last().map(|(_, value)| value)
     }
 
-    /// The value at that path: names of members, or `0` for an array's first entry, each with a slash in front.
+    /// The value at that path. Each part is a slash with the name of a member, or `0` for an array's first entry.
     #[must_use]
     pub fn pointer(self, way: &str) -> Option<Self> {
         way.split('/')
@@ -270,7 +271,7 @@ impl<'t, 'a> Branch<'t, 'a> {
         }
     }
 
-    /// The truth, if it is one.
+    /// The boolean, if it is one.
     #[must_use]
     pub fn as_bool(self) -> Option<bool> {
         match self.kind() {
@@ -279,13 +280,13 @@ impl<'t, 'a> Branch<'t, 'a> {
         }
     }
 
-    /// The number, if it is a whole one, not negative, and fits.
+    /// The number, if it is a whole number, not negative, and fits.
     #[must_use]
     pub fn as_u64(self) -> Option<u64> {
         self.number()?.as_u64()
     }
 
-    /// The number, if it is one that is whole and fits.
+    /// The number, if it is a whole number and fits.
     #[must_use]
     pub fn as_i64(self) -> Option<i64> {
         self.number()?.as_i64()
@@ -308,7 +309,7 @@ impl<'t, 'a> Branch<'t, 'a> {
 /// The entries of an array, in order.
 #[derive(Debug, Clone)]
 pub struct BranchEntries<'t, 'a> {
-    /// The nodes of those that are left, and others behind them.
+    /// The nodes of the remaining ones, and others after them.
     rest: &'t [TreeNode<'a>],
     left: usize,
 }
@@ -328,10 +329,10 @@ impl<'t, 'a> Iterator for BranchEntries<'t, 'a> {
 
 impl ExactSizeIterator for BranchEntries<'_, '_> {}
 
-/// The members of an object as they were written, names that come twice included.
+/// The members of an object in written order, including repeated names.
 #[derive(Debug, Clone)]
 pub struct BranchMembers<'t, 'a> {
-    /// The nodes of those that are left, and others behind them.
+    /// The nodes of the remaining ones, and others after them.
     rest: &'t [TreeNode<'a>],
     left: usize,
 }
@@ -353,15 +354,15 @@ impl<'t, 'a> Iterator for BranchMembers<'t, 'a> {
 impl ExactSizeIterator for BranchMembers<'_, '_> {}
 
 impl<'t, 'a> BranchMembers<'t, 'a> {
-    /// Whether each name comes behind the one in front of it, as text is ordered.
+    /// Whether the names are in ascending order.
     #[must_use]
     pub fn are_in_order(&self) -> bool {
         let names = self.clone().map(|(name, _)| name);
         names.is_sorted_by(|one, next| one < next)
     }
 
-    /// The members by name, each name once: the last of those that share it. It takes 8 bytes for each member, whose
-    /// text has 5 at least.
+    /// The members by name, each name once. Of repeated names the last member counts. It takes 8 bytes for each
+    /// member, whose text has at least 5.
     pub fn in_order(
         &self,
     ) -> impl ExactSizeIterator<Item = (&'t str, Branch<'t, 'a>)> + use<'t, 'a> {
@@ -387,7 +388,7 @@ impl<'t, 'a> BranchMembers<'t, 'a> {
     }
 }
 
-/// The value that `rest` begins with, which is behind it then.
+/// Takes the first value of `rest` from it.
 fn next_branch<'t, 'a>(rest: &mut &'t [TreeNode<'a>]) -> Option<Branch<'t, 'a>> {
     let nodes = match rest.first()? {
         TreeNode::Array(extent) | TreeNode::Object(extent) => extent.nodes,

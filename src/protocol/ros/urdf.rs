@@ -1,15 +1,15 @@
-//! The arm as 3D tools draw it: URDF from lengths and masses.
+//! The arm for 3D tools: URDF from lengths and masses.
 //!
-//! One link per rod, `link1` to `linkN`, `world` before the first and [`END_EFFECTOR`] behind the last; joint `i` turns
-//! about z. At `q = 0` all lie along +x. Frames of the same names are what `/tf` moves.
+//! There is one link per rod, `link1` to `linkN`, with `world` before the first and [`END_EFFECTOR`] after the last.
+//! Joint `i` turns about z. At `q = 0` all links are along +x. `/tf` has frames of the same names.
 //!
-//! **Invariant:** the inertia told is that of the dynamics: a thin uniform rod.
+//! **Invariant:** the inertia is that of the dynamics: a thin uniform rod.
 
 use std::fmt::Write as _;
 
 use crate::protocol::messages::scene::{END_EFFECTOR, WORLD, link_name};
 
-/// Thickness of a link as it is drawn \[m\]; it has none in the dynamics.
+/// Thickness of a link in drawings \[m\]. In the dynamics it has none.
 const THICKNESS: f64 = 0.05;
 /// A thin rod has no inertia about its own axis. Parsers want one greater than 0, and at most the sum of the other two.
 const AXIAL_PART: f64 = 1e-6;
@@ -24,7 +24,7 @@ pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String
     {
         let link = link_name(index);
         let middle = length / 2.0;
-        // The inertia of the lightest and shortest rod would be 0 as a double.
+        // For the lightest and shortest rod the inertia would underflow to 0.
         let across =
             (mass * length * length / 12.0).clamp(f64::MIN_POSITIVE / AXIAL_PART, f64::MAX);
         let along = across * AXIAL_PART;
@@ -56,7 +56,7 @@ pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String
 mod tests {
     use super::*;
 
-    /// A rod of 3 kg and 2 m has m l² / 12 = 1 kg m². Its joint stands at the end of the link before.
+    /// A rod of 3 kg and 2 m has m l² / 12 = 1 kg m². Its joint is at the end of the previous link.
     #[test]
     fn a_description_has_the_lengths_the_masses_and_the_rods_inertia() {
         let xml = describe(&["joint1", "joint2"], &[0.5, 2.0], &[1.0, 3.0]);

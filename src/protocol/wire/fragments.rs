@@ -1,10 +1,10 @@
 //! Long messages in pieces: `fragment` in both directions.
 //!
-//! They [go out](split()) only to subscribers that asked for them with `fragment_size`, and are taken in from any
-//! client, within bounds. The caller gives the time.
+//! They are [sent](split()) only to subscribers with a `fragment_size`, and accepted from any client, within
+//! bounds. The caller passes the time.
 //!
-//! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
-//! messages, none of them for longer than [`MAX_AGE`].
+//! **Invariant:** incomplete messages have at most [`MAX_FRAME`] bytes together. There are at most
+//! [`MAX_UNFINISHED`] of them, none older than [`MAX_AGE`].
 
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
@@ -15,59 +15,59 @@ use serde::Serialize;
 use super::frame::start_of;
 use crate::protocol::limits::MAX_FRAME;
 
-/// Messages of one connection that may be incomplete at once: clients send one after the other.
+/// Most incomplete messages of one connection. Clients send one after the other.
 pub const MAX_UNFINISHED: usize = 8;
-/// Pieces of one message: each of a longest frame's has a kilobyte.
+/// Most pieces of one message: a kilobyte each for the longest frame.
 pub const MAX_PIECES: usize = 4096;
-/// Bytes that a piece takes beside its text: its place among the others, and the allocator's own.
+/// Bytes of a piece besides its text: its table entry and the allocator's overhead.
 pub const PIECE_BYTES: usize = 128;
-/// How long a message may take to come: longer than over the slowest usable network.
+/// Longest time for all pieces of a message: longer than on the slowest usable network.
 pub const MAX_AGE: Duration = Duration::from_secs(60);
 
 /// A piece of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Piece {
-    /// The message, as the sender names it (any JSON value's text).
+    /// The sender's id of the message (the text of any JSON value).
     pub id: String,
     /// The text.
     pub data: String,
     /// The piece's number, from 0.
     pub num: usize,
-    /// How many there are.
+    /// The number of pieces.
     pub total: usize,
 }
 
-/// Why a piece is not taken; the pieces of its message are forgotten.
+/// Why a piece is refused. The pieces of its message are then discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FragmentError {
-    /// There is no piece of such a number.
+    /// The piece's number is too large.
     #[error("fragment: num must be less than total, got {num} of {total}")]
     NoSuchPiece {
         /// The piece.
         num: usize,
-        /// How many there are.
+        /// The number of pieces.
         total: usize,
     },
     /// Too many pieces.
     #[error("fragment: total must be at most {MAX_PIECES}, got {0}")]
     TooMany(usize),
     /// The number of pieces has changed.
-    #[error("fragment: total was {before}, and now is {now}")]
+    #[error("fragment: total must stay {before}, got {now}")]
     Changed {
-        /// The number as it was.
+        /// The previous number.
         before: usize,
-        /// The number as it is now.
+        /// The new number.
         now: usize,
     },
     /// Too many messages at once.
     #[error("fragment: at most {MAX_UNFINISHED} messages may be incomplete at once")]
     TooManyMessages,
     /// Too long.
-    #[error("fragment: what is incomplete has at most {MAX_FRAME} bytes")]
+    #[error("fragment: incomplete messages must have at most {MAX_FRAME} bytes together")]
     TooLong,
 }
 
-/// Messages of one connection that are still incomplete.
+/// The incomplete messages of one connection.
 #[derive(Debug, Default)]
 pub struct Fragments {
     messages: HashMap<String, Incomplete>,
@@ -82,7 +82,7 @@ struct Incomplete {
     bytes: usize,
 }
 
-/// A message all of whose pieces have come. To put megabytes of them together takes milliseconds.
+/// A message with all its pieces. Joining megabytes of them takes milliseconds.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Complete {
     pieces: BTreeMap<usize, String>,
@@ -106,11 +106,11 @@ impl Complete {
 }
 
 impl Fragments {
-    /// Takes a piece. Returns the message with the last missing one. A piece that comes twice counts once.
+    /// Takes a piece. Returns the message with its last missing piece. A repeated piece counts once.
     ///
     /// # Errors
-    /// [`FragmentError`] where the piece breaks a bound; with the first bytes of the message, if its first piece has
-    /// come.
+    /// [`FragmentError`] if the piece exceeds a bound, with the first bytes of the message, if its first piece has
+    /// arrived.
     pub fn take(
         &mut self,
         piece: Piece,
@@ -154,7 +154,7 @@ impl Fragments {
         self.messages.values().map(|one| one.bytes).sum()
     }
 
-    /// Bytes of memory that this takes: pieces without text take some too, and so do ids.
+    /// Bytes of memory in use. Pieces without text and ids count too.
     #[must_use]
     pub fn allocated(&self) -> usize {
         let beside = self.messages.iter();
@@ -194,7 +194,7 @@ impl Fragments {
         Ok(())
     }
 
-    /// Forgets messages that take longer than [`MAX_AGE`].
+    /// Discards messages older than [`MAX_AGE`].
     pub fn forget_old(&mut self, now: Instant) {
         self.messages
             .retain(|_, one| now.saturating_duration_since(one.began) <= MAX_AGE);
@@ -203,7 +203,7 @@ impl Fragments {
 
 // ---- a long message, cut into pieces for a subscriber: none is longer than was asked for ----------------------------
 
-/// The smallest pieces sent: smaller ones would be frame more than content.
+/// The smallest pieces that are sent. Smaller ones would have more overhead than content.
 pub const MIN_SIZE: usize = 64;
 
 #[derive(Serialize)]
@@ -215,8 +215,8 @@ struct Fragment<'a> {
     total: usize,
 }
 
-/// A frame in pieces of at most `size` bytes of text each, one line per piece. A frame that is no longer than that
-/// stays as it is. `None` if the lines have more than `most` bytes.
+/// A frame in pieces of at most `size` bytes of text each, one line per piece. A shorter frame does not change.
+/// `None` if the lines have more than `most` bytes.
 #[must_use]
 pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes> {
     let text = frame.strip_suffix(b"\n").unwrap_or(frame);
@@ -228,7 +228,7 @@ pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes>
     if least_length(text, size, id) > most {
         return None;
     }
-    // A piece must not end within a character: the longest has four bytes.
+    // A piece must not end inside a character, which has up to four bytes.
     let mut pieces = Vec::new();
     let mut rest = text;
     while !rest.is_empty() {
@@ -257,7 +257,7 @@ pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes>
     Some(Bytes::from(lines))
 }
 
-/// The least bytes that the pieces of a text can have: pieces that would be too long are not made first.
+/// The least total bytes of a text's pieces. So pieces that would be too long are never made.
 fn least_length(text: &str, size: usize, id: &str) -> usize {
     const SHORTEST: usize = r#"{"op":"fragment","id":"","data":"","num":0,"total":0}"#.len() + 1;
     let escaped = text.bytes().filter(|byte| matches!(byte, b'"' | b'\\'));
@@ -399,7 +399,7 @@ mod tests {
         assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(later)));
     }
 
-    /// Characters of one to four bytes, cut at every size: together again they are what they were.
+    /// Characters of one to four bytes, split at every size, give the same text when joined.
     #[test]
     fn a_frame_in_pieces_is_the_frame_again() {
         let text = format!("{{\"msg\":\"{}\"}}", "aä€😀\\\"".repeat(40));

@@ -1,12 +1,12 @@
-//! Bytes into frames: an incremental reader that any split of the stream leaves unmoved, and that resynchronises.
+//! Splits bytes into frames: an incremental reader that resynchronises after a fault. The result does not depend
+//! on how the stream is divided into chunks.
 //!
 //! A frame is one JSON object. It ends where its braces and brackets balance outside strings, or at a newline. Anything
 //! else runs to the newline and is one malformed frame.
 //!
-//! Messages that need no reading (see [`series`]) are taken as they are.
+//! Messages that need no parsing (see [`series`]) are taken unchanged.
 //!
-//! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last
-//! pushed.
+//! **Invariant:** no byte is read more than twice. At most one incomplete frame and the last chunk are kept.
 
 use bytes::Bytes;
 
@@ -16,7 +16,7 @@ use super::series::{self, Series};
 use super::text;
 use crate::protocol::limits::{MAX_FRAME, MAX_NESTING, MEDIUM, SHORT};
 
-/// Bytes of a line that is no object, kept for the error message.
+/// Bytes of a line that is not an object, kept for the error message.
 const MAX_PREFIX: usize = 32;
 /// Buffer that an idle reader may keep.
 const KEPT_BUFFER: usize = 16 * 1024;
@@ -28,22 +28,22 @@ enum Within {
     Between,
     /// In an object that is kept.
     Object,
-    /// In an object that has been reported already, and is skipped to where it would have ended.
+    /// In an object that has been reported already, and is skipped to its end.
     SkippedObject,
-    /// In a line that is no object; its beginning is being collected.
+    /// In a line that is not an object. Its beginning is being collected.
     Line,
     /// In a line that has been reported already, and is skipped to the newline.
     SkippedLine,
 }
 
-/// Takes bytes as they come and gives frames, one at a time.
+/// Takes bytes in chunks and returns frames, one at a time.
 ///
-/// [`push`](Self::push) a chunk, then [`cut`](Self::cut) until it gives `None`; at the end of the stream,
-/// [`finish`](Self::finish). As an iterator it reads each frame too, without series.
+/// [`push`](Self::push) a chunk, then [`cut`](Self::cut) until it returns `None`. At the end of the
+/// stream, call [`finish`](Self::finish). As an iterator it also decodes each frame, without series.
 #[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,
-    /// Start of the present frame in the buffer. Bytes before it have been handed out or skipped.
+    /// Start of the present frame in the buffer. Bytes before it have been returned or skipped.
     start: usize,
     /// How far the buffer has been scanned.
     at: usize,
@@ -51,7 +51,7 @@ pub struct FrameReader {
     nesting: Nesting,
     /// Longest frame.
     limit: usize,
-    /// The first bytes of the object that was refused last; a line that is no object has none.
+    /// The first bytes of the last refused object. A line that is not an object has none.
     refused: Vec<u8>,
 }
 
@@ -85,7 +85,7 @@ impl FrameReader {
     /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
     pub fn push(&mut self, bytes: &[u8]) {
         self.compact();
-        // A `Vec` would grow to twice [`MEDIUM`] before those bytes have come.
+        // Without this a `Vec` would grow to twice [`MEDIUM`] before those bytes arrive.
         let needed = self.buffer.len() + bytes.len();
         if needed > self.buffer.capacity() && needed <= MEDIUM && needed > MEDIUM / 2 {
             self.buffer.reserve_exact(MEDIUM - self.buffer.len());
@@ -93,8 +93,8 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The series of messages with which the stream goes on, if it does, short in all. It must be asked for before the
-    /// next frame.
+    /// The series of messages at the present position, if there is one, limited in length. Call this before the next
+    /// frame.
     pub fn series(&mut self) -> Option<Series> {
         if self.state != Within::Between {
             return None;
@@ -106,7 +106,7 @@ impl FrameReader {
         let (topic, length) = series::leading(rest)?;
         let series = Series {
             topic: topic.into(),
-            // The series is a copy, so that keeping it keeps nothing else of the stream.
+            // The series is a copy, so it does not keep the stream's buffer in memory.
             frames: Bytes::copy_from_slice(rest.get(..length)?),
         };
         self.at += space + length;
@@ -125,19 +125,19 @@ impl FrameReader {
         })
     }
 
-    /// How much memory the reader holds, in bytes.
+    /// The reader's memory in bytes.
     #[must_use]
     pub const fn buffered(&self) -> usize {
         self.buffer.capacity()
     }
 
-    /// Whether a frame has begun and not ended. One that is skipped does not count: nothing of it is kept.
+    /// Whether a frame has begun and not ended. A skipped frame does not count, because none of it is kept.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         matches!(self.state, Within::Object | Within::Line)
     }
 
-    /// Ends the stream, after the last frame was taken. An unfinished frame is one malformed frame.
+    /// Ends the stream, after the last frame was taken. An incomplete frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
             Within::Object => Some(FrameError::StreamEnded),
@@ -148,8 +148,7 @@ impl FrameReader {
         error
     }
 
-    /// Moves what is unfinished to the front of the buffer, once what is done with has outgrown it: constant time per
-    /// byte.
+    /// Moves the incomplete frame to the front of the buffer once the finished part is longer: constant time per byte.
     fn compact(&mut self) {
         let rest = self.buffer.len() - self.start;
         if self.start < rest {
@@ -161,7 +160,7 @@ impl FrameReader {
         self.start = 0;
     }
 
-    /// Gives back the memory of a long frame once nothing of it is left.
+    /// Frees the memory of a long frame once it has been returned.
     fn give_back(&mut self) {
         if self.start == self.buffer.len() {
             self.buffer.clear();
@@ -175,7 +174,7 @@ impl FrameReader {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// Skips white space up to the first byte of something.
+    /// Skips white space.
     fn skip_space(&mut self) {
         let rest = self.rest();
         let space = rest.iter().position(|byte| !is_space(*byte));
@@ -192,7 +191,7 @@ impl FrameReader {
         }
     }
 
-    /// Goes on in a line that is no object. `None` if it has not ended yet or has been reported.
+    /// Continues a line that is not an object. `None` if it has not ended yet or has been reported.
     fn scan_line(&mut self) -> Option<FrameError> {
         let rest = self.rest();
         let newline = rest.iter().position(|&byte| byte == b'\n');
@@ -220,7 +219,7 @@ impl FrameReader {
         not_an_object(self.buffer.get(self.start..self.at).unwrap_or_default())
     }
 
-    /// Goes on in an object. `None` if it has not ended yet, or ended after it had been reported.
+    /// Continues an object. `None` if it has not ended yet, or was reported before its end.
     fn scan_object(&mut self) -> Option<Result<RawFrame, FrameError>> {
         let (scanned, event) = self
             .nesting
@@ -230,7 +229,8 @@ impl FrameReader {
         if !kept {
             self.start = self.at;
         }
-        // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
+        // A newline stays unscanned. It belongs to the white space after the frame and does not count for a frame's
+        // length.
         let limit = self.limit;
         let too_long = self.at - self.start > limit;
         let (state, error) = match event {
@@ -259,7 +259,7 @@ impl FrameReader {
         }))
     }
 
-    /// The frame that has just balanced.
+    /// The frame that has just ended.
     fn take_frame(&mut self) -> RawFrame {
         let rest = self.rest();
         let behind = rest
@@ -268,7 +268,7 @@ impl FrameReader {
         let newline = behind == Some(&b'\n');
         let length = self.at - self.start;
         let bytes = if length > KEPT_BUFFER && length >= rest.len() {
-            // The frame keeps the buffer, and the bytes behind it are copied, since they are fewer.
+            // The frame keeps the buffer. The bytes after it are copied, because they are fewer.
             let mut kept = Vec::with_capacity(rest.len().max(KEPT_BUFFER));
             kept.extend_from_slice(rest);
             let mut bytes = std::mem::replace(&mut self.buffer, kept);
@@ -312,7 +312,7 @@ impl FrameReader {
     }
 }
 
-/// Frames as far as the bytes reach, decoded.
+/// Iterates over the complete frames, decoded.
 impl Iterator for FrameReader {
     type Item = Result<Frame, FrameError>;
 
@@ -341,15 +341,14 @@ const fn is_space(byte: u8) -> bool {
 pub struct Frame {
     /// The text, with `NaN` and its like made [acceptable](json::accept_literals).
     pub text: String,
-    /// Whether a line end was seen right behind it. Older raw-TCP clients send none, and want each frame in a write of
-    /// its own.
+    /// Whether a line end was right after it. Older raw-TCP clients send none, and need each frame in a separate write.
     pub newline: bool,
 }
 
-/// Why a stretch of the stream is no frame. Nothing inside it is executed; later frames work.
+/// Why a part of the stream is not a frame. Nothing inside it is executed, and later frames work.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// Something other than `{` began the line; holds the beginning of it.
+    /// The line does not begin with `{`; holds the beginning of it.
     #[error("malformed frame: a frame is one JSON object on one line, got \"{0}\"")]
     NotAnObject(String),
     /// A newline came before the object was complete.
@@ -361,21 +360,21 @@ pub enum FrameError {
     /// The stream ended before the object was complete.
     #[error("malformed frame: the connection ended inside an object")]
     StreamEnded,
-    /// A `]` came where `}` was due, or the reverse.
-    #[error("malformed frame: {found} closes what {opener} opened")]
+    /// A `]` in place of `}`, or the reverse.
+    #[error("malformed frame: {found} does not close {opener}")]
     Mismatch {
         /// The bracket that opened the innermost level.
         opener: char,
-        /// The bracket that was to close it.
+        /// The bracket in place of the right one.
         found: char,
     },
     /// More than [`MAX_NESTING`] levels.
     #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
     TooDeep,
-    /// Something stood behind the object of a message, which holds one.
-    #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
+    /// Text after the one object of a message.
+    #[error("malformed frame: a message must be one JSON object, but more text follows it")]
     MoreBehind,
-    /// Longer than the limit, which it holds: [`MAX_FRAME`] unless the reader has another.
+    /// Longer than the limit, which it holds. The limit is [`MAX_FRAME`], unless the reader has another.
     #[error("frame longer than {0} bytes, skipped")]
     TooLong(usize),
     /// Not UTF-8.
@@ -389,39 +388,39 @@ pub enum FrameError {
 /// The next part of a stream.
 #[derive(Debug)]
 pub enum FramePart {
-    /// Messages of a client on a topic of clients that can go out as they are.
+    /// Messages of a client on a topic of clients that can be forwarded unchanged.
     Lines(Series),
     /// Any other frame.
     Frame(RawFrame),
-    /// A whole message of a WebSocket. Nobody has looked at it.
+    /// A whole WebSocket message, not yet scanned.
     Message(Bytes),
-    /// A stretch that is no frame, and its first bytes, at most [`KEPT_START`] of them.
+    /// A part that is not a frame, with its first bytes, at most [`KEPT_START`].
     Error(FrameError, Vec<u8>),
 }
 
-/// Bytes that are kept from the start of a frame that cannot be read: they hold the names and the id by which the call
-/// that it answers is found.
+/// Bytes kept from the start of a frame that cannot be read. They contain the names and the id of the call that it may
+/// answer.
 pub const KEPT_START: usize = 1024;
 
-/// The bytes that are kept of the start of a frame that cannot be read.
+/// The kept bytes from the start of a frame that cannot be read.
 pub(super) fn start_of(bytes: &[u8]) -> Vec<u8> {
     bytes.get(..KEPT_START).unwrap_or(bytes).to_vec()
 }
 
-/// A [`Frame`] whose bytes nobody has looked at but to find its end: reading on may be left to another thread.
+/// A [`Frame`] that has only been scanned for its end. Another thread may parse it.
 #[derive(Debug)]
 pub struct RawFrame {
     bytes: Vec<u8>,
-    /// Whether there may be names of numbers that are not finite.
+    /// Whether it may contain `NaN` or `Infinity`.
     has_literals: bool,
     newline: bool,
 }
 
 impl RawFrame {
-    /// The frame that a message holds, which may be pretty-printed. `None` if the message is nothing but white space.
+    /// The frame in a message, which may be pretty-printed. `None` if the message has only white space.
     ///
     /// # Errors
-    /// If it is anything else than one object; with its first bytes.
+    /// If it is not one object, with its first bytes.
     pub fn of_message(message: &[u8]) -> Option<Result<Self, (FrameError, Vec<u8>)>> {
         let text = message.trim_ascii();
         if text.is_empty() {
@@ -437,14 +436,14 @@ impl RawFrame {
         })
     }
 
-    /// How long it is, in bytes; never 0.
+    /// Its length in bytes; never 0.
     #[must_use]
-    #[allow(clippy::len_without_is_empty, reason = "it has two braces at least")]
+    #[allow(clippy::len_without_is_empty, reason = "it has at least two braces")]
     pub const fn len(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Whether a line end was seen right behind it.
+    /// Whether a line end was right after it.
     #[must_use]
     pub const fn newline(&self) -> bool {
         self.newline
@@ -453,7 +452,7 @@ impl RawFrame {
     /// The frame.
     ///
     /// # Errors
-    /// If it is not UTF-8; with the frame's first bytes.
+    /// If it is not UTF-8, with the frame's first bytes.
     pub fn decode(self) -> Result<Frame, (FrameError, Vec<u8>)> {
         let text = String::from_utf8(self.bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
@@ -469,7 +468,7 @@ impl RawFrame {
     }
 }
 
-/// Whether the object, if `text` is one, may have names of numbers that are not finite.
+/// Whether the object in `text`, if there is one, may contain `NaN` or `Infinity`.
 fn one_object(text: &[u8]) -> Result<bool, FrameError> {
     if !text.starts_with(b"{") {
         let line = text.split(|byte| *byte == b'\n').next();
@@ -483,7 +482,7 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
         match event {
             Some(Event::Balanced) if rest.is_empty() => return Ok(nesting.has_literals),
             Some(Event::Balanced) => return Err(FrameError::MoreBehind),
-            // Between tokens a newline is white space.
+            // A newline between tokens is white space.
             Some(Event::Fault(FrameError::LineEnded)) if !rest.is_empty() => {
                 rest = rest.get(1..).unwrap_or_default();
             }
@@ -497,16 +496,16 @@ fn one_object(text: &[u8]) -> Result<bool, FrameError> {
 
 const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
 
-/// The reason why a scan of an object stops.
+/// Why a scan of an object stops.
 #[derive(Debug)]
 enum Event {
     /// The object has ended.
     Balanced,
-    /// It is none. A newline is such a fault too.
+    /// It is not a valid object. A newline is such a fault too.
     Fault(FrameError),
 }
 
-/// State of the scan in an object: the brackets that are open, and whether it is inside a string.
+/// State of the scan in an object: the open brackets, and whether it is inside a string.
 #[derive(Debug, Clone, Copy)]
 struct Nesting {
     depth: usize,
@@ -514,7 +513,7 @@ struct Nesting {
     brackets: u128,
     in_string: bool,
     escaped: bool,
-    /// Whether an `N` or an `I` stood outside strings: only then can there be a `NaN` or an `Infinity`.
+    /// Whether there was an `N` or an `I` outside strings. Only then can there be a `NaN` or an `Infinity`.
     has_literals: bool,
 }
 
@@ -529,8 +528,8 @@ impl Nesting {
         }
     }
 
-    /// Goes on with `bytes`. Returns how many were scanned, and what stopped the scan: it stops before a newline, and
-    /// behind anything else.
+    /// Continues with `bytes`. Returns the number of scanned bytes and the reason for the stop. The scan stops before
+    /// a newline, and after any other fault or end.
     fn scan(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
         let mut at = 0;
         while let Some(&byte) = bytes.get(at) {
@@ -598,9 +597,9 @@ impl Nesting {
     }
 }
 
-/// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
+/// The number of bytes from the start that are plain inside a string: no end, no escape and no newline.
 pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
-    /// Most strings are keys and names, and end before a block would pay.
+    /// Most strings are keys and names, which are too short for blocks.
     const SHORT: usize = 16;
     /// Bytes that the compiler compares with a few vector instructions.
     const BLOCK: usize = 32;

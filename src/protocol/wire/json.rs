@@ -1,8 +1,8 @@
-//! JSON as it is met in the wild: lenient about numbers coming in, strict about numbers going out.
+//! JSON that is lenient about numbers in the input and strict about numbers in the output.
 //!
-//! Python's `json` writes `NaN`, `Infinity` and `-Infinity`, and anybody may write `1e999`. Coming in, the names become
-//! literals that overflow, so that the parser takes the frame and [`number`] gives a non-finite value for the field's
-//! reader to reject by name. Going out, in payloads that only pass through, a number that overflows becomes `null`.
+//! Python's `json` writes `NaN`, `Infinity` and `-Infinity`, and any client may write `1e999`. In the input, these
+//! names become literals that overflow. So the parser accepts the frame, [`number`] returns a non-finite value, and the
+//! field's reader rejects it by name. In forwarded payloads a number that overflows becomes `null`.
 //!
 //! **Invariant:** one pass, linear in the length of any text.
 
@@ -14,11 +14,11 @@ use std::iter::repeat;
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-/// The text that replaces `NaN` on the way in. It reads as an infinity: nothing that we accept tells the two apart.
+/// The text that replaces `NaN` in the input. It is read as infinity, because no valid input distinguishes the two.
 pub(crate) const NAN: &str = "9e999";
-/// The text that replaces `Infinity` on the way in; the sign before it stays.
+/// The text that replaces `Infinity` in the input. The sign before it stays.
 pub(crate) const INFINITY: &str = "1e999";
-/// Digits of the largest finite `f64` before the point: a number of fewer, without an exponent, can't overflow.
+/// Digits of the largest finite `f64` before the point. A shorter number without an exponent cannot overflow.
 const SAFE_DIGITS: usize = OVERFLOW.len() - 1;
 /// The least number that rounds to infinity: 2^1024 - 2^970, halfway between the largest `f64` and the next power of
 /// two.
@@ -27,8 +27,8 @@ const OVERFLOW: &[u8; 309] = b"\
     3028641669288791094655554785194040263065748867150582068190890200070838367627385484581771153176447573027\
     0069855571366959622842914819860834936475292719074168444365510704342711559699508093042880177904174497792";
 
-/// Makes `NaN`, `Infinity` and `-Infinity` (outside strings, as whole tokens) literals that overflow; the rest is
-/// untouched.
+/// Replaces `NaN`, `Infinity` and `-Infinity` (outside strings, as whole tokens) by literals that overflow. The
+/// rest does not change.
 #[must_use]
 pub fn accept_literals(text: String) -> String {
     let bytes = text.as_bytes();
@@ -59,7 +59,7 @@ pub fn accept_literals(text: String) -> String {
     accepted
 }
 
-/// Replaces every number that overflows an `f64` by `null`; all other bytes of the valid JSON text `raw` are untouched.
+/// Replaces every number that overflows an `f64` by `null`. All other bytes of the valid JSON text `raw` do not change.
 #[must_use]
 pub fn strict(raw: &str) -> Cow<'_, str> {
     let bytes = raw.as_bytes();
@@ -85,7 +85,7 @@ pub fn strict(raw: &str) -> Cow<'_, str> {
     Cow::Owned(output)
 }
 
-/// The value of a JSON number, infinite where the literal overflows; `None` if `raw` is not a number.
+/// The value of a JSON number, infinite if the literal overflows; `None` if `raw` is not a number.
 #[must_use]
 pub fn number(raw: &RawValue) -> Option<f64> {
     let token = raw.get();
@@ -120,7 +120,8 @@ pub fn boolean(raw: &RawValue) -> Option<bool> {
     }
 }
 
-/// The text of a JSON string; `None` if `raw` is none, or if it holds half a surrogate pair, which is no text.
+/// The text of a JSON string; `None` if `raw` is not a string, or if it has half of a surrogate pair, which is
+/// not valid text.
 #[must_use]
 pub fn text(raw: &RawValue) -> Option<Cow<'_, str>> {
     let quoted = raw.get();
@@ -131,8 +132,7 @@ pub fn text(raw: &RawValue) -> Option<Cow<'_, str>> {
     Some(Cow::Borrowed(inner))
 }
 
-/// Whether `name` stands at `at`, with nothing around it that would make it part of a longer token (`1Infinity`,
-/// `NaNs`).
+/// Whether `name` is a whole token at `at`, and not part of a longer one (`1Infinity`, `NaNs`).
 fn whole_token(bytes: &[u8], at: usize, name: &str, signed: bool) -> bool {
     let before = |back: usize| at.checked_sub(back).and_then(|index| bytes.get(index));
     let sign = usize::from(signed && before(1) == Some(&b'-'));
@@ -153,8 +153,8 @@ const fn is_numeric(byte: u8) -> bool {
     matches!(byte, b'0'..=b'9' | b'-' | b'+' | b'.' | b'e' | b'E')
 }
 
-/// Whether a JSON number rounds to infinity, by its digits and its exponent, in one pass. To make an `f64` of it may
-/// take as long as three hundred of its bytes, if it lies close to halfway between two.
+/// Whether a JSON number rounds to infinity, from its digits and its exponent, in one pass. Parsing it to an `f64`
+/// may be hundreds of times slower, if it is close to halfway between two doubles.
 fn overflows(token: &[u8]) -> bool {
     let exponent_at = token.iter().position(|byte| matches!(byte, b'e' | b'E'));
     if exponent_at.is_none() && token.len() <= SAFE_DIGITS {
@@ -167,7 +167,7 @@ fn overflows(token: &[u8]) -> bool {
     let Some(first) = mantissa.iter().position(|byte| matches!(byte, b'1'..=b'9')) else {
         return false;
     };
-    // How many digits stand before the point once the exponent has moved it; 0 or less where zeros follow the point.
+    // The number of digits before the point after applying the exponent; 0 or less if zeros follow the point.
     let shift = if first < point {
         whole(point - first)
     } else {
@@ -189,7 +189,7 @@ fn overflows(token: &[u8]) -> bool {
     }
 }
 
-/// The value of an exponent, its `e` included; saturates, and is 0 where there is none.
+/// The value of an exponent with its `e`. Saturates; 0 if there is none.
 fn power(exponent: &[u8]) -> i64 {
     let digits = exponent.iter().filter(|byte| byte.is_ascii_digit());
     let value = digits.fold(0_i64, |value, digit| {
@@ -210,12 +210,12 @@ fn whole(length: usize) -> i64 {
 
 // ---- the members of an object and the entries of an array, read in one pass -----------------------------------------
 
-/// Reads the JSON object `text` and gives, for each of `names`, the raw value under that key: the last one where a key
-/// is repeated. Other members are checked for syntax and ignored.
+/// Reads the JSON object `text` and returns, for each of `names`, the raw value of that key. Of repeated keys the last
+/// one counts. Of other members only the syntax is checked.
 ///
 /// # Errors
-/// Where `text` is not one valid JSON object. The reason does not repeat a string in its place: to escape that would
-/// take fifty times as long as to read it.
+/// If `text` is not one valid JSON object. The reason does not quote a string, because escaping it would take fifty
+/// times as long as reading it.
 pub(crate) fn members<'a, const N: usize>(
     text: &'a str,
     names: &[&str; N],
@@ -239,18 +239,18 @@ pub(crate) fn members_into<'a>(
     deserializer.end()
 }
 
-/// A JSON array, read no further than it has to be.
+/// A JSON array, parsed only as far as necessary.
 pub(crate) struct Entries<'a> {
-    /// The first entries, at most as many as were asked for.
+    /// The first entries, at most the requested number.
     pub(crate) first: Vec<&'a RawValue>,
     /// The last entry.
     pub(crate) last: Option<&'a RawValue>,
-    /// How many entries there are.
+    /// The number of entries.
     pub(crate) count: usize,
 }
 
-/// Reads the array `raw`, keeping at most `limit` entries: a long array costs time, not memory. `None` if it is no
-/// array.
+/// Reads the array `raw` and keeps at most `limit` entries, so a long array uses little memory. `None` if it is
+/// not an array.
 pub(crate) fn entries(raw: &RawValue, limit: usize) -> Option<Entries<'_>> {
     let inside = raw.get().strip_prefix('[')?.strip_suffix(']')?;
     let mut entries = Entries {
@@ -280,8 +280,8 @@ pub(crate) fn entries(raw: &RawValue, limit: usize) -> Option<Entries<'_>> {
     }
 }
 
-/// The index of the comma behind the entry that begins at `start`, or of the end: in a valid array without its brackets
-/// whatever is open closes.
+/// The index of the comma after the entry that begins at `start`, or of the end. In a valid array every open bracket is
+/// closed.
 fn entry_end(inside: &[u8], start: usize) -> usize {
     let mut at = start;
     let mut open = 0_usize;
@@ -363,7 +363,7 @@ fn next_of(bytes: &[u8], at: usize, wanted: impl Fn(u8) -> bool) -> Option<usize
         .map(|offset| at + offset)
 }
 
-/// The index behind the string that opens at `open`; the end of the text where it does not close.
+/// The index after the string that begins at `open`; the end of the text if it is not closed.
 fn string_end(bytes: &[u8], open: usize) -> usize {
     let mut at = open + 1;
     while let Some(found) = next_of(bytes, at, |byte| matches!(byte, b'"' | b'\\')) {
@@ -379,7 +379,7 @@ fn string_end(bytes: &[u8], open: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// A client may send a million entries where two belong.
+    /// A client may send a million entries in place of two.
     #[test]
     fn no_more_entries_are_kept_than_were_asked_for_but_all_are_counted() {
         let raw = RawValue::from_string("[1,2,3,4]".to_owned()).unwrap();

@@ -1,6 +1,6 @@
-//! From bytes to frames and back: lines, nesting, pieces, text and JSON.
+//! Bytes to frames and back: lines, nesting, fragments, text and JSON.
 //!
-//! **Invariant:** bytes are cut and checked here; `op` has their meaning.
+//! **Invariant:** bytes are split and checked here. `op` interprets them.
 
 pub mod fragments;
 pub mod frame;

@@ -1,16 +1,16 @@
-//! The first bytes of a connection: are they JSON to be read here, or another protocol?
+//! The first bytes of a connection, which show whether it sends JSON or another protocol.
 //!
-//! **Invariant:** what opens like HTTP, TLS or BSON is never read as JSON: a web page could otherwise drive the arm by
-//! posting at the port.
+//! **Invariant:** a connection that starts like HTTP, TLS or BSON is never read as JSON. Otherwise a web page could
+//! drive the arm by an HTTP POST.
 
-/// The verdict on a connection by its first bytes.
+/// The protocol of a connection, by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Opening {
-    /// Could still become anything: wait for more bytes (at most eight are ever needed).
+    /// Undecided: wait for more bytes (at most eight are needed).
     Undecided,
-    /// Ours to read.
+    /// JSON, to be read here.
     Json,
-    /// Another protocol: answer one line, close, parse nothing.
+    /// Another protocol: send one line, close, and parse nothing.
     Foreign(Foreign),
 }
 
@@ -26,7 +26,7 @@ pub enum Foreign {
 }
 
 impl Foreign {
-    /// One line for the status: the protocol that was recognised, and those of this port.
+    /// One line for the status: the recognised protocol, and those of this port.
     #[must_use]
     pub const fn explanation(self) -> &'static str {
         match self {
@@ -43,7 +43,7 @@ impl Foreign {
     }
 }
 
-/// How HTTP requests open.
+/// The first bytes of HTTP requests.
 const METHODS: [&[u8]; 10] = [
     b"GET ",
     b"HEAD ",
@@ -56,14 +56,14 @@ const METHODS: [&[u8]; 10] = [
     b"PATCH ",
     b"PRI ",
 ];
-/// How a TLS record with a hello opens.
+/// The first bytes of a TLS record with a hello.
 const TLS_HELLO: &[u8] = &[0x16, 0x03];
-/// A BSON document opens with its length in four bytes, little-endian: below 16 MiB one of them is 0.
+/// A BSON document begins with its length in four bytes, little-endian. Below 16 MiB one of them is 0.
 const BSON_LENGTH: usize = 4;
 
-/// Judges a connection by all the bytes that it has sent so far.
+/// Determines the protocol from all bytes sent so far.
 ///
-/// At the end of the stream an undecided opening counts as JSON.
+/// At the end of the stream an undecided start counts as JSON.
 #[must_use]
 pub fn opening(first: &[u8]) -> Opening {
     if first.starts_with(TLS_HELLO) {
@@ -84,18 +84,17 @@ pub fn opening(first: &[u8]) -> Opening {
     }
 }
 
-/// Whether a malformed line is one that every request of a browser has in its head: `start` is how the line begins.
+/// Whether a malformed line is a header that every browser sends. `start` is the beginning of the line.
 ///
-/// A page may choose the method of a request to its own server, and a hostile name server can make a browser take us
-/// for that. The opening is then none of `METHODS`, but the head still comes before the body, and has a line that names
-/// the host.
+/// A page may choose the method of a request to its own server, and a hostile name server can direct this request here.
+/// The method may then be outside `METHODS`, but the head still precedes the body and has a `Host` line.
 #[must_use]
 pub fn is_host_line(start: &str) -> bool {
     let name = start.split(':').next().unwrap_or_default();
     name.len() < start.len() && name.eq_ignore_ascii_case("host")
 }
 
-/// Whether a line with text in it is complete: such a line is answered, not kept waiting for a fourth byte.
+/// Whether a line with text is complete. Such a line is answered without waiting for a fourth byte.
 fn holds_a_line(bytes: &[u8]) -> bool {
     bytes.trim_ascii_start().contains(&b'\n')
 }

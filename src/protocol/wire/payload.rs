@@ -1,6 +1,6 @@
-//! A client's JSON that is passed on or echoed: ids, messages, arguments, answers.
+//! A client's JSON that is forwarded or echoed: ids, messages, arguments, answers.
 //!
-//! **Invariant:** it is read once, when it comes. Its text is one line of valid JSON, ready to be copied.
+//! **Invariant:** it is parsed once, on arrival. Its text is one line of valid JSON, ready to be copied.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -17,24 +17,24 @@ pub struct Payload(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     raw: Box<RawValue>,
-    /// The text as it is written, if it differs from what came.
+    /// The output text, if it differs from the input.
     line: Option<Box<RawValue>>,
 }
 
 impl Payload {
-    /// The value as it came: numbers that overflow are still there, so that a reader can refuse them by name.
+    /// The input value. Numbers that overflow are unchanged, so a reader can reject them by name.
     #[must_use]
     pub fn raw(&self) -> &RawValue {
         &self.0.raw
     }
 
-    /// The text as it came.
+    /// The input text.
     #[must_use]
     pub fn get(&self) -> &str {
         self.0.raw.get()
     }
 
-    /// Bytes that it takes, shared or not: its text, the line if that is another text, and what keeps them.
+    /// Bytes of memory, shared or not: its text, the output text if it differs, and their overhead.
     #[must_use]
     pub fn allocated(&self) -> usize {
         let counts = 2 * size_of::<usize>();
@@ -42,7 +42,7 @@ impl Payload {
         counts + size_of::<Inner>() + self.get().len() + line
     }
 
-    /// The text as it is written: [strict](json::strict), on one line.
+    /// The output text: [strict](json::strict), on one line.
     #[must_use]
     pub fn line(&self) -> &str {
         self.written().get()
@@ -56,8 +56,8 @@ impl Payload {
 impl From<Box<RawValue>> for Payload {
     fn from(raw: Box<RawValue>) -> Self {
         let strict = json::strict(raw.get());
-        // Valid JSON has line ends between tokens only. Some readers take a carriage return for one: then what another
-        // client has put between two of them would be a frame to them.
+        // Valid JSON has line ends only between tokens. Some readers treat a carriage return as a line end, and would
+        // read the text between two of them as a frame.
         let line = match strict {
             text if text.contains('\r') || text.contains('\n') => {
                 Some(text.replace(['\r', '\n'], " "))
@@ -76,7 +76,7 @@ impl From<&RawValue> for Payload {
     }
 }
 
-/// As it is written.
+/// The output text.
 impl Serialize for Payload {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.written().serialize(serializer)

@@ -1,46 +1,44 @@
-//! Messages that can go out as they have come in: a series of `publish` frames on one topic, line behind line, each
-//! spelled as the runtime itself would spell it.
+//! Messages that can be forwarded unchanged: a series of `publish` frames on one topic, one per line, each spelled
+//! as the runtime would write it.
 //!
-//! Most programs write their JSON that way, and a flood of messages is all of this kind. Such a line is checked in
-//! one pass and passed on as it is; nothing of it is taken apart and put together again.
+//! Most programs write their JSON in this form. Such a line is checked in one pass and forwarded unchanged,
+//! without parsing and encoding.
 //!
-//! **Invariant:** a series is passed on as the general reader and writer would have done it, byte for byte. A
-//! doubtful message is left to those.
+//! **Invariant:** a series is forwarded byte for byte as the general reader and writer would do it. All other
+//! messages are left to these.
 
 use bytes::Bytes;
 
 use crate::protocol::catalog::Topic;
 use crate::protocol::limits::MAX_NAME;
 
-/// Bytes of a series: enough to make little of what a series costs besides its bytes, few enough to be fair to other
-/// clients.
+/// Most bytes of a series: enough that the cost per series is small, few enough to be fair to other clients.
 pub const MAX_SERIES: usize = 64 * 1024;
 
-/// How a message begins that is one of a series.
+/// The start of a message in a series.
 const HEAD: &[u8] = b"{\"op\":\"publish\",\"topic\":\"";
-/// The text between topic and message, the latter's brace included.
+/// The text between topic and message, including the message's brace.
 const MIDDLE: &[u8] = b"\",\"msg\":{";
-/// The text behind the message's closing brace.
+/// The text after the message's closing brace.
 const END: &[u8] = b"}\n";
 /// Longest number whose value is certainly finite: the largest `f64` has 309 digits.
 const MAX_DIGITS: usize = 308;
-/// Levels that are kept in one word, the message itself included. A deeper message goes the general
-/// way.
+/// Levels that fit into one word, including the message itself. The general reader handles deeper messages.
 const MAX_LEVELS: u32 = 60;
 
-/// Messages of a client on a topic of clients, one behind the other.
+/// Consecutive messages of a client on a topic of clients.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Series {
-    /// The topic, as it is spelled in the frames: with a slash in front.
+    /// The topic as spelled in the frames, with a leading slash.
     pub topic: Box<str>,
     /// The frames, each with its newline.
     pub frames: Bytes,
 }
 
-/// The series that `bytes` begin with: its topic, and how long it is. `None` where they do not begin with a whole
-/// message of one.
+/// The series at the start of `bytes`: its topic and its length. `None` if they do not begin with a whole message
+/// of a series.
 pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
-    // A longer line is no series: no more is looked at to find that out.
+    // A longer line is not a series, so no more bytes are read to check it.
     let bytes = bytes.get(..MAX_SERIES).unwrap_or(bytes);
     let name = bytes.strip_prefix(HEAD)?;
     let end = name
@@ -64,15 +62,15 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
     (length > 0).then_some((topic, length))
 }
 
-/// How long the first message of frames for one client is: one line of a series, all of anything else (fragments,
-/// binary, or more bytes than a series has). A message of megabytes takes no longer.
+/// The length of the first message of frames for one client: one line of a series, or all of anything else
+/// (fragments, binary, or more bytes than a series has). The time does not depend on the length of the message.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
     first_messages(frames, 0).0
 }
 
-/// How long, and how many, the first messages of frames for one client are that have so many bytes together: one at
-/// least, and at most all of them.
+/// The length and number of the first messages of frames for one client that have at least `bytes` bytes together:
+/// at least one, at most all.
 #[must_use]
 pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
@@ -85,8 +83,8 @@ pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     (end, lines(before) + 1)
 }
 
-/// How many lines end in `bytes`. They are counted in chunks whose count fits into a byte, of which the compiler makes
-/// much faster code.
+/// The number of line ends in `bytes`. They are counted in chunks whose count fits into a byte, which compiles to much
+/// faster code.
 fn lines(bytes: &[u8]) -> usize {
     let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
     let parts = bytes.chunks(u8::MAX.into());
@@ -98,7 +96,7 @@ fn lines(bytes: &[u8]) -> usize {
 pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
     let mut start = frames.len();
     for _ in 0..count {
-        // A message ends with a newline, its own.
+        // A message ends with its newline.
         let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
         start = before
             .iter()
@@ -111,14 +109,15 @@ pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
     frames.split_off(start)
 }
 
-/// Each message of `frames` by itself.
+/// Each message of `frames`.
 pub fn messages(mut frames: Bytes) -> impl Iterator<Item = Bytes> {
     std::iter::from_fn(move || {
         (!frames.is_empty()).then(|| frames.split_to(first_message(&frames)))
     })
 }
 
-/// The length of the frame that `bytes` begin with, its newline included, if it has that head and is fit for a series.
+/// The length of the frame at the start of `bytes`, including its newline, if it has that head and is suitable for a
+/// series.
 fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
     if !bytes.starts_with(head) {
         return None;
@@ -127,11 +126,10 @@ fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
     bytes.get(end..)?.starts_with(END).then(|| end + END.len())
 }
 
-/// Where the JSON object ends whose brace is right before `at`. `None` where it is not valid or not complete, and
-/// where it needs a closer look: an escape, a byte beyond ASCII, an exponent, a number or a nesting of unusual
-/// length.
+/// The end of the JSON object whose brace is right before `at`. `None` if it is not valid or not complete, or if it
+/// needs the general reader: an escape, a byte beyond ASCII, an exponent, a very long number or very deep nesting.
 fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
-    // One bit per open level, 1 for a bracket; the leading 1 marks how many there are.
+    // One bit per open level, 1 for a bracket. The leading 1 marks their number.
     let mut levels: u64 = 0b10;
     let mut fresh = true;
     loop {
@@ -162,7 +160,7 @@ fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
             };
             fresh = false;
         }
-        // Behind a value, or where an empty object or array ends.
+        // After a value, or at the end of an empty object or array.
         loop {
             if !fresh {
                 at = past_space(bytes, at);
@@ -185,7 +183,7 @@ fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
     }
 }
 
-/// Goes past a key, its colon and the spaces around the colon.
+/// Skips a key, its colon and the spaces around the colon.
 fn key(bytes: &[u8], at: usize) -> Option<usize> {
     if *bytes.get(at)? != b'"' {
         return None;
@@ -201,7 +199,7 @@ fn past_space(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// Goes past `true`, `false` or `null`.
+/// Skips `true`, `false` or `null`.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     let rest = bytes.get(at..)?;
     let words: [&[u8]; 3] = [b"true", b"false", b"null"];
@@ -209,7 +207,7 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     Some(at + word.len())
 }
 
-/// Goes past a number. It stops before an exponent, with which nothing begins that may follow a value.
+/// Skips a number. It stops before an exponent, which then fails the check of the next token.
 fn number(bytes: &[u8], start: usize) -> Option<usize> {
     let mut at = start;
     if *bytes.get(at)? == b'-' {
@@ -236,7 +234,7 @@ const fn all(byte: u8) -> u64 {
     u64::from_le_bytes([byte; 8])
 }
 
-/// Eight bytes from `at` on, the first one lowest; zeros behind the end.
+/// Eight bytes from `at` on, the first one lowest; zeros after the end.
 fn eight(bytes: &[u8], at: usize) -> u64 {
     let rest = bytes.get(at..).unwrap_or_default();
     if let Some(eight) = rest.first_chunk::<8>() {
@@ -247,17 +245,17 @@ fn eight(bytes: &[u8], at: usize) -> u64 {
         .fold(0, |word, byte| (word << 8) | u64::from(*byte))
 }
 
-/// How many of eight bytes come before the first one that is marked by its top bit; 8 if none is.
+/// The number of bytes before the first one whose top bit is set; 8 if there is none.
 const fn before_mark(marks: u64) -> usize {
     ((marks & all(0x80)).trailing_zeros() / 8) as usize
 }
 
-/// Goes past the digits at `at`, eight at a time.
+/// Skips the digits at `at`, eight at a time.
 fn past_digits(bytes: &[u8], mut at: usize) -> usize {
     loop {
         let values = eight(bytes, at) ^ all(b'0');
-        // A value of 10 or more reaches the top bit. A carry may mark bytes behind the first that is no digit, never
-        // one before it.
+        // A value of 10 or more sets the top bit. A carry may mark bytes after the first non-digit, never one before
+        // it.
         let digits = before_mark(values.wrapping_add(all(0x80 - 10)) | values);
         at += digits;
         if digits < 8 {
@@ -266,11 +264,11 @@ fn past_digits(bytes: &[u8], mut at: usize) -> usize {
     }
 }
 
-/// Goes past the end of a string of plain ASCII whose inside begins at `at`.
+/// Skips the rest of a string of plain ASCII, from `at` inside it.
 fn string(bytes: &[u8], mut at: usize) -> Option<usize> {
     loop {
         let text = eight(bytes, at);
-        // The lowest mark is right; higher ones may come from a borrow.
+        // The lowest mark is correct. Higher ones may come from a borrow.
         let equal = |byte: u8| (text ^ all(byte)).wrapping_sub(all(1)) & !(text ^ all(byte));
         let control = text.wrapping_sub(all(b' ')) & !text;
         let plain = before_mark(equal(b'"') | equal(b'\\') | control | text);

@@ -1,6 +1,6 @@
-//! A `service_response` that is written bit by bit: for answers of many megabytes, whose encoder must be able to pause.
+//! A `service_response` that is written in parts, for answers of many megabytes whose encoder must be able to pause.
 //!
-//! **Invariant:** what has been written is always the beginning of a valid frame, if the caller's parts are JSON.
+//! **Invariant:** the written text is always the beginning of a valid frame, if the caller's parts are JSON.
 
 use bytes::Bytes;
 
@@ -27,14 +27,14 @@ impl StreamedResponse {
         response
     }
 
-    /// Writes JSON, or a part of it, as it is.
+    /// Writes JSON, or a part of it, unchanged.
     pub fn raw(&mut self, json: &str) {
         self.text.extend_from_slice(json.as_bytes());
     }
 
     /// Writes a number; `null` if it is not finite.
     pub fn number(&mut self, value: f64) {
-        // Writing into memory can't fail, and every f64 has a JSON form.
+        // Writing into memory cannot fail, and every f64 has a JSON form.
         let _ = serde_json::to_writer(&mut self.text, &value);
     }
 

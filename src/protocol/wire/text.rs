@@ -1,6 +1,6 @@
-//! Client text in our own messages and in the log: shortened, and with control characters escaped.
+//! Clients' text in messages of the runtime and in the log: shortened, with control characters escaped.
 //!
-//! **Invariant:** nothing that a client sent is echoed in a message of ours at a length of its own choosing.
+//! **Invariant:** clients' text in a message of the runtime has a bounded length.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use serde_json::value::RawValue;
 
 use super::json;
 
-/// Characters of client text that a message of ours repeats: enough to recognise it by, one line on a terminal.
+/// Most characters of clients' text in a message: enough to recognise it, and one line on a terminal.
 pub(crate) const EXCERPT: usize = 48;
 
 /// At most [`EXCERPT`] characters of `text`, control characters escaped, an ellipsis where something was cut.
@@ -29,8 +29,8 @@ pub(crate) fn shortened(text: &str, limit: usize) -> String {
     short
 }
 
-/// Whether a character does something on a terminal other than to show itself: control characters, and those that end a
-/// line or turn the direction of writing. Each has at most four hexadecimal digits.
+/// Whether a character controls a terminal: control characters, and characters that end a line or change the direction
+/// of writing. Each has at most four hexadecimal digits.
 pub(crate) fn acts(character: char) -> bool {
     let turns = matches!(
         character,
@@ -49,7 +49,7 @@ pub(crate) fn push_plain(text: &mut String, character: char) {
     }
 }
 
-/// The same within the quotation marks of JSON, which YAML reads too.
+/// The same inside a JSON string, which YAML reads too.
 #[cfg(feature = "cli")]
 pub(crate) fn push_quoted(text: &mut String, character: char) {
     match character {
@@ -62,12 +62,12 @@ pub(crate) fn push_quoted(text: &mut String, character: char) {
     }
 }
 
-/// Names a JSON value at the end of a sentence: by the value itself if it is short, else by its kind.
+/// Describes a JSON value at the end of a sentence: the value itself if it is short, else its kind.
 pub(crate) fn found(raw: &RawValue) -> String {
     match raw.get() {
         object if object.starts_with('{') => "an object".to_owned(),
         array if array.starts_with('[') => "an array".to_owned(),
-        // The reader has put these in the place of names that JSON does not have.
+        // The reader has replaced `NaN` and `Infinity` by these.
         json::NAN => "NaN".to_owned(),
         json::INFINITY => "Infinity".to_owned(),
         negative if negative.strip_prefix('-') == Some(json::INFINITY) => "-Infinity".to_owned(),

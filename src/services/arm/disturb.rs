@@ -1,6 +1,6 @@
-//! `/arm_sim/disturb`: a push.
+//! `/arm_sim/disturb`: a disturbance.
 //!
-//! **Invariant:** a push that is refused leaves the arm as it was.
+//! **Invariant:** a refused disturbance does not change the arm.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -9,12 +9,12 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::field_by_field::FieldByField;
 use crate::services::{Address, Answered, Ask};
 
-/// Why nothing moves any more.
+/// The reason for a refusal after a divergence.
 pub(crate) const DIVERGED: &str =
     "is refused: the simulation has diverged; /arm_sim/reset clears this";
 
-/// Adds an effort to that of every step for a while, from the next one on. Refused if something was rejected, or the
-/// simulation has diverged.
+/// Adds an effort to that of every step for some time, from the next one on. Refused if a field was rejected, or if
+/// the simulation has diverged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Disturb<const N: usize> {
     /// \[N m\].

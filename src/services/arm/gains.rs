@@ -1,6 +1,6 @@
 //! `/pid_controller/set_gains`: the controller's gains.
 //!
-//! **Invariant:** gains that are not given stay as they are.
+//! **Invariant:** gains that are not given do not change.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub struct SetGains<const N: usize> {
 }
 
 impl<const N: usize> SetGains<N> {
-    /// The gains that `gains` become.
+    /// `gains` with these changes.
     #[must_use]
     pub fn applied_to(&self, gains: &Gains<N>) -> Gains<N> {
         Gains {

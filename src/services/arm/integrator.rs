@@ -1,6 +1,6 @@
 //! `/arm_sim/set_integrator`: method and timestep of the live arm.
 //!
-//! **Invariant:** setting what is in force already leaves the arm exactly as it was, down to the fraction of a step.
+//! **Invariant:** setting the present values does not change the arm, not even the fraction of a step.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -21,7 +21,7 @@ pub struct SetIntegrator {
     pub rejected: Rejections,
 }
 
-/// Method and timestep in force.
+/// The present method and timestep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Integrator {
     /// The method that takes the steps.

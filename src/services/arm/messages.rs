@@ -20,10 +20,10 @@ pub fn joint_names<const N: usize>() -> [&'static str; N] {
 /// Reads a setpoint.
 ///
 /// # Errors
-/// If the message holds none for this arm.
+/// If the message has no valid setpoint for this arm.
 pub fn read_setpoint<const N: usize>(heard: &NodeMessage) -> Result<Setpoint<N>, TrajectoryError> {
     let request = heard.setpoint(&joint_names::<N>())?;
-    // The reader has checked how many they are.
+    // The reader has checked their number.
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     Ok(Setpoint {
         position: array(&request.position),
@@ -31,10 +31,10 @@ pub fn read_setpoint<const N: usize>(heard: &NodeMessage) -> Result<Setpoint<N>,
     })
 }
 
-/// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`: its layout says nothing that counts.
+/// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`. Its layout is ignored.
 ///
 /// # Errors
-/// If the message does not hold one for each joint.
+/// If the message does not have one for each joint.
 pub fn read_effort<const N: usize>(heard: &NodeMessage) -> Result<[f64; N], Rejections> {
     let args = Arguments::Object(heard.msg.clone());
     let mut fields = Fields::of_message(&args, Topic::EffortCommands)?;

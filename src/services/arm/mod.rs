@@ -1,9 +1,9 @@
-//! The questions to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints and efforts.
+//! The requests to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints and efforts.
 //!
-//! A request carries what was given and valid, field by field, and what was rejected, by name. Valid fields take
-//! effect, and the answer echoes the values as they now are.
+//! A request has the valid fields, and the rejected ones by name. Valid fields take effect, and the answer
+//! echoes the present values.
 //!
-//! **Invariant:** a bad field never keeps a good one from the arm, which hears of both.
+//! **Invariant:** an invalid field never prevents a valid one from taking effect.
 
 mod disturb;
 mod gains;

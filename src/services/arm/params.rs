@@ -24,10 +24,10 @@ pub struct SetParams<const N: usize> {
 }
 
 impl<const N: usize> SetParams<N> {
-    /// The arm that `arm` becomes.
+    /// `arm` with these changes.
     ///
     /// # Errors
-    /// If there can't be such an arm.
+    /// If such an arm is not valid.
     pub fn applied_to(&self, arm: &Arm<N>) -> Result<Arm<N>, ArmError> {
         Arm::new(
             self.lengths.unwrap_or(*arm.lengths()),

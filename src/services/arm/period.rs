@@ -1,6 +1,6 @@
-//! `/pid_controller/set_period`: how often the control law runs.
+//! `/pid_controller/set_period`: the control period.
 //!
-//! **Invariant:** setting what is in force already leaves the arm exactly as it was, down to the step of its period.
+//! **Invariant:** setting the present values does not change the arm, not even the step in its period.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -15,18 +15,18 @@ use crate::services::{Address, Answered, Ask};
 pub struct SetPeriod {
     /// That time \[s\], not negative; 0 for every step.
     pub period: Option<f64>,
-    /// Whether an effort is applied one period after the state that it is about.
+    /// Whether an effort is applied one period after its state was read.
     pub delay: Option<bool>,
     /// Fields that were not valid.
     pub rejected: Rejections,
 }
 
-/// The control period in force.
+/// The present control period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodInForce {
-    /// Time as asked for, and the delay.
+    /// The requested time, and the delay.
     pub period: ControlPeriod,
-    /// A whole number of timesteps \[s\].
+    /// The effective period, a whole number of timesteps \[s\].
     pub effective: f64,
 }
 

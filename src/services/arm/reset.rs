@@ -1,6 +1,6 @@
-//! `/arm_sim/reset`: back to the starting pose at time 0.
+//! `/arm_sim/reset`: returns to the starting pose at time 0.
 //!
-//! **Invariant:** a goal that ends by it is announced before the answer.
+//! **Invariant:** the result of a goal that it ends is published before the answer.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use crate::protocol::op::fields::{Fields, Rejections};
 use crate::services::field_by_field::{Echo, FieldByField};
 use crate::services::{Address, Answered, Ask};
 
-/// Puts the arm back to its starting pose at time 0, unless something was rejected.
+/// Returns the arm to its starting pose at time 0, unless the request was rejected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reset<const N: usize> {
     /// A reset has no fields: the request is rejected as a whole.
@@ -39,7 +39,7 @@ impl<const N: usize> Answered for Reset<N> {
     }
 }
 
-/// Writes the state in which the arm is now.
+/// Writes the present state of the arm.
 pub(super) fn write_state<const N: usize>(echo: &Echo<State<N>>, to: &Address) -> Bytes {
     #[derive(Serialize)]
     struct Values<'a> {

@@ -1,6 +1,6 @@
 //! `/arm_sim/set_state`: puts the arm into another state.
 //!
-//! **Invariant:** clock, setpoint, integral, gains and an active goal stay as they are.
+//! **Invariant:** clock, setpoint, integral, gains and an active goal do not change.
 
 use bytes::Bytes;
 

@@ -1,10 +1,10 @@
 //! `/arm_sim/step`: single steps of a paused arm.
 //!
-//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and requests for more take turns. It is as if each had asked for
-//! single steps, one after the other, so other requests take effect in between.
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and requests for more take turns. The effect is that of separate
+//! requests, so other requests take effect in between.
 //!
-//! **Invariant:** a request that is refused at first changes nothing. One that is accepted is done as a whole, unless a
-//! divergence, a resume or the end of the runtime comes in between.
+//! **Invariant:** a refused request changes nothing. An accepted one is completed, unless the arm diverges, is resumed,
+//! or the runtime ends.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -15,27 +15,27 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::field_by_field::FieldByField;
 use crate::services::{Address, Answered, Ask};
 
-/// Steps in one request: the budget of one wake-up, and ten seconds of the default timestep.
+/// Most steps in one request: the budget of one wake-up, and ten seconds at the default timestep.
 pub const MAX_STEPS: u64 = 10_000;
 
-/// Steps in a row: some 0.2 ms of work, so that neither the tick nor anybody's call waits for the steps of others.
+/// Steps per turn: about 0.2 ms of work, so neither the tick nor another client's call waits long.
 pub const STEPS_IN_A_ROW: u64 = 1000;
 
-/// Takes steps while paused. Refused if something was rejected, or the arm can't be stepped.
+/// Takes steps while paused. Refused if a field was rejected, or if the arm cannot be stepped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step<const N: usize> {
-    /// How many, 1 to [`MAX_STEPS`].
+    /// The number of steps, 1 to [`MAX_STEPS`].
     pub steps: Option<u64>,
-    /// The effort that is applied in them \[N m\], while the controller is paused; none for the controller's.
+    /// The effort in these steps \[N m\], in place of the controller's; `None` for the controller's.
     pub effort: Option<[f64; N]>,
     /// Fields that were not valid.
     pub rejected: Rejections,
 }
 
-/// Steps that were taken.
+/// The taken steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepped<const N: usize> {
-    /// How many.
+    /// The number of steps.
     pub steps: u64,
     /// Simulation time after them \[s\].
     pub time: f64,
@@ -43,14 +43,14 @@ pub struct Stepped<const N: usize> {
     pub state: State<N>,
     /// Effort of the last step \[N m\].
     pub effort: [f64; N],
-    /// Why there were no more.
+    /// Why they ended.
     pub end: StepsEnd,
 }
 
-/// The end of the steps of a request.
+/// Why the steps of a request ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepsEnd {
-    /// There are no more.
+    /// All steps were taken.
     AllTaken,
     /// The simulation has diverged.
     Diverged,

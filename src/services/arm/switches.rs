@@ -1,6 +1,7 @@
 //! Services with one field, `data`: `/arm_sim/pause` and `/pid_controller/enable`.
 //!
-//! **Invariant:** a switch that is in that position already changes nothing, but that a commanded effort ends.
+//! **Invariant:** setting a switch to its present position changes nothing, except that a commanded effort
+//! ends.
 
 use bytes::Bytes;
 use serde::Serialize;

@@ -1,6 +1,6 @@
-//! `/study/gains` and `/study/plan`: advice that has been tried, and changes nothing.
+//! `/study/gains` and `/study/plan`: simulated suggestions, which change nothing.
 //!
-//! **Invariant:** every answer has been run, and the arm hears of none.
+//! **Invariant:** every returned answer was simulated, and the live arm does not change.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -25,18 +25,18 @@ use crate::study::planner::{self, Candidate, PlanError, Planned, Task, plan};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
-/// Looks for gains by which every move settles in time, with a margin of stability.
+/// Searches gains with which every move settles in time, with a stability margin.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SuggestGains<const N: usize> {
-    /// Time in which every move is to settle \[s\], greater than 0.
+    /// Time in which every move must settle \[s\], greater than 0.
     pub settling_time: Option<f64>,
-    /// How many timesteps the smallest timestep limit over all poses is to be, at least 1.
+    /// The required ratio of the smallest timestep limit over all poses to the timestep, at least 1.
     pub margin: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub timestep: Option<f64>,
     /// The method that takes the steps.
     pub method: Option<Method>,
-    /// Parameters of the arm that are to be others.
+    /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
 }
 
@@ -44,19 +44,19 @@ impl<const N: usize> Ask for SuggestGains<N> {
     type Answer = Result<Suggested<N>, NotSuggested>;
 }
 
-/// Gains that have been tried.
+/// Simulated gains.
 #[derive(Debug, Clone, Copy)]
 pub struct Suggested<const N: usize> {
-    /// The gains, and how they fared.
+    /// The gains and their results.
     pub found: SuggestedGains<N>,
-    /// The timestep that the gains are for \[s\].
+    /// The timestep for these gains \[s\].
     pub timestep: f64,
 }
 
 /// Why no gains are suggested.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotSuggested {
-    /// There can't be such an arm.
+    /// The arm is not valid.
     #[error("params {0}")]
     Params(#[from] ArmError),
     /// There are no such gains.
@@ -64,26 +64,26 @@ pub enum NotSuggested {
     Gains(#[from] GainsError),
 }
 
-/// Looks for the cheapest method and timestep that keep a run within an error.
+/// Searches the cheapest method and timestep that keep a run within an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanRun<const N: usize> {
-    /// The error of the end effector that may be made \[m\], greater than 0.
+    /// The allowed error of the end effector \[m\], greater than 0.
     pub error: f64,
-    /// How long the run is \[s\], greater than 0.
+    /// The duration of the run \[s\], greater than 0.
     pub duration: Option<f64>,
-    /// Whether the gains that are set control the arm where the question has none.
+    /// Whether the present gains control the arm if the request has none.
     pub servo: bool,
     /// Initial positions \[rad\].
     pub q0: Option<[f64; N]>,
     /// Initial velocities \[rad/s\].
     pub qdot0: Option<[f64; N]>,
-    /// Parameters of the arm that are to be others.
+    /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
-    /// Gains that are to be others.
+    /// Changed gains.
     pub gains: Option<SetGains<N>>,
     /// The setpoint \[rad\], at rest.
     pub setpoint: Option<[f64; N]>,
-    /// The time between two runs of the control law \[s\]; none, or 0, to have it planned.
+    /// The control period \[s\]; `None` or 0 to plan it.
     pub control_period: Option<f64>,
 }
 
@@ -91,27 +91,27 @@ impl<const N: usize> Ask for PlanRun<N> {
     type Answer = Result<PlannedRun, NotPlanned>;
 }
 
-/// A plan that has been tried.
+/// A simulated plan.
 #[derive(Debug, Clone)]
 pub struct PlannedRun {
     /// The cheapest run that was found.
     pub best: Candidate,
-    /// All runs that were tried and good enough.
+    /// All simulated runs within the error.
     pub planned: Planned,
-    /// The control period \[s\], where a controller holds the arm: the timestep, unless another was asked for.
+    /// The control period \[s\], if a controller holds the arm: the timestep, unless another was requested.
     pub control_period: Option<f64>,
 }
 
 /// Why there is no plan.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotPlanned {
-    /// There can't be such an arm.
+    /// The arm is not valid.
     #[error("params {0}")]
     Params(#[from] ArmError),
-    /// There can't be such a plan.
+    /// The request is not valid.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Nothing was good enough.
+    /// No run is within the error.
     #[error("no plan was found")]
     Nothing,
 }
@@ -222,19 +222,19 @@ impl From<PlannedRun> for PlanValues {
 
 // ---- work -----------------------------------------------------------------------------------------------------------
 
-/// Time to settle in unless it is said \[s\]: the default gains promise it of the default arms.
+/// Default settling time \[s\]: the default gains meet it on the default arms.
 const DEFAULT_SETTLING: f64 = 4.0;
-/// Margin unless it is said: the timestep is then no longer than `/study/stability` advises.
+/// Default margin. The timestep is then at most the advice of `/study/stability`.
 const DEFAULT_MARGIN: f64 = 1.25;
-/// How long a plan is unless it is said \[s\].
+/// Default duration of a plan \[s\].
 const DEFAULT_DURATION: f64 = 10.0;
-/// How long a plan under control is \[s\]: a move has settled by then.
+/// Default duration of a plan under control \[s\]: a move has settled by then.
 const DEFAULT_MOVE: f64 = 4.0;
 
 // ---- gains ----------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> SuggestGains<N> {
-    /// The work that this asks for, of an arm that is `present` so.
+    /// The computation for this request and the `present` arm.
     #[must_use]
     pub fn work(self, present: Present<N>) -> StudyWork<Result<Suggested<N>, NotSuggested>> {
         let computation = Paused::new(async move {
@@ -250,7 +250,7 @@ impl<const N: usize> SuggestGains<N> {
     }
 }
 
-/// The loop and the demands on its gains, with the present settings where the question leaves something out.
+/// The loop and the demands on its gains, with the present settings for missing fields.
 fn demands<const N: usize>(
     ask: &SuggestGains<N>,
     present: &ControlLoop<N>,
@@ -276,7 +276,7 @@ fn demands<const N: usize>(
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> PlanRun<N> {
-    /// The work that this asks for, of an arm that is `present` so.
+    /// The computation for this request and the `present` arm.
     #[must_use]
     pub fn work(self, present: Present<N>) -> StudyWork<Result<PlannedRun, NotPlanned>> {
         let computation = Paused::new(async move {
@@ -298,14 +298,14 @@ impl<const N: usize> PlanRun<N> {
     }
 }
 
-/// The run that is to be planned, with the present settings and state where the question leaves something out.
+/// The run to be planned, with the present settings and state for missing fields.
 fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N>, ArmError> {
     let Present { control, state } = present;
     let arm = match &ask.params {
         None => control.arm,
         Some(params) => params.applied_to(&control.arm)?,
     };
-    // With the servo the gains are those that are set. Otherwise the arm is left to itself, as in a rollout.
+    // With `servo` the present gains apply. Otherwise the arm is free, as in a rollout.
     let missing = if ask.servo {
         control.gains
     } else {

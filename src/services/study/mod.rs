@@ -1,8 +1,8 @@
-//! `/study/*`: predictions and offline runs of the arm, apart from the live arm.
+//! `/study/*`: predictions and offline runs, without effect on the live arm.
 //!
-//! A value that a request leaves out is the arm's as it is when the computation begins; the arm is left as it is.
+//! A missing value is the arm's at the start of the computation. The arm does not change.
 //!
-//! **Invariant:** a computation is done a piece at a time, and each piece is a fraction of a millisecond.
+//! **Invariant:** a computation is done in pieces, each of a fraction of a millisecond.
 
 mod advice;
 mod reading;
@@ -18,20 +18,20 @@ use crate::math::arm::State;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 
-/// The longest number and the comma behind it, and the number itself while the answer is computed.
+/// Bytes of the longest number with its comma, and of the number itself while the answer is computed.
 pub(crate) const NUMBER_BYTES: usize = 25 + 8;
 
-/// The work that a call asks for, done a piece at a time.
+/// The computation of a call, done in pieces.
 pub trait Work<T>: Send {
-    /// The most bytes that the answer and its computation can take together; it is asked before the work begins.
+    /// The most bytes of the answer and its computation together. It is called before the computation begins.
     fn most_bytes(&self) -> usize;
 
-    /// Does a piece, which is a fraction of a slice. Returns the answer after the last one. `clock` tells what work
-    /// costs: only differences mean something.
+    /// Computes one piece, a fraction of a slice. Returns the answer after the last one. `clock` measures the run
+    /// time; only differences count.
     fn advance(&mut self, clock: fn() -> Duration) -> Option<T>;
 }
 
-/// A computation of the study, which needs no clock.
+/// A computation that needs no clock.
 pub struct StudyWork<T> {
     most_bytes: usize,
     computation: Paused<T>,
@@ -47,10 +47,10 @@ impl<T> Work<T> for StudyWork<T> {
     }
 }
 
-/// The arm's settings at one instant.
+/// The arm's settings at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Present<const N: usize> {
-    /// The loop, with the gains as they are set, whether the controller is on or off.
+    /// The loop with the present gains, even if the controller is off.
     pub control: ControlLoop<N>,
     /// The arm's positions and velocities.
     pub state: State<N>,

@@ -1,11 +1,11 @@
-//! How questions to `study` are read: as a whole.
+//! Readers for requests to `study`, as a whole.
 //!
-//! **Invariant:** one bad field refuses the whole question, and each bad field is named.
+//! **Invariant:** one invalid field rejects the whole request, and each invalid field is named.
 
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Fields, Rejections};
 
-/// The question, unless a field of it was rejected.
+/// The request, unless a field was rejected.
 pub(super) fn taken<A>(ask: A, fields: Fields<'_>) -> Result<A, Rejections> {
     if fields.accepted() {
         Ok(ask)
@@ -14,7 +14,7 @@ pub(super) fn taken<A>(ask: A, fields: Fields<'_>) -> Result<A, Rejections> {
     }
 }
 
-/// The control period in force, with another length \[s\] where that is given.
+/// The present control period, with another length \[s\] if one is given.
 pub(super) fn with_period(present: ControlPeriod, period: Option<f64>) -> ControlPeriod {
     ControlPeriod {
         period: period.unwrap_or(present.period),

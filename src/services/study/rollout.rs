@@ -1,9 +1,9 @@
 //! `/study/rollout`: an offline run of the arm, sample by sample, with its cost and its error.
 //!
-//! The run is made once by itself, against a worker's clock. If a reference is asked for, it is made again beside the
-//! reference, which costs far more than the run. So `took` is the time of the run alone.
+//! The run is first made alone and timed with a worker's clock, so `took` is the time of the run alone. If a
+//! reference is requested, the run is repeated beside the reference, which costs far more.
 //!
-//! **Invariant:** the samples are the live arm's own steps, and a run in slices gives the same bits as one at once.
+//! **Invariant:** the samples are the live arm's own steps. A run in slices gives the same bits as one without.
 
 use std::time::Duration;
 
@@ -33,11 +33,11 @@ use crate::study::rollout::{
 /// Runs the arm offline.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunOffline<const N: usize> {
-    /// Initial positions \[rad\]; 0 unless said.
+    /// Initial positions \[rad\]; 0 by default.
     pub q0: Option<[f64; N]>,
-    /// Initial velocities \[rad/s\]; 0 unless said.
+    /// Initial velocities \[rad/s\]; 0 by default.
     pub qdot0: Option<[f64; N]>,
-    /// How long \[s\], greater than 0.
+    /// Duration \[s\], greater than 0.
     pub duration: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub timestep: Option<f64>,
@@ -45,13 +45,13 @@ pub struct RunOffline<const N: usize> {
     pub control_period: Option<f64>,
     /// The method that takes the steps.
     pub method: Option<Method>,
-    /// Parameters of the arm that are to be others.
+    /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
-    /// The gains; without them nothing controls the arm. A part that is left out is switched off.
+    /// The gains. Without them the arm is free. A missing member counts as 0.
     pub gains: Option<SetGains<N>>,
     /// The setpoint \[rad\], at rest.
     pub setpoint: Option<[f64; N]>,
-    /// How many samples.
+    /// The number of samples.
     pub samples: Option<u64>,
     /// Whether to run a reference too.
     pub reference: Option<bool>,
@@ -61,28 +61,28 @@ impl<const N: usize> Ask for RunOffline<N> {
     type Answer = Result<Box<Ran<N>>, NotRun>;
 }
 
-/// A run that has been made.
+/// A finished run.
 pub struct Ran<const N: usize> {
     /// The run.
     pub run: Rollout<N>,
-    /// The time of a worker that the run alone took.
+    /// The worker's time for the run alone.
     pub took: Duration,
 }
 
-/// Why nothing was run.
+/// Why there was no run.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotRun {
-    /// There can't be such an arm.
+    /// The arm is not valid.
     #[error("params {0}")]
     Params(#[from] ArmError),
-    /// There can't be such a run.
+    /// The run is not valid.
     #[error(transparent)]
     Rollout(#[from] RolloutError),
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-/// Samples encoded between two looks at the clock: some tens of microseconds.
+/// Samples encoded between two checks of the clock: some tens of microseconds.
 const SAMPLES_PER_LOOK: usize = 256;
 
 impl<const N: usize> Callable for RunOffline<N> {
@@ -213,26 +213,26 @@ fn row<const N: usize>(writer: &mut StreamedResponse, values: Option<&[f64; N]>)
 }
 // ---- work -----------------------------------------------------------------------------------------------------------
 
-/// How long a run is unless it is said \[s\].
+/// Default duration of a run \[s\].
 const DEFAULT_DURATION: f64 = 10.0;
-/// Samples of a run unless it is said, if there are as many steps: enough for a smooth curve.
+/// Default number of samples, if there are as many steps: enough for a smooth curve.
 const DEFAULT_SAMPLES: u64 = 1001;
-/// Numbers in a sample of the answer beside those of the joints, and as many again for brackets and commas.
+/// Numbers in a sample of the answer besides those of the joints, and the same for brackets and commas.
 const COLUMNS: usize = 5;
 
-/// A run on its way.
+/// A run in progress.
 pub struct RolloutWork<const N: usize> {
     most_bytes: usize,
-    /// The run by itself; none once it is made.
+    /// The run alone; `None` once it is finished.
     alone: Option<Paused<Result<Rollout<N>, NotRun>>>,
-    /// The time that it took so far.
+    /// Its time so far.
     took: Duration,
-    /// The same run beside a reference, if that is wanted.
+    /// The same run beside a reference, if one is requested.
     compared: Option<Paused<Result<Rollout<N>, NotRun>>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
-    /// The work that `ask` asks for, of an arm that is `present` so.
+    /// The computation for `ask` and the `present` arm.
     #[must_use]
     pub fn new(ask: &RunOffline<N>, present: Present<N>) -> Self {
         let samples = usize::try_from(ask.samples.unwrap_or(DEFAULT_SAMPLES));
@@ -280,7 +280,7 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
     }
 }
 
-/// The request for the run, with the present settings where the question leaves something out.
+/// The request for the run, with the present settings for missing fields.
 fn request<const N: usize>(
     ask: &RunOffline<N>,
     present: &Present<N>,
@@ -296,7 +296,7 @@ fn request<const N: usize>(
     Ok(RolloutRequest {
         control: ControlLoop {
             arm,
-            // A part of the law that is left out is switched off; without any the whole law is.
+            // A missing member of the gains counts as 0. Without gains there is no control.
             gains: gains.map_or(no_control(), |gains| gains.applied_to(&no_control())),
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),

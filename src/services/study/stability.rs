@@ -1,10 +1,9 @@
 //! `/study/stability`: the largest stable timesteps of a control loop.
 //!
-//! The present gains count, whether the controller is on or off. The question is its largest stable timestep.
-//! Gains that are all zero ask about the arm left to itself. The motion is the one that is ahead of the arm as it is
-//! now.
+//! The present gains count, even if the controller is off. Gains of zero examine the free arm. The motion is the
+//! coming motion of the present arm.
 //!
-//! **Invariant:** a limit is given only where something limits, and is 0 where no timestep is stable.
+//! **Invariant:** a limit is missing if nothing limits the timestep, and 0 if no timestep is stable.
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -33,9 +32,9 @@ use crate::study::stability::{Limits, most_bytes, search_limits};
 pub struct PredictStability<const N: usize> {
     /// The method that takes the steps.
     pub method: Option<Method>,
-    /// Gains that are to be others.
+    /// Changed gains.
     pub gains: Option<SetGains<N>>,
-    /// Parameters of the arm that are to be others.
+    /// Changed parameters of the arm.
     pub params: Option<SetParams<N>>,
     /// The setpoint \[rad\], at rest.
     pub setpoint: Option<[f64; N]>,
@@ -53,9 +52,9 @@ pub struct Predicted<const N: usize> {
     pub limits: Limits<N>,
     /// The limits of control period and timestep.
     pub clocks: ClockLimits,
-    /// The motion that is ahead of the arm as it is now, and its largest timestep.
+    /// The coming motion of the present arm, and its largest timestep.
     pub motion: Motion,
-    /// Whether the arm is left to itself.
+    /// Whether the arm is free.
     pub is_free: bool,
 }
 
@@ -150,7 +149,7 @@ impl StabilityValues {
 // ---- work -----------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> PredictStability<N> {
-    /// The work that this asks for, of an arm that is `present` so.
+    /// The computation for this request and the `present` arm.
     #[must_use]
     pub fn work(self, present: Present<N>) -> StudyWork<Result<Box<Predicted<N>>, ArmError>> {
         let computation = Paused::new(async move {
@@ -169,7 +168,7 @@ impl<const N: usize> PredictStability<N> {
     }
 }
 
-/// The loop that is asked about.
+/// The loop of the request.
 fn control_loop<const N: usize>(
     ask: &PredictStability<N>,
     present: &ControlLoop<N>,

@@ -84,18 +84,22 @@ fn server(says: &'static [u8], closes: bool) -> SocketAddr {
 fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
     for (says, closes, word) in [
         (&b""[..], true, "closed"),
-        (b"HTTP/1.1 400 Bad Request\r\n", false, "no frame came"),
+        (
+            b"HTTP/1.1 400 Bad Request\r\n",
+            false,
+            "cannot read a frame",
+        ),
         (b"{\"op\":", true, "within a frame"),
-        (b"[1, 2]\n", false, "no frame came"),
-        (b"", false, "nothing that was awaited came within 0.2 s"),
+        (b"[1, 2]\n", false, "cannot read a frame"),
+        (b"", false, "no answer or message within 0.2 s"),
         (
             b"{\"op\":\"service_response\",\"id\":7}\n",
             false,
-            "nothing that was awaited came",
+            "no answer or message within",
         ),
     ] {
         let address = server(says, closes).to_string();
-        let is_silent = word.starts_with("nothing");
+        let is_silent = word.starts_with("no answer");
         let patience = if is_silent {
             "0.2".to_owned()
         } else {

@@ -84,7 +84,7 @@ fn what_was_not_awaited_puts_no_timeout_off() {
             let arguments = [&command[..], &["--timeout", "0.3"]].concat();
             let (status, out, complaint) = end(start(&arguments, &server(drip(bytes))));
             assert_eq!((status, out.as_str()), (Some(3), ""), "{command:?}");
-            let expected = "pendularm: nothing that was awaited came within 0.3 s\n";
+            let expected = "pendularm: no answer or message within 0.3 s\n";
             assert_eq!(complaint, expected, "{command:?}");
         }
     }

@@ -12,11 +12,11 @@ const UNKNOWN_FIELDS: &str = r#"
 service call | /pid_controller/enable | {data:true} | "data:true" | {data: true}
 service call | /pid_controller/enable | data:true | "data:true" | {data: true}
 service call | /pid_controller/enable | {"data:true": null} | "data:true" | data
-service call | /pid_controller/enable | {enable: true} | "enable" | it has data
+service call | /pid_controller/enable | {enable: true} | "enable" | known fields: data
 service call | arm_sim/set_params | {gravty: 5} | "gravty" | gravity
 service call | /arm_sim/set_params | {"Gravity": 5} | "Gravity" | gravity
 service call | /arm_sim/set_params | {gravity:5} | "gravity:5" | {gravity: 5}
-service call | /arm_sim/reset | {now: 1} | "now" | it has none
+service call | /arm_sim/reset | {now: 1} | "now" | known fields: none
 service call | /ik_trial/start | {duration:5} | "duration:5" | {duration: 5}
 service call | /study/stability | {gains: {kP: [1, 1]}} | "gains.kP" | kp
 service call | /study/stability | [rk4, {kP: [1, 1]}] | "gains.kP" | kp

@@ -10,8 +10,9 @@ use proptest::prelude::*;
 #[test]
 fn arguments_that_do_not_exist_are_refused_by_name() {
     for argument in ["--speed", "-x", "--link"] {
-        let expected =
-            format!("unexpected argument '{argument}' found; --help shows what there is");
+        let expected = format!(
+            "unexpected argument '{argument}' found; --help lists all commands and options"
+        );
         assert_eq!(refusal(&[argument]), expected);
     }
     assert!(refusal(&["fly"]).starts_with("unrecognized subcommand 'fly'"));

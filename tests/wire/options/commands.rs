@@ -53,7 +53,7 @@ fn a_plan_is_asked_for_with_what_can_be_planned() {
         &["--setpoint=1,2", "--duration=2"],
     ] {
         let refused = refusal(&plan(free));
-        let expected = "--setpoint must be left out without --duration servo";
+        let expected = "--setpoint needs --duration servo";
         assert!(refused.starts_with(expected), "{refused}");
     }
     assert!(refusal(&["plan"]).contains("--error <METRES>"));

@@ -1,6 +1,6 @@
-//! Calls: which question each service asks, and its answer.
+//! Calls: the question of each service, and its answer.
 //!
-//! **Invariant:** a question is read and its answer written by the runtime's own functions.
+//! **Invariant:** the runtime's own functions read a question and write its answer.
 
 use pendularm::live::ArmRequest;
 use pendularm::math::kinematics::solve;
@@ -98,7 +98,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Reads a question, has it answered, and writes the answer behind all news of goals.
+    /// Reads a question, answers it, and writes the answer after all news of goals.
     fn answer<A: Answered>(
         &mut self,
         service: Service,
@@ -127,7 +127,7 @@ impl<const N: usize> Kernel<N> {
         });
     }
 
-    /// All steps in a row, with the news of the goal as they come.
+    /// Takes all steps, with the news of the goal in between.
     fn step(&mut self, ask: Step<N>) -> <Step<N> as pendularm::services::Ask>::Answer {
         let mut asked = self.arm.begin_steps(ask)?;
         loop {

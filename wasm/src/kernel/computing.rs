@@ -1,6 +1,6 @@
-//! Computations on their way: each is advanced a piece at a time, so that the arm goes on meanwhile.
+//! Running computations. Each is advanced in pieces, so the arm continues meanwhile.
 //!
-//! **Invariant:** a computation answers once.
+//! **Invariant:** a computation sends one answer.
 
 use std::marker::PhantomData;
 
@@ -10,13 +10,13 @@ use pendularm::services::{Address, Answered, ResponseWriter, Streamed};
 
 use super::Clock;
 
-/// Something heavy that ends with a response.
+/// A long computation that ends with a response.
 pub(super) trait Computation {
-    /// Does a piece. Returns the response after the last one.
+    /// Computes a piece. Returns the response after the last one.
     fn advance(&mut self, clock: Clock) -> Option<Bytes>;
 }
 
-/// Work whose answer is short.
+/// A computation with a short answer.
 pub(super) struct Short<A, W> {
     work: W,
     to: Address,
@@ -40,7 +40,7 @@ impl<A: Answered, W: Work<A::Answer>> Computation for Short<A, W> {
     }
 }
 
-/// Work whose answer may be long.
+/// A computation whose answer may be long.
 pub(super) struct Streaming<A: Streamed> {
     stage: Stage<A>,
     to: Address,

@@ -1,4 +1,4 @@
-//! Goals: one is active at most, as in the node `ik_action`.
+//! Goals: at most one is active, as in the node `ik_action`.
 //!
 //! **Invariant:** each goal has exactly one result. A preempting goal comes in this order: the old goal's result, the
 //! response, the trajectory, feedback, result.
@@ -18,11 +18,11 @@ use pendularm::services::goals::{
 use super::Kernel;
 use pendularm::live::World as _;
 
-/// The goal that is being pursued.
+/// The active goal.
 #[derive(Clone)]
 pub(super) struct ActiveGoal<const N: usize> {
     pub(super) goal: AcceptedGoal<N>,
-    /// Whether the trial has sent it.
+    /// Whether it is a goal of the trial.
     pub(super) of_trial: bool,
 }
 
@@ -40,7 +40,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// A status, before the answer, about what keeps the arm from moving.
+    /// Sends a status, before the answer, with the reason why the arm does not move.
     pub(super) fn warn(&self, to: &Address, obstacle: Obstacle) {
         self.tell(Level::Warning, &obstacle.to_string(), to.id());
     }
@@ -50,7 +50,7 @@ impl<const N: usize> Kernel<N> {
         active.map_or_else(String::new, |active| active.goal.id.clone())
     }
 
-    /// Solves a goal, ends the one before and puts it in its place; [`Kernel::set_in_motion`] is to follow.
+    /// Solves a goal and replaces the previous one. Call [`Kernel::set_in_motion`] next.
     pub(super) fn begin_goal(
         &mut self,
         goal: GoalRequest,
@@ -78,7 +78,7 @@ impl<const N: usize> Kernel<N> {
         Ok(tracking.obstacle)
     }
 
-    /// The active goal's setpoint goes out to the subscribers, and then to the arm.
+    /// Sends the active goal's setpoint to the subscribers, and then to the arm.
     pub(super) fn set_in_motion(&mut self) {
         if let Some(ActiveGoal { goal, .. }) = &self.goal {
             let (number, positions) = (goal.number, goal.positions);
@@ -91,7 +91,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Ends the active goal, if it is the one that is meant.
+    /// Ends the active goal, if it has the given id.
     pub(super) fn cancel(&mut self, meant: Option<&str>) -> Result<(), CancelRejected> {
         let goal = &self.goal.as_ref().ok_or(CancelRejected::NotActive)?.goal;
         if meant.is_some_and(|id| id != goal.id) {
@@ -107,7 +107,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Passes on how the active goal goes, or how it has ended.
+    /// Sends feedback or the end of the active goal.
     pub(super) fn judge(&mut self, judged: GoalJudged<N>) {
         let is_active = |active: &ActiveGoal<N>| active.goal.number == judged.number;
         let world = self.arm.world();

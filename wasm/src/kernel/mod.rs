@@ -1,7 +1,7 @@
 //! One client's view of the runtime: frames in, frames out.
 //!
-//! **Invariant:** the arm advances to now before a frame has an effect, and all news of goals are told before the
-//! answer.
+//! **Invariant:** the arm advances to the present time before a frame takes effect, and all news of goals are
+//! sent before the answer.
 
 mod calls;
 mod computing;
@@ -29,16 +29,16 @@ use self::computing::Computation;
 use self::goals::ActiveGoal;
 use self::surroundings::Surroundings;
 
-/// The numbers of links that an arm may have.
+/// The allowed numbers of links.
 pub const LINKS: [usize; 2] = [2, 3];
 
-/// A time from any fixed moment on.
+/// The time since a fixed moment.
 pub type Clock = fn() -> Duration;
 
 /// The arm of `N` links, its services and its topics, for one client.
 pub struct Kernel<const N: usize> {
     arm: LiveArm<N, Surroundings<N>>,
-    /// The statuses that the client wants.
+    /// The client's level of statuses.
     verbosity: Verbosity,
     error_form: ErrorForm,
     goal: Option<ActiveGoal<N>>,
@@ -46,9 +46,9 @@ pub struct Kernel<const N: usize> {
     accepted: u64,
     trial: Trial,
     rng: fastrand::Rng,
-    /// News of goals that the trial has not heard.
+    /// News of goals that the trial has not handled.
     news: VecDeque<(ActiveGoal<N>, GoalJudged<N>)>,
-    /// When the status of the trial was last published.
+    /// The time of the trial's last published status.
     trial_shown: Duration,
     computations: VecDeque<Box<dyn Computation>>,
 }
@@ -58,13 +58,13 @@ where
     Arm<N>: Default,
     Gains<N>: Default,
 {
-    /// An arm as the runtime starts it. The targets of trials depend on `seed`.
+    /// An arm in the runtime's initial state. The targets of trials depend on `seed`.
     #[must_use]
     pub fn new(clock: Clock, seed: u64) -> Self {
         let world = Surroundings::new(clock);
         Self {
             arm: LiveArm::new(Arm::default(), Gains::default(), world),
-            // The level over WebSocket until the client says otherwise.
+            // The default level over WebSocket.
             verbosity: Verbosity::NONE,
             error_form: ErrorForm::Text,
             goal: None,
@@ -79,7 +79,7 @@ where
 }
 
 impl<const N: usize> Kernel<N> {
-    /// The simulation as it is now.
+    /// The present simulation.
     #[must_use]
     pub fn simulation(&self) -> &Simulation<N> {
         self.arm.simulation()
@@ -123,7 +123,7 @@ impl<const N: usize> Kernel<N> {
         self.settle();
     }
 
-    /// Publishes what is due, 60 times a second.
+    /// Publishes due messages, 60 times a second.
     pub fn tick(&mut self) {
         self.attend();
         if let Some(control) = self.arm.limit_to_predict() {
@@ -134,7 +134,7 @@ impl<const N: usize> Kernel<N> {
         self.settle();
     }
 
-    /// Computes for at most that time, if a computation waits. True if one still does.
+    /// Computes for at most that time, if a computation waits. Returns whether one still waits.
     pub fn compute(&mut self, budget: Duration) -> bool {
         let clock = self.arm.world().clock();
         let began = clock();
@@ -156,13 +156,13 @@ impl<const N: usize> Kernel<N> {
         self.arm.world().take_frames()
     }
 
-    /// Takes the steps that are due.
+    /// Takes the due steps.
     fn attend(&mut self) {
         self.arm.catch_up();
         self.settle();
     }
 
-    /// Passes on all news of goals, and does what the trial wants done.
+    /// Sends all news of goals, and executes the trial's commands.
     fn settle(&mut self) {
         while let Some(judged) = self.arm.world().next_judged() {
             self.judge(judged);
@@ -178,14 +178,14 @@ impl<const N: usize> Kernel<N> {
         self.tell(Level::Error, why, id);
     }
 
-    /// A status, if the client wants such.
+    /// Sends a status, if the client's level includes it.
     fn tell(&self, level: Level, why: &str, id: Option<&Payload>) {
         if self.verbosity.wants(level) {
             self.send(messages::status(level, why, id));
         }
     }
 
-    /// A message that the client publishes: subscribers are told of it, and so is the arm.
+    /// Handles a published message: passes it to the subscribers and to the arm.
     fn take_message(
         &mut self,
         name: &str,

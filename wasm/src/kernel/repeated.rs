@@ -1,4 +1,4 @@
-//! A run that is made again and again, because the clock of a browser is too coarse for one.
+//! A run that is repeated, because a browser's clock is too coarse for one run.
 //!
 //! **Invariant:** the samples and the errors are those of the first run; only its time is an average.
 
@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use pendularm::services::study::{NotRun, Present, Ran, RolloutWork, RunOffline, Work};
 
-/// The least time that is measured: the clock of a browser goes in steps of 0.1 ms or 1 ms.
+/// The least measured time. A browser's clock has steps of 0.1 ms or 1 ms.
 const LEAST_MEASURED: Duration = Duration::from_millis(20);
-/// The most evaluations of the dynamics for one measurement, should the clock stand still.
+/// The most evaluations of the dynamics in one measurement, in case the clock does not advance.
 const MOST_EVALUATIONS: u64 = 4_000_000;
 
-/// A run, repeated by itself until `LEAST_MEASURED` has passed. Its time is the mean of all.
+/// A run that is repeated until `LEAST_MEASURED` has passed. Its time is the mean of all runs.
 pub(super) struct Repeated<const N: usize> {
     /// The same run without a reference, whose time is not measured.
     alone: RunOffline<N>,

@@ -1,7 +1,6 @@
-//! The surroundings of the arm in a page: a clock, and one client with its subscriptions.
+//! The environment of the arm in a page: a clock, and one client with its subscriptions.
 //!
-//! **Invariant:** nothing is written for a topic without a subscription; frames leave in the order in which they were
-//! written.
+//! **Invariant:** nothing is encoded for a topic without a subscription. Frames leave in the order of writing.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -26,7 +25,7 @@ struct Subscription {
     latest: Option<Duration>,
 }
 
-/// The clock, and the way to the client.
+/// The clock, and the queue for the client.
 pub(super) struct Surroundings<const N: usize> {
     clock: Clock,
     subscriptions: RefCell<Vec<Subscription>>,
@@ -68,7 +67,7 @@ impl<const N: usize> Surroundings<N> {
         all.iter().any(|one| one.topic == topic)
     }
 
-    /// Sends the message that `write` writes, unless nobody wants it yet.
+    /// Sends the message of `write`, if a subscription is due.
     fn deliver(&self, topic: Topic, write: impl FnOnce() -> Bytes) {
         let mut all = self.subscriptions.borrow_mut();
         let Some(one) = all.iter_mut().find(|one| one.topic == topic) else {
@@ -83,7 +82,7 @@ impl<const N: usize> Surroundings<N> {
         }
     }
 
-    /// Passes a client's own message on to it.
+    /// Sends the client its own message.
     pub(super) fn pass_on(&self, topic: Topic, msg: &Payload) {
         self.deliver(topic, || messages::publish_raw(topic.name(), msg));
     }

@@ -1,7 +1,7 @@
-//! Timed trials, as in the node `ik_trial`: the rules are `math::trial`'s.
+//! Timed trials, as in the node `ik_trial`. The rules are in `math::trial`.
 //!
-//! **Invariant:** each command of the trial is carried out whole before the next, and news of its goals are heard behind
-//! them.
+//! **Invariant:** each command of the trial is completed before the next, and news of its goals are handled after the
+//! commands.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use pendularm::services::trial::{NotStarted, STATUS_PERIOD, StartTrial, Terms, s
 use super::Kernel;
 
 impl<const N: usize> Kernel<N> {
-    /// The trial is told the time, does what follows from it, and hears of its goals.
+    /// Advances the trial to the present time, executes its commands, and passes it the news of its goals.
     pub(super) fn advance_trial(&mut self) {
         loop {
             let commands = self.trial.tick(self.arm.pose().simulated);
@@ -45,14 +45,14 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Does what the trial wants done.
+    /// Executes the trial's commands.
     fn carry_out(&mut self, commands: Vec<TrialCommand>) {
         let mut waiting = std::collections::VecDeque::from(commands);
         while let Some(command) = waiting.pop_front() {
             match command {
                 TrialCommand::PublishStatus => self.publish_status(),
                 TrialCommand::CancelGoal { goal_id } => {
-                    // A refusal means that the goal is over already: all that was wanted.
+                    // A refusal means that the goal has already ended, as wanted.
                     let _ = self.cancel(Some(&goal_id));
                 }
                 TrialCommand::SendGoal {
@@ -78,7 +78,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Starts a trial afresh, unless something was rejected.
+    /// Starts a new trial, unless a field was rejected.
     pub(super) fn start_trial(&mut self, ask: StartTrial, to: &Address) -> Terms {
         let outcome = if ask.rejected.is_empty() {
             let pose = self.arm.pose();
@@ -103,7 +103,7 @@ impl<const N: usize> Kernel<N> {
         self.decide(decided, None)
     }
 
-    /// Does what was decided; the caller is warned if nothing can move the arm.
+    /// Executes the commands. The caller gets a warning if the arm cannot move.
     fn decide(
         &mut self,
         decided: Result<Vec<TrialCommand>, Rejection>,
@@ -117,7 +117,7 @@ impl<const N: usize> Kernel<N> {
         Ok(())
     }
 
-    /// At a tick: shows the trial if that is due.
+    /// At a tick: publishes the trial's status if it is due.
     pub(super) fn show_trial(&mut self) {
         let now: Duration = self.arm.world().now();
         if now.saturating_sub(self.trial_shown) >= STATUS_PERIOD {

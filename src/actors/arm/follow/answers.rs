@@ -1,6 +1,6 @@
-//! Feedback and results of `control_msgs/action/FollowJointTrajectory`, as they are written.
+//! Encoders of feedback and results of `control_msgs/action/FollowJointTrajectory`.
 //!
-//! **Invariant:** the fields are those of the catalogue, and codes are those of the action.
+//! **Invariant:** the fields are those of the catalog, and the codes those of the action.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 use crate::protocol::messages::{Header, Stamp};
 
-/// How a goal has ended, as the action counts.
+/// The result codes of the action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ResultCode {
     Successful = 0,
@@ -52,7 +52,7 @@ struct PointMessage {
     time_from_start: Stamp,
 }
 
-/// How the arm follows at simulation time `now`, `time` after the start \[s\].
+/// The feedback at simulation time `now`, `time` after the start \[s\].
 pub(super) fn feedback<const N: usize>(
     now: f64,
     time: f64,

@@ -1,10 +1,10 @@
-//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name serves it.
+//! Paths: the action `/joint_trajectory_controller/follow_joint_trajectory`, as in `ros2_control`.
 //!
-//! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and sees how the arm
-//! follows; the rules are `math::trajectory`'s. A goal ends where its setpoint is not the arm's any more: another
-//! trajectory, another goal or a reset has taken its place. It ends, too, where the arm cannot follow ([`Obstacle`]).
+//! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and checks how the
+//! arm follows. The rules are in `math::trajectory`. A goal ends when another trajectory, another goal or a reset
+//! replaces its setpoint. It also ends when the arm cannot follow ([`Obstacle`]).
 //!
-//! **Invariant:** at most one goal is active, and each that was accepted has exactly one result.
+//! **Invariant:** at most one goal is active, and each accepted goal has exactly one result.
 
 mod answers;
 mod wire;
@@ -26,11 +26,11 @@ use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
 use crate::protocol::op::GoalStatus;
 use crate::services::goals::NOT_ACTIVE;
 
-/// Time between two moves of the setpoint, which the arm holds in between: at a radian a second it is some millimetres
-/// behind.
+/// Time between two moves of the setpoint, which the arm holds in between. At 1 rad/s the setpoint is some millimetres
+/// behind the path.
 pub const PERIOD: Duration = Duration::from_millis(5);
 
-/// Why a goal ends whose arm is put back to the start.
+/// The reason of a goal that a reset ends.
 const RESET: &str = "the arm was reset";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ pub struct PathFollower<const N: usize> {
     timer: Option<SpawnHandle>,
 }
 
-/// The arm, as far as paths are concerned.
+/// The messages to the arm for paths.
 #[derive(Clone)]
 pub struct PathArm<const N: usize> {
     motion: Recipient<ArmMotion<N>>,
@@ -52,7 +52,7 @@ pub struct PathArm<const N: usize> {
 }
 
 impl<const N: usize> PathArm<N> {
-    /// The ways to this arm.
+    /// The recipients of this arm.
     #[must_use]
     pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
         Self {
@@ -63,15 +63,15 @@ impl<const N: usize> PathArm<N> {
     }
 }
 
-/// The goal that is being followed.
+/// The active goal.
 struct ActivePath<const N: usize> {
     course: Course<N>,
     client: ActionClient,
-    /// Simulation time of its start \[s\], since the reset before it.
+    /// Simulation time of its start \[s\], since the last reset.
     began: f64,
-    /// Resets of the arm before it.
+    /// The number of resets of the arm before it.
     resets: u64,
-    /// The setpoint as this node knows it.
+    /// The last setpoint of this node.
     setpoint: Setpoint<N>,
     feedback: Cadence,
 }
@@ -90,29 +90,29 @@ impl<const N: usize> PathFollower<N> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Follow this path. From clients, by the action.
+/// A path to follow. From clients, by the action.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct FollowPath<const N: usize> {
-    /// The points behind the place where the arm is.
+    /// The points after the present pose.
     pub points: Vec<Waypoint<N>>,
-    /// How far off the joints may be on the way.
+    /// Tolerance on the way.
     pub on_the_way: Tolerance<N>,
-    /// How far off they may be at the end.
+    /// Tolerance at the end.
     pub at_the_end: Tolerance<N>,
-    /// How long after the end they may take for that \[s\]; infinite for no limit.
+    /// Time after the end in which the joints must arrive \[s\]; infinite for no limit.
     pub patience: f64,
     /// The client that sent it.
     pub client: ActionClient,
-    /// Dropped when the arm is on its way, or the goal refused.
+    /// Dropped when the goal has started or is refused.
     pub done: Done,
 }
 
-/// The end of the path that the same client has sent.
+/// Cancels the path of the same client.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct StopFollowing {
-    /// The client that wants it; it gets an error status if no such goal is active.
+    /// The client that cancels. It gets an error status if no such goal is active.
     pub from: Canceller,
     /// Dropped when the goal has ended.
     pub done: Done,
@@ -163,7 +163,7 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
 impl<const N: usize> Handler<Barrier> for PathFollower<N> {
     type Result = AtomicResponse<Self, ()>;
 
-    /// Looks at the arm first: its goal may have ended by a reset, which is to be said before that is answered.
+    /// Checks the arm first: a reset may have ended the goal, and this must be sent before the reset is answered.
     fn handle(&mut self, _: Barrier, _: &mut Context<Self>) -> Self::Result {
         if self.active.is_none() {
             return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));
@@ -194,7 +194,7 @@ impl<const N: usize> ActivePath<N> {
 }
 
 impl<const N: usize> PathFollower<N> {
-    /// Sets a goal in motion, in place of the one before.
+    /// Starts a goal in place of the previous one.
     fn begin(&mut self, goal: FollowPath<N>, motion: &JointMotion<N>, ctx: &mut Context<Self>) {
         let start = Waypoint {
             time: 0.0,
@@ -229,13 +229,13 @@ impl<const N: usize> PathFollower<N> {
         self.lead(motion, Some(goal.done), ctx);
     }
 
-    /// Sees how the arm stands, and moves its setpoint on.
+    /// Checks the arm, and moves its setpoint.
     fn look(&mut self, ctx: &mut Context<Self>) {
         self.timer = None;
         ctx.wait(self.go_on());
     }
 
-    /// The same, for an asker that waits for it.
+    /// The same for a caller that waits for it.
     fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         motion.map(|motion, node, ctx| match motion {
@@ -277,7 +277,7 @@ impl<const N: usize> PathFollower<N> {
         }));
     }
 
-    /// The setpoint has been moved, or was somebody else's.
+    /// Handles the answer: the setpoint has been moved, or another one has replaced it.
     fn moved(&mut self, is_ours: bool, standing: Standing, ctx: &mut Context<Self>) {
         if !is_ours {
             return self.tell_why(ctx);
@@ -305,7 +305,7 @@ impl<const N: usize> PathFollower<N> {
         }
     }
 
-    /// Ends the goal: another setpoint or a reset has replaced its own since the arm was last looked at.
+    /// Ends the goal: another setpoint or a reset has replaced its own since the last check.
     fn tell_why(&self, ctx: &mut Context<Self>) {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, _| {
@@ -321,14 +321,14 @@ impl<const N: usize> PathFollower<N> {
         }));
     }
 
-    /// Ends the goal, whose setpoint is gone or will not be moved any more.
+    /// Ends the goal. Its setpoint has been replaced or is no longer moved.
     fn abort(&mut self, why: &str) {
         if let Some(goal) = self.active.take() {
             goal.end(GoalStatus::Aborted, ResultCode::InvalidGoal, why);
         }
     }
 
-    /// Holds the arm where it is, unless somebody else leads it by now.
+    /// Holds the arm at its present pose, unless another setpoint is active.
     fn halt(&self, from: Setpoint<N>) -> impl Future<Output = ()> + use<N> {
         let arm = self.arm.clone();
         async move {

@@ -1,6 +1,6 @@
 //! Goals of `control_msgs/action/FollowJointTrajectory` in JSON.
 //!
-//! **Invariant:** a long goal is read on another thread, and what its client sends behind it waits.
+//! **Invariant:** a long goal is read on another thread, and its client's later frames wait.
 
 use actix::prelude::*;
 
@@ -13,17 +13,17 @@ use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
 use crate::protocol::op::follow::{FollowGoal, JointTolerance};
 
-/// How far off each joint may be at the end where the goal does not say \[rad\].
+/// Default position tolerance of each joint at the end \[rad\].
 const GOAL_TOLERANCE: f64 = 0.05;
-/// How fast each joint may still be there where the goal does not say \[rad/s\]: the default of `ros2_control`.
+/// Default velocity tolerance of each joint at the end \[rad/s\]: the default of `ros2_control`.
 const STOPPED_VELOCITY: f64 = 0.01;
 /// Both.
 const AT_THE_END: [Option<f64>; 2] = [Some(GOAL_TOLERANCE), Some(STOPPED_VELOCITY)];
-/// How long after the end it may take for that where the goal does not say \[s\].
+/// Default time after the end in which the joints must arrive \[s\].
 const GOAL_TIME: f64 = 5.0;
 
 impl<const N: usize> PathFollower<N> {
-    /// Enters this node's action into the registry's table.
+    /// Adds this node's action to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         let requests = requests(address.clone().recipient(), address.clone().recipient());
         nodes
@@ -54,7 +54,7 @@ fn requests<const N: usize>(
     })
 }
 
-/// The goal for an arm of `N` links; the reader has checked how many values there are.
+/// The goal for an arm of `N` links. The reader has checked the number of values.
 fn path<const N: usize>(goal: &FollowGoal, client: ActionClient, done: Done) -> FollowPath<N> {
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let points = goal.points.iter().map(|point| Waypoint {
@@ -77,7 +77,7 @@ fn path<const N: usize>(goal: &FollowGoal, client: ActionClient, done: Done) -> 
     }
 }
 
-/// The defaults of position and velocity where nothing is said, or 0.
+/// The default tolerances of position and velocity, for missing values and 0.
 fn tolerance<const N: usize>(
     [position, velocity]: [Option<f64>; 2],
     given: &[JointTolerance],

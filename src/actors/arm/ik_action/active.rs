@@ -1,6 +1,6 @@
-//! The goal that is being pursued, and what its messages say.
+//! The active goal and its messages.
 //!
-//! **Invariant:** a goal's messages show the target and the setpoint that it was accepted with.
+//! **Invariant:** a goal's messages have the target and the setpoint with which it was accepted.
 
 use super::messages::{CancelRejected, GoalNews, GoalOwner, Meant};
 use crate::actors::arm::sim::GoalJudged;
@@ -9,12 +9,12 @@ use crate::protocol::messages::goal::{IkFeedback, IkResult};
 use crate::protocol::op::GoalStatus;
 use crate::services::goals::AcceptedGoal;
 
-/// The goal that is being pursued.
+/// The active goal.
 pub(super) struct ActiveGoal<const N: usize> {
     pub(super) goal: AcceptedGoal<N>,
-    /// The one that follows the goal besides the subscribers.
+    /// The receiver of the goal's news besides the subscribers.
     pub(super) owner: Option<GoalOwner<N>>,
-    /// The status that its client hears if it ends before it is reached.
+    /// The status for its client if it ends before it is reached.
     pub(super) if_preempted: GoalStatus,
 }
 
@@ -38,7 +38,7 @@ impl<const N: usize> ActiveGoal<N> {
         }
     }
 
-    /// Whether this is the goal that is meant.
+    /// Whether this goal has the given id.
     pub(super) fn check(&self, meant: &Meant) -> Result<(), CancelRejected> {
         match (meant, &self.owner) {
             (Meant::Active, _) => Ok(()),
@@ -51,7 +51,7 @@ impl<const N: usize> ActiveGoal<N> {
         }
     }
 
-    /// Its owner hears how it goes, or how it ended.
+    /// Informs its owner of feedback or of its end.
     pub(super) fn inform_owner(&self, judged: &GoalJudged<N>) {
         match &self.owner {
             None => {}

@@ -1,6 +1,6 @@
-//! Goals, their ends and their news, as nodes say them to one another and clients by the service or the action.
+//! Messages about goals between nodes, and from clients by the service or the action.
 //!
-//! **Invariant:** every message is plain, and nobody has to ask twice: every question says what has become of it.
+//! **Invariant:** every message is a plain value, and every request is answered with its outcome.
 
 use std::sync::Arc;
 
@@ -13,14 +13,14 @@ use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
 pub use crate::services::goals::{CancelRejected, GoalRejected};
 
-/// Go there. The answer is the goal's id, given before its trajectory goes out.
+/// A goal. The answer is its id, sent before its trajectory is published.
 #[derive(Clone)]
 pub struct SendGoal<const N: usize> {
     /// The target.
     pub target: Target,
-    /// When it counts as reached.
+    /// The condition for success.
     pub criteria: Criteria,
-    /// Hears how the goal goes, besides the subscribers; its being gone is nobody's trouble.
+    /// The receiver of feedback besides the subscribers. It may end at any time.
     pub owner: Option<GoalOwner<N>>,
 }
 
@@ -28,7 +28,7 @@ impl<const N: usize> Ask for SendGoal<N> {
     type Answer = Result<String, GoalRejected>;
 }
 
-/// The one that follows a goal besides the subscribers.
+/// The receiver of a goal's news besides the subscribers.
 #[derive(Clone)]
 pub enum GoalOwner<const N: usize> {
     /// A node.
@@ -37,22 +37,22 @@ pub enum GoalOwner<const N: usize> {
     Client(Arc<ActionClient>),
 }
 
-/// A goal is preempted if it is the active one; answered after its result has been published.
+/// Preempts a goal if it is the active one. Answered after its result has been published.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CancelGoal {
-    /// The goal that is meant.
+    /// The goal to preempt.
     pub goal: Meant,
 }
 
-/// A goal, as who wants its end knows it.
+/// The identification of a goal to be ended.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Meant {
-    /// Whichever is active.
+    /// The active goal.
     #[default]
     Active,
-    /// The goal of this id, which its sender got for an answer.
+    /// The goal with this id, from the answer to its sender.
     Called(String),
-    /// The goal that a client has sent by the action.
+    /// The goal of this client, sent by the action.
     Sent(SentGoal),
 }
 
@@ -60,7 +60,7 @@ impl Ask for CancelGoal {
     type Answer = Result<(), CancelRejected>;
 }
 
-/// How a goal goes. To the owner that its [`SendGoal`] named.
+/// The progress of a goal, for the owner in its [`SendGoal`].
 #[derive(Message, Debug, Clone, PartialEq)]
 #[rtype(result = "()")]
 pub struct GoalNews<const N: usize> {
@@ -70,8 +70,8 @@ pub struct GoalNews<const N: usize> {
     pub distance: f64,
     /// The setpoint that the goal commanded \[rad\].
     pub positions: [f64; N],
-    /// The arm at that instant.
+    /// The state of the arm at that time.
     pub pose: Pose<N>,
-    /// How it ended; none while it is active.
+    /// How it ended; `None` while it is active.
     pub outcome: Option<Outcome>,
 }

@@ -1,9 +1,9 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
 //! `/ik_action/result`.
 //!
-//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the
-//! setpoint. Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears
-//! nothing else, so that goals follow one another whole.
+//! `ik` solves a goal. The arm is informed of it, and checks it at every step once it has the setpoint. Subscribers
+//! get that setpoint on `/joint_trajectory`. While a goal starts, the node handles no other message, so goals do not
+//! interleave.
 //!
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.
@@ -46,21 +46,21 @@ pub struct IkAction<const N: usize> {
     result_wanted: bool,
 }
 
-/// The arm, as far as goals are concerned.
+/// The messages to the arm for goals.
 #[derive(Clone)]
 pub struct GoalTracker<const N: usize> {
     /// Begins a goal.
     pub track: Recipient<TrackGoal<N>>,
-    /// Sets it in motion.
+    /// Sends its setpoint.
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
-    /// Hears whom to send a [`Barrier`] before it says that it is at rest.
+    /// Registers a receiver of [`Barrier`]s before the arm reports that it is at rest.
     pub add_barrier: Recipient<AddBarrier>,
 }
 
 impl<const N: usize> GoalTracker<N> {
-    /// The ways to this arm.
+    /// The recipients of this arm.
     #[must_use]
     pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
         Self {
@@ -91,7 +91,7 @@ impl<const N: usize> IkAction<N> {
         }
     }
 
-    /// Enters this node's services and topics into the registry's table.
+    /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
         nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
@@ -147,7 +147,7 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
 impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
     type Result = ();
 
-    /// From the arm. News of a goal that is not active any more come too late to be passed on.
+    /// From the arm. News of a goal that is no longer active are discarded.
     fn handle(&mut self, judged: GoalJudged<N>, _: &mut Context<Self>) {
         if judged.outcome.is_some() {
             self.conclude(&judged);
@@ -181,7 +181,7 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> IkAction<N> {
-    /// Solves a goal and sets it in motion; its sender is answered in between.
+    /// Solves a goal and starts it. Its sender is answered in between.
     fn pursue(
         &self,
         goal: SendGoal<N>,
@@ -217,7 +217,7 @@ impl<const N: usize> IkAction<N> {
         }))
     }
 
-    /// The old goal's result goes out, and the new goal takes its place.
+    /// Publishes the old goal's result and replaces it by the new goal.
     fn accept(&mut self, number: u64, goal: SendGoal<N>, tracking: Tracking<N>) -> String {
         if let Some(before) = tracking.before {
             self.conclude(&before);
@@ -233,7 +233,7 @@ impl<const N: usize> IkAction<N> {
         id
     }
 
-    /// The active goal's setpoint goes out to the subscribers, and then to the arm.
+    /// Sends the active goal's setpoint to the subscribers, and then to the arm.
     fn set_in_motion(&self) {
         let Some(goal) = &self.active else {
             return;
@@ -245,8 +245,8 @@ impl<const N: usize> IkAction<N> {
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 
-    /// Preempts the active goal if it is the one that is meant, and if the arm has not found it reached already; its
-    /// client hears of that `status`.
+    /// Preempts the active goal if it has the given id and the arm has not reached it yet. Its client gets that
+    /// `status`.
     fn end(
         &self,
         meant: &Meant,
@@ -276,7 +276,7 @@ impl<const N: usize> IkAction<N> {
         }))
     }
 
-    /// Publishes the result of the goal, and forgets the goal. Does nothing if another goal is active.
+    /// Publishes the result of the goal and removes it. Does nothing if another goal is active.
     fn conclude(&mut self, judged: &GoalJudged<N>) {
         let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
             return;

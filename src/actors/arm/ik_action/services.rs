@@ -1,6 +1,6 @@
-//! Goals and cancellations, by the services and by the action: how each is read, and how its answer is written.
+//! Readers of goals and cancellations, by the services and by the action, and the writers of their answers.
 //!
-//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action.
+//! **Invariant:** a goal of the service and a goal of the action are read in the same way.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 use crate::services::goals::{CancelRequest, GoalRequest};
 
-/// The action's goals and cancellations on their way to the node.
+/// Passes the action's goals and cancellations to the node.
 pub(super) fn requests<const N: usize>(
     send: Recipient<Call<SendGoal<N>>>,
     cancel: Recipient<Call<CancelGoal>>,
@@ -45,7 +45,7 @@ pub(super) fn requests<const N: usize>(
     })
 }
 
-/// A client that has sent a goal by the action: feedback shows that it was accepted.
+/// A client that has sent a goal by the action. Feedback shows that it was accepted.
 struct GoalSender(Arc<ActionClient>);
 
 impl Asker<Result<String, GoalRejected>> for GoalSender {
@@ -66,8 +66,8 @@ impl Asker<Result<String, GoalRejected>> for GoalSender {
     }
 }
 
-/// A client that wants the end of a goal which it has sent by the action: it hears if that is not active. The goal's
-/// result says all else.
+/// A client that cancels a goal of the action. It is informed if that goal is not active. Otherwise the goal's
+/// result is the answer.
 struct GoalCanceller(Canceller);
 
 impl Asker<Result<(), CancelRejected>> for GoalCanceller {

@@ -1,6 +1,6 @@
-//! How a trial moves the arm: by goals that it sends to `ik_action`.
+//! The goals that a trial sends to `ik_action`.
 //!
-//! **Invariant:** each command is carried out whole before the next.
+//! **Invariant:** each command is completed before the next.
 
 use actix::prelude::*;
 
@@ -9,27 +9,27 @@ use crate::actors::arm::sim::{ArmPose, Barrier};
 use crate::actors::node::{Call, ask};
 use crate::math::trial::TrialCommand;
 
-/// `ik_action`, as its client sees it.
+/// The messages to `ik_action`.
 #[derive(Clone)]
 pub struct GoalClient<const N: usize> {
     /// Sends a goal.
     pub send: Recipient<Call<SendGoal<N>>>,
     /// Cancels it.
     pub cancel: Recipient<Call<CancelGoal>>,
-    /// Waits until the news so far have arrived.
+    /// Waits until all earlier news have arrived.
     pub barrier: Recipient<Barrier>,
 }
 
-/// The answer of `ik_action` to a goal that the trial sent.
+/// The answer of `ik_action` to a goal of the trial.
 pub(super) struct GoalAnswer<const N: usize> {
     pub(super) ticket: u64,
     /// The goal's id, if it was accepted.
     pub(super) goal_id: Option<String>,
-    /// Lengths after a refusal \[m\]: they may have been the reason.
+    /// Lengths after a refusal \[m\], which may have been the reason.
     pub(super) lengths: Option<[f64; N]>,
 }
 
-/// Takes the trial's commands to `ik_action`, one after another.
+/// Sends the trial's commands to `ik_action`, one after another.
 pub(super) async fn carry_out<const N: usize>(
     commands: Vec<TrialCommand>,
     arm: Recipient<ArmPose<N>>,
@@ -41,7 +41,7 @@ pub(super) async fn carry_out<const N: usize>(
         match command {
             TrialCommand::CancelGoal { goal_id } => {
                 let goal = Meant::Called(goal_id);
-                // A refusal means that the goal is over already: all that was wanted.
+                // A refusal means that the goal has already ended, as wanted.
                 let _ = ask(&goals.cancel, CancelGoal { goal }).await;
             }
             TrialCommand::SendGoal {

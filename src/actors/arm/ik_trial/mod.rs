@@ -1,10 +1,10 @@
-//! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the state of things on `/ik_trial/status`.
+//! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the topic `/ik_trial/status`.
 //!
-//! The rules are `math::trial`'s. The node asks the arm for lengths and simulation time before it does anything, and
-//! moves it through `ik_action` only. Its request there is completed before it takes its next message.
+//! The rules are in `math::trial`. The node requests lengths and simulation time from the arm before each action,
+//! and moves the arm only through `ik_action`. Its request there is completed before it handles its next message.
 //!
-//! **Invariant:** time and goals' news are taken in the order in which the arm gave them; nothing ticks while no trial
-//! runs and nobody watches.
+//! **Invariant:** time and news of goals are handled in the order in which the arm sent them. No timer runs without a
+//! trial or a subscriber.
 
 mod goals;
 
@@ -25,10 +25,10 @@ pub use crate::services::trial::{
     NotStarted, STATUS_PERIOD, SkipTarget, StartTrial, StopTrial, Terms,
 };
 
-/// Least time before the clock is looked at again to see whether a trial is over. The rest of a trial may take long,
-/// if the arm is paused or slow.
+/// Least time between two checks whether a trial is over. The rest of a trial may take long if the arm is paused or
+/// slow.
 const SHORTEST_NAP: Duration = Duration::from_millis(20);
-/// Longest such time: a timer can't be set to any number of seconds that a client may think of.
+/// Longest such time, because a timer cannot be set to every duration that a client may request.
 const LONGEST_NAP: Duration = Duration::from_secs(3600);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -40,14 +40,14 @@ pub struct IkTrial<const N: usize> {
     publish: Recipient<Publish>,
     trial: Trial,
     rng: fastrand::Rng,
-    /// Lengths as last heard \[m\].
+    /// The last known lengths \[m\].
     lengths: [f64; N],
-    /// Resets of the arm, and simulation time through all of them \[s\], as last heard.
+    /// The last known number of resets, and simulation time over all of them \[s\].
     clock: (u64, f64),
     status_wanted: bool,
-    /// A timer for `/ik_trial/status`, while somebody watches.
+    /// A timer for `/ik_trial/status`, while it has subscribers.
     status_timer: Option<SpawnHandle>,
-    /// The arm has been asked for the time of a status: one question at a time.
+    /// Whether a request for the time of a status is pending. There is one at a time.
     status_asked: bool,
     /// A timer for the end of the trial, while one runs.
     deadline: Option<SpawnHandle>,
@@ -77,7 +77,7 @@ impl<const N: usize> IkTrial<N> {
         }
     }
 
-    /// Enters this node's services and its topic into the registry's table.
+    /// Adds this node's services and its topic to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<StartTrial>(Service::TrialStart, address.clone());
         nodes.serve::<SkipTarget>(Service::TrialSkip, address.clone());
@@ -89,17 +89,17 @@ impl<const N: usize> IkTrial<N> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// The arm's answer, and what it was asked for. From this node to itself, so that it stands behind all the news that
-/// the arm gave before.
+/// The arm's answer and the purpose of the request. From this node to itself, so it is queued after all earlier news
+/// of the arm.
 #[derive(Message)]
 #[rtype(result = "()")]
 struct PoseKnown<const N: usize> {
-    /// None if the arm has ended.
+    /// `None` if the arm has ended.
     pose: Option<Pose<N>>,
     intent: Intent,
 }
 
-/// The node's next deed, once it knows lengths and time.
+/// The node's next action, once it has lengths and time.
 enum Intent {
     Start(Changes, Reply<Terms>),
     Skip(Reply<Result<(), Rejection>>),
@@ -227,7 +227,7 @@ impl<const N: usize> Handler<Interest> for IkTrial<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl Intent {
-    /// Without an arm nothing comes of it.
+    /// Without an arm there is nothing to do.
     fn refuse(self) {
         let why = Unserved::NoAnswer(Node::ArmSim.name());
         match self {
@@ -238,21 +238,21 @@ impl Intent {
     }
 }
 
-/// Tells the caller why the trial's goals do not move the arm, if they do not.
+/// Informs the caller if the trial's goals do not move the arm, with the reason.
 fn warn<T, const N: usize>(reply: &Reply<T>, pose: &Pose<N>) {
     if let Some(obstacle) = pose.obstacle {
         reply.warn(&obstacle.to_string());
     }
 }
 
-/// A call that is answered once all that it asked for is under way.
+/// A call that is answered after its actions have started.
 enum Pending {
     Start(Reply<Terms>),
     Other(Reply<Result<(), Rejection>>),
 }
 
 impl<const N: usize> IkTrial<N> {
-    /// Asks the arm, and goes on when all that it said before has been heard too.
+    /// Sends a request to the arm, and continues after all its earlier messages have been handled.
     fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
         let (arm, barrier, own) = (self.arm.clone(), self.goals.barrier.clone(), ctx.address());
         let question = async move {
@@ -263,7 +263,7 @@ impl<const N: usize> IkTrial<N> {
         ctx.spawn(question.into_actor(self));
     }
 
-    /// Takes note of lengths and time. Two questions may be answered in either order: the later time counts.
+    /// Stores lengths and time. Two requests may be answered in either order, so the later time counts.
     fn hear(&mut self, pose: &Pose<N>) -> Vec<TrialCommand> {
         self.lengths = pose.lengths;
         let heard = (pose.resets, pose.simulated);
@@ -273,7 +273,7 @@ impl<const N: usize> IkTrial<N> {
         self.trial.tick(self.clock.1)
     }
 
-    /// Does what the trial wants done, then answers the call that led to it.
+    /// Executes the trial's commands, then answers the call that caused them.
     fn perform(
         &mut self,
         commands: Vec<TrialCommand>,
@@ -341,7 +341,7 @@ impl<const N: usize> IkTrial<N> {
             .do_send(Publish::made(Topic::TrialStatus, move || message));
     }
 
-    /// The timers that the present state asks for, and no others.
+    /// Sets the timers of the present state, and no others.
     fn keep_timers(&mut self, ctx: &mut Context<Self>) {
         match self.trial.remaining() {
             None => self.cancel_deadline(ctx),
@@ -369,7 +369,7 @@ impl<const N: usize> IkTrial<N> {
         }
     }
 
-    /// A status shows the present time, which while a trial runs is the arm's to tell.
+    /// A status has the present time. While a trial runs, the arm provides it.
     fn status_due(&mut self, ctx: &mut Context<Self>) {
         if !self.trial.running() {
             self.publish_status();

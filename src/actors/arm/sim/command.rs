@@ -1,6 +1,6 @@
-//! Efforts of clients, which they publish on `/effort_controller/commands`.
+//! Efforts of clients, published on `/effort_controller/commands`.
 //!
-//! **Invariant:** a command is in force while the controller is off and its client is connected, and no longer.
+//! **Invariant:** a command acts only while the controller is off and its client is connected.
 
 use std::sync::Weak;
 
@@ -12,7 +12,7 @@ use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_effort;
 
-/// Has the registry bring this file's commands.
+/// Adds this file's topic to the registry's table.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
     let commands = commands(arm.clone().recipient());
     nodes.listeners.insert(Topic::EffortCommands, commands);
@@ -24,7 +24,7 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 pub struct CommandEffort<const N: usize> {
     /// Effort per joint \[N m\].
     pub effort: [f64; N],
-    /// The message that it came in. Its client gets an error if the controller is on.
+    /// The client's message. Its client gets an error if the controller is on.
     pub message: TopicMessage,
 }
 
@@ -42,7 +42,7 @@ impl<const N: usize> Handler<CommandEffort<N>> for ArmSim<N> {
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Ends the command of a client that has gone.
+    /// Ends the command of a client that has disconnected.
     pub(super) fn end_orphaned_command(&mut self) {
         let is_gone = |present: &Weak<()>| present.strong_count() == 0;
         if self.commander.as_ref().is_some_and(is_gone) {
@@ -52,7 +52,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-/// Commands on their way to the arm; an error status for what is none.
+/// Passes commands to the arm. An invalid message gets an error status.
 fn commands<const N: usize>(arm: Recipient<CommandEffort<N>>) -> Route<TopicMessage> {
     Box::new(move |message| match read_effort(&message.heard) {
         Ok(effort) => arm.do_send(CommandEffort { effort, message }),

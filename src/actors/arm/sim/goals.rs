@@ -1,8 +1,8 @@
-//! Goals on the arm: their begin, their end, and the barriers before the arm says that it is at rest.
+//! Goals on the arm: their start, their end, and the barriers before the arm reports that it is at rest.
 //!
-//! `ik_action` owns the goal and hears what becomes of it; `live/goals.rs` judges the steps.
+//! `ik_action` owns the goal and gets its news. `live/goals.rs` checks the steps.
 //!
-//! **Invariant:** an answer that the arm is at rest comes behind all news of goals.
+//! **Invariant:** an answer that the arm is at rest follows all news of goals.
 
 use actix::prelude::*;
 
@@ -64,8 +64,8 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Answers once all news of the arm about goals are published. News of a goal go by way of its owner, and none
-    /// may come after the answer that the arm is at rest.
+    /// Answers after all news of goals have been published. The owner of a goal publishes them, and none may
+    /// follow the answer that the arm is at rest.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = self.owners.iter();
         let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();
@@ -74,7 +74,7 @@ impl<const N: usize> ArmSim<N> {
         }
         let passed = async move {
             for one in asked {
-                // An owner that has ended publishes nothing either.
+                // An owner that has ended publishes nothing.
                 let _ = one.await;
             }
         };

@@ -1,6 +1,6 @@
-//! The way of the arm's question for its limits: `study` predicts them on its workers.
+//! The arm's request for its limits, which `study` predicts on its workers.
 //!
-//! **Invariant:** one question is on its way at a time.
+//! **Invariant:** at most one request is pending.
 
 use actix::prelude::*;
 
@@ -26,7 +26,7 @@ impl<const N: usize> Handler<Consult<N>> for ArmSim<N> {
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Has the limit of the loop in force predicted, if that is needed.
+    /// Requests the limit of the active loop, if it is needed.
     pub(super) fn ask_limit(&mut self, ctx: &mut Context<Self>) {
         let Some(study) = &self.study else {
             return;

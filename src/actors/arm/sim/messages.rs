@@ -1,7 +1,6 @@
-//! Messages between the arm and other nodes or the runtime. Questions that clients can ask as well are
-//! in `services`.
+//! Messages between the arm and other nodes or the runtime. Requests that clients can also send are in `services`.
 //!
-//! **Invariant:** every message is plain: it knows nothing of the actor that handles it.
+//! **Invariant:** every message is a plain value, independent of the actor that handles it.
 
 use actix::dev::{MessageResponse, OneshotSender};
 use actix::prelude::*;
@@ -16,75 +15,74 @@ use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
-/// Asks for simulation time \[s\]. From `rosapi` and `rosout`.
+/// Requests simulation time \[s\]. From `rosapi` and `rosout`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "f64")]
 pub struct SimulationTime;
 
-/// Asks for the simulation that an offline observer would have to run to get the present state. From tests.
+/// Requests the offline simulation with the same state. From tests.
 #[derive(Message)]
 #[rtype(result = "Snapshot<N>")]
 pub struct TakeSnapshot<const N: usize>;
 
-/// The whole simulation as it is now.
+/// The whole present simulation.
 #[derive(MessageResponse)]
 pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
 
-/// The arm's settings as they are now. From `study`, at every call.
+/// The arm's present settings. From `study`, at every call.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Present<N>")]
 pub struct ArmSettings<const N: usize>;
 
-/// The largest stable control period and timestep \[s\] of a loop with held control. From the arm to `study`; none if
-/// the runtime ends meanwhile.
+/// The largest stable control period and timestep \[s\] of a loop with held control. From the arm to `study`. `None`
+/// if the runtime ends meanwhile.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<ClockLimits>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 
-/// The node to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
+/// The node that computes [`HeldLimit`]. From the runtime, once. Without it an arm has no limits.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it, and from the republisher
-/// of frames, whenever some are due.
+/// Requests the arm's present pose. From `ik` and `ik_trial` at every request that depends on it, and from the
+/// republisher of frames when frames are due.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;
 
-/// A goal begins, and the one before it ends, both in this instant. From `ik_action`, which then publishes the
+/// Begins a goal and ends the previous one, at the same time. From `ik_action`, which then publishes the
 /// trajectory and sends the [`CommandGoal`].
 #[derive(Message)]
 #[rtype(result = "Tracking<N>")]
 pub struct TrackGoal<const N: usize> {
-    /// Names the goal between `ik_action` and the arm; each is used once.
+    /// Identifies the goal between `ik_action` and the arm. Each id is used once.
     pub number: u64,
     /// The target of the end effector \[m\].
     pub target: DVec2,
-    /// When it counts as there.
+    /// The condition for success.
     pub criteria: Criteria,
     /// Joint positions that put the end effector there \[rad\].
     pub solution: [f64; N],
-    /// Hears of progress and of the end, unless that is the answer to its own message.
+    /// The receiver of feedback and of the end, unless the end is the answer to its own message.
     pub owner: Recipient<GoalJudged<N>>,
 }
 
-/// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From
-/// the arm, before it says that it is at rest, and from `ik_trial`, which so hears all that the arm had said about
-/// goals before it gave the time.
+/// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before it
+/// reports that it is at rest. Also from `ik_trial`, which so gets all news of goals that the arm sent before the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;
 
-/// The sender tells clients of goals: the arm is to send it a [`Barrier`] before it says that it is at rest. From
-/// `ik_action` and `joint_trajectory_controller`, when they start.
+/// The sender informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest.
+/// From `ik_action` and `joint_trajectory_controller`, when they start.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
 pub struct AddBarrier(pub Recipient<Barrier>);
 
-/// The goal's setpoint is held from the next step on, and the goal judged, unless it has ended. From `ik_action`.
+/// Holds the goal's setpoint from the next step on, and checks the goal, unless it has ended. From `ik_action`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct CommandGoal<const N: usize> {
@@ -94,7 +92,7 @@ pub struct CommandGoal<const N: usize> {
     pub positions: [f64; N],
 }
 
-/// The goal is preempted, unless it has ended already. From `ik_action`. The answer is how the latest goal ended.
+/// Preempts the goal, unless it has ended already. From `ik_action`. The answer is how the latest goal ended.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<GoalJudged<N>>")]
 pub struct EndGoal<const N: usize> {
@@ -113,7 +111,7 @@ macro_rules! answers {
         $(impl<const N: usize, A: Actor, M: Message<Result = Self>> MessageResponse<A, M> for $answer<N> {
             fn handle(self, _: &mut A::Context, to: Option<OneshotSender<Self>>) {
                 if let Some(to) = to {
-                    // Nobody may be waiting any more.
+                    // The receiver may have ended.
                     let _ = to.send(self);
                 }
             }

@@ -1,9 +1,9 @@
 //! The arm: steps the simulation against wall time, serves `/arm_sim/*` and `/pid_controller/*`, publishes its state.
 //!
-//! The actor (`node.rs`) only asks the clock and says who hears what; the arm itself is `live`'s, and its questions are
-//! in `services`. `requests` has what clients ask, `messages` what other nodes say.
+//! The actor (`node.rs`) only reads the clock and routes messages. The arm itself is in `live`, and its requests are in
+//! `services`. `requests` handles clients' requests, `messages` has the messages of other nodes.
 //!
-//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
+//! **Invariant:** there is no physics here. The live arm and an offline `Simulation` are bit-identical.
 
 mod command;
 mod goals;

@@ -1,6 +1,7 @@
-//! The arm's motion for those who lead it along a path, and the setpoint moved on by them alone.
+//! The arm's motion for the node that moves it along a path, and the setpoint of that node.
 //!
-//! **Invariant:** a setpoint is moved on only from where its mover has put it: another writer of it takes over.
+//! **Invariant:** a setpoint is moved only if it is still the mover's last one. Otherwise another writer has
+//! replaced it.
 
 use actix::prelude::*;
 
@@ -10,34 +11,34 @@ use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 
-/// How the arm moves now. From `joint_trajectory_controller`, while it leads the arm.
+/// Requests the arm's present motion. From `joint_trajectory_controller`, while a goal is active.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "JointMotion<N>")]
 pub struct ArmMotion<const N: usize>;
 
-/// The arm at one instant.
+/// The motion of the arm at one time.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
 pub struct JointMotion<const N: usize> {
     /// Positions and velocities.
     pub state: State<N>,
-    /// The joint state that is held.
+    /// The held joint state.
     pub setpoint: Setpoint<N>,
     /// Simulation time since the last reset \[s\].
     pub time: f64,
-    /// Resets of the arm so far.
+    /// The number of resets.
     pub resets: u64,
-    /// Whether it is paused, and no step has been taken since.
+    /// Whether it is paused and no step has been taken since.
     pub stands_still: bool,
-    /// Why it does not follow its setpoint; none if it does.
+    /// Why it does not follow its setpoint; `None` if it does.
     pub obstacle: Option<Obstacle>,
 }
 
-/// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
+/// Moves the setpoint, if it is still the sender's last one. The answer is whether it was. From
 /// `joint_trajectory_controller`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "bool")]
 pub struct MoveSetpoint<const N: usize> {
-    /// The setpoint as the sender knows it.
+    /// The sender's last setpoint.
     pub from: Setpoint<N>,
     /// The next one.
     pub to: Setpoint<N>,

@@ -1,9 +1,9 @@
-//! The actor: asks the clock, advances the simulation, wakes for the next tick.
+//! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
-//! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
-//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps
-//! beyond that are taken after [`BREATHER`]. However many messages wait, the wake-up comes: it is looked for at the
-//! end of every [turn](super::turn).
+//! The arm wakes 60 times a second. It advances to the present time before it handles a message, so every answer has
+//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond
+//! that are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of
+//! every [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
@@ -32,18 +32,18 @@ use crate::math::pid::Gains;
 pub struct ArmSim<const N: usize> {
     pub(super) arm: LiveArm<N, ArmWorld<N>>,
     pub(super) turn: Turn,
-    /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
-    /// turn is on its way.
+    /// Requested steps that are not yet taken, at most one request per client. While there are any, the next turn is
+    /// scheduled.
     pub(super) steps: VecDeque<Steps<N>>,
-    /// They are being taken.
+    /// Whether they are being taken.
     pub(super) is_stepping: bool,
-    /// Ends with the client whose effort is commanded.
+    /// Ends when the client with the commanded effort disconnects.
     pub(super) commander: Option<Weak<()>>,
     /// The node that predicts limits, if there is one.
     pub(super) study: Option<Recipient<HeldLimit<N>>>,
-    /// The nodes that tell clients of goals, to be asked whether all news have been passed on.
+    /// The nodes that inform clients of goals, which get barriers.
     pub(super) owners: Vec<Recipient<Barrier>>,
-    /// Progress of the goal on its way, whose arrival is to be waited for.
+    /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
 
@@ -74,7 +74,7 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 
-    /// The same with another time between two runs of the control law \[s\], not negative.
+    /// The same with another control period \[s\], not negative.
     #[must_use]
     pub fn with_period(mut self, period: f64) -> Self {
         self.arm.set_period(period);
@@ -127,7 +127,7 @@ impl<const N: usize> Handler<TakeSnapshot<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Wakes at the next multiple of the tick's length: missed ticks are skipped, not made up.
+    /// Wakes at the next multiple of the tick's length. Missed ticks are skipped, not made up.
     fn schedule_tick(&self, ctx: &mut Context<Self>) {
         let tick = Duration::from_secs(1) / PUBLISH_RATE;
         let since_tick = self.arm.world.epoch.elapsed().as_nanos() % tick.as_nanos();
@@ -140,7 +140,7 @@ impl<const N: usize> ArmSim<N> {
         });
     }
 
-    /// To be called at every message: ends the turn with it if enough has been done in a row.
+    /// Call this at every message. It ends the turn after a limited amount of work.
     pub(super) fn count_message(&mut self, ctx: &mut Context<Self>) {
         if self.turn.count() {
             let others = tokio::task::yield_now().into_actor(self);
@@ -148,26 +148,26 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 
-    /// To be called at every message that depends on the present state or changes it.
+    /// Call this at every message that depends on the present state or changes it.
     pub(super) fn attend(&mut self, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         self.advance_to_now(ctx);
     }
 
-    /// To be called at every call: a client that calls once is likely to call again at once.
+    /// Call this at every service call, because a client is likely to call again at once.
     pub(super) fn attend_call(&mut self, ctx: &mut Context<Self>) {
         self.attend(ctx);
         stay_awake();
     }
 
-    /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
+    /// Takes due steps within one wake-up's budget. The rest is taken soon after.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         self.end_orphaned_command();
         let is_behind = self.arm.advance_to_now();
         Self::breathe(is_behind, ctx);
     }
 
-    /// Takes up what is owed after a breather.
+    /// Takes the remaining steps after a breather.
     fn breathe(is_behind: bool, ctx: &mut Context<Self>) {
         if is_behind {
             ctx.run_later(BREATHER, |node, ctx| {

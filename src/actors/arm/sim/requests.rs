@@ -1,5 +1,4 @@
-//! Calls and messages of clients to the arm. The questions are in `services::arm`, and their effects in
-//! `live`.
+//! Calls and messages of clients to the arm. The requests are in `services::arm`, and their effects in `live`.
 //!
 //! **Invariant:** the arm advances to now before it answers.
 
@@ -17,7 +16,7 @@ use crate::services::arm::{
 };
 
 impl<const N: usize> ArmSim<N> {
-    /// Enters this node's services and topics into the registry's table.
+    /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         command::attach(address, nodes);
         setpoint::attach(address, nodes);

@@ -1,6 +1,6 @@
-//! Setpoints, which clients publish on `/joint_trajectory`.
+//! Setpoints of clients, published on `/joint_trajectory`.
 //!
-//! **Invariant:** a setpoint is taken as a whole, or answered with a status that says what is wrong with it.
+//! **Invariant:** a setpoint is accepted as a whole, or answered with a status that names the fault.
 
 use actix::prelude::*;
 
@@ -11,7 +11,7 @@ use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_setpoint;
 
-/// Has the registry bring this file's setpoints.
+/// Adds this file's topic to the registry's table.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
     let setpoints = setpoints(arm.clone().recipient());
     nodes.listeners.insert(Topic::JointTrajectory, setpoints);
@@ -21,9 +21,9 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct SetSetpoint<const N: usize> {
-    /// The joint state to be held.
+    /// The joint state to hold.
     pub setpoint: Setpoint<N>,
-    /// Dropped when it is held.
+    /// Dropped when it has taken effect.
     pub done: Option<Done>,
 }
 
@@ -36,7 +36,7 @@ impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
     }
 }
 
-/// Setpoints on their way to the arm; an error status for what is none.
+/// Passes setpoints to the arm. An invalid message gets an error status.
 fn setpoints<const N: usize>(arm: Recipient<SetSetpoint<N>>) -> Route<TopicMessage> {
     Box::new(move |message| match read_setpoint(&message.heard) {
         Ok(setpoint) => arm.do_send(SetSetpoint {

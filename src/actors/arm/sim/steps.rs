@@ -1,9 +1,9 @@
-//! Steps of a paused arm that clients ask for: requests for more than a row take turns.
+//! Steps of a paused arm that clients request. Requests for more than one row take turns.
 //!
-//! It is as if each had asked for single steps, one after the other, so what others ask takes effect in between.
+//! The effect is that of separate requests for single steps, so other requests take effect in between.
 //!
-//! **Invariant:** a request is refused at first and changes nothing, or is done as a whole, unless a divergence, a
-//! resume or the end of the runtime comes in between.
+//! **Invariant:** a refused request changes nothing. An accepted one is completed, unless the arm diverges, is
+//! resumed, or the runtime ends.
 
 use actix::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::services::arm::Step;
 impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     type Result = ();
 
-    /// The goal that the arm pursues is its owner's to end.
+    /// Only the owner of the goal ends it.
     fn handle(&mut self, ShutDown(why): ShutDown, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         for mut steps in self.steps.drain(..) {
@@ -27,7 +27,7 @@ impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
 impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
     type Result = ();
 
-    /// Wall time plays no part in the steps, and the arm goes on from there when it is resumed.
+    /// The steps do not depend on wall time, and the arm continues from their end when it is resumed.
     fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
         let asked = match self.arm.begin_steps(ask) {
@@ -46,8 +46,8 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Lets everybody else have a turn, and the owner of the goal hear how it goes; then those whose steps are not all
-    /// taken, one after the other.
+    /// Yields to all other messages, and waits for the goal's feedback. Then the remaining requests continue, one
+    /// after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
         let underway = self.underway.take();
         self.is_stepping = underway.is_some() || !self.steps.is_empty();
@@ -68,7 +68,7 @@ impl<const N: usize> ArmSim<N> {
         }));
     }
 
-    /// Takes the next steps in a row; answers if they are the last, or puts the request behind those of the others.
+    /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
     fn take_row(&mut self, mut steps: Steps<N>) {
         if steps.reply.caller_is_gone() {
             return steps.reply.refuse(Unserved::CallerGone);

@@ -1,13 +1,13 @@
-//! The arm tells its news.
+//! The journal of the arm.
 //!
-//! **Invariant:** a listener hears the whole simulation first.
+//! **Invariant:** a listener gets the whole simulation first.
 
 use actix::prelude::*;
 
 use super::node::ArmSim;
 use crate::live::{ArmListener, Journal};
 
-/// The news go to this listener from now on, or to nobody. From the recorder.
+/// Sets the listener of the journal, or none. From the recorder.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);

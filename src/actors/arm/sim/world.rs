@@ -1,6 +1,6 @@
-//! The surroundings of the arm in the runtime: its clocks, the registry, the owner of its goal.
+//! The environment of the arm in the runtime: its clocks, the registry, the owner of its goal.
 //!
-//! **Invariant:** what is published is written by the registry, not on the arm's thread.
+//! **Invariant:** the registry encodes published messages, not the arm's thread.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,13 +16,13 @@ use crate::live::{GoalJudged, World};
 use crate::math::simulation::Divergence;
 use crate::protocol::catalog::Topic;
 
-/// The surroundings of an arm of `N` links.
+/// The environment of an arm of `N` links.
 pub(super) struct ArmWorld<const N: usize> {
-    /// The moment from which the pacer and the ticks count.
+    /// The start time of the pacer and the ticks.
     pub(super) epoch: Instant,
     pub(super) publish: Recipient<Publish>,
     pub(super) gauges: Arc<Gauges>,
-    /// Hears of the goal that is tracked.
+    /// The receiver of the tracked goal's news.
     pub(super) owner: Option<Recipient<GoalJudged<N>>>,
 }
 

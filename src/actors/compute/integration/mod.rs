@@ -1,10 +1,8 @@
-//! `/arm_sim/integration_step`: a method integrates `x'' = f(t)` on the worker pool, apart from the live arm.
+//! `/arm_sim/integration_step`: integrates `x'' = f(t)` on the worker pool, independent of the live arm.
 //!
-//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
-//! time.
+//! A worker parses, computes and writes the request in slices. A connection submits one computation at a time.
 //!
-//! **Invariant:** nothing here knows the arm. The arm and the other clients go on during every
-//! request.
+//! **Invariant:** nothing here uses the arm. No request blocks the arm or other clients.
 
 mod services;
 
@@ -23,14 +21,14 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{RejectedField, Rejections};
 use crate::services::study::{NUMBER_BYTES, Work};
 
-/// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
+/// Expression nodes evaluated between two checks of the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
-/// Memory that a byte of an expression may take once it has been parsed.
+/// Largest memory of a parsed expression per byte of its text.
 const EXPRESSION_BYTES: usize = 32;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
-/// The actor that takes the calls and hands them to the workers.
+/// The actor that passes the calls to the workers.
 pub struct Integration {
     workers: WorkerPool,
 }
@@ -42,7 +40,7 @@ impl Integration {
         Self { workers }
     }
 
-    /// Enters this node's service into the registry's table.
+    /// Adds this node's service to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve_long::<IntegrationStep>(Service::IntegrationStep, address.clone());
     }
@@ -66,7 +64,7 @@ impl Handler<Call<IntegrationStep>> for Integration {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-/// A particle on its way.
+/// A particle in progress.
 enum Integrating {
     Asked(IntegrationStep),
     Stepping(Box<Particle>),
@@ -102,7 +100,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
     }
 }
 
-/// Parses the formula. Every field that is wrong is named, in the order of the request; the formula comes first.
+/// Parses the formula. Every wrong field is named, in the order of the request, with the formula first.
 fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     let function = ask.function.as_deref().map(Expression::parse);
     let mut rejected = match &function {

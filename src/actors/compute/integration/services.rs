@@ -1,7 +1,6 @@
-//! The question to `integration`, how it is read, and how its answer is written, a slice at a time.
+//! The request to `integration`, its reader, and the writer of its answer, in slices.
 //!
-//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
-//! thread.
+//! **Invariant:** a worker parses the formula's text, and writes the response. No actor's thread does.
 
 use bytes::Bytes;
 
@@ -20,7 +19,7 @@ pub struct IntegrationStep {
     pub function: Option<String>,
     /// Initial position \[m\].
     pub x0: Option<f64>,
-    /// Initial velocity \[m/s\]; 0 unless said.
+    /// Initial velocity \[m/s\]; 0 by default.
     pub xdot0: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub dt: Option<f64>,
@@ -36,18 +35,18 @@ impl Ask for IntegrationStep {
     type Answer = Result<Box<Particle>, NotIntegrated>;
 }
 
-/// Why nothing was integrated.
+/// Why there was no integration.
 #[derive(Debug, thiserror::Error)]
 pub enum NotIntegrated {
-    /// Fields were not valid.
+    /// Fields were rejected.
     #[error("{0}")]
     Rejected(Rejections),
-    /// The fields do not go together.
+    /// The fields do not fit together.
     #[error(transparent)]
     Particle(#[from] ParticleError),
 }
 
-/// Numbers encoded between two looks at the clock: some tens of microseconds.
+/// Numbers encoded between two checks of the clock: some tens of microseconds.
 const NUMBERS_PER_LOOK: usize = 1024;
 
 impl Callable for IntegrationStep {
@@ -77,7 +76,7 @@ impl Streamed for IntegrationStep {
     }
 }
 
-/// The answer, written a slice at a time: it may be 60 MB.
+/// The answer, written in slices. It may have 60 MB.
 struct SamplesWriter {
     particle: Box<Particle>,
     writer: StreamedResponse,
@@ -85,7 +84,7 @@ struct SamplesWriter {
     entry: usize,
 }
 
-/// The one of the three arrays that is being written.
+/// The index of the array that is being written, of three.
 #[derive(Clone, Copy)]
 enum Array {
     Times,

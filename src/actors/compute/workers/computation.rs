@@ -1,34 +1,34 @@
-//! Something heavy, cut into slices: a computation as the workers see it.
+//! A long computation in slices, the interface of the workers.
 //!
-//! **Invariant:** a computation answers once, at its end or when it is refused.
+//! **Invariant:** a computation sends one answer, at its end or when it is refused.
 
 use std::time::{Duration, Instant};
 
-/// How long one computation may keep a worker before the next one has its turn. It is short beside the 5 ms that a
-/// client may be delayed, and long beside the cost of changing over.
+/// Longest time of one computation on a worker before the next one. It is short compared with the 5 ms by which a
+/// client may be delayed, and long compared with the cost of switching.
 pub const SLICE: Duration = Duration::from_millis(1);
 
-/// Whether a computation wants another turn.
+/// The state of a computation after a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// It waits for its next turn.
     Unfinished,
-    /// It can't begin yet, and tries again when another has ended, or after a moment.
+    /// It cannot begin yet, and tries again when another has ended, or after a pause.
     Waiting,
-    /// It has answered and can be dropped.
+    /// It has sent its answer and can be dropped.
     Finished,
 }
 
-/// Something heavy that is done a slice at a time.
+/// A long computation that is done in slices.
 pub trait Computation: Send {
-    /// Works until `deadline` or the end, whichever is first, and answers at the end.
+    /// Works until `deadline` or its end, and sends the answer at its end.
     fn advance(&mut self, deadline: Instant) -> Progress;
 
-    /// Whether nobody waits for the answer any more, so that it may be dropped.
+    /// Whether the caller has disconnected, so the computation can be dropped.
     fn is_abandoned(&self) -> bool {
         false
     }
 
-    /// Answers that the runtime is ending; the computation is dropped afterwards.
+    /// Sends the answer that the runtime is ending. The computation is dropped afterwards.
     fn refuse(&mut self, why: &'static str);
 }

@@ -1,13 +1,13 @@
-//! A few threads that do the heavy requests in slices, so that no client waits for a million steps of another one.
+//! A few threads that compute long requests in slices, so no client waits for a million steps of another one.
 //!
-//! A computation is advanced for one slice, and then stands at the end of the queue: round robin. A connection has at
-//! most one computation here at a time (the others wait in the connection), so each connection has the same share.
+//! A computation is advanced for one slice, and then queued at the end: round robin. A connection has at most one
+//! computation here at a time (the others wait in the connection), so each connection has the same share.
 //!
-//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection. Computations whose
-//! callers have gone make room.
+//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection. Computations of
+//! disconnected callers are removed.
 //!
-//! **Invariant:** a computation is advanced, refused and dropped outside the lock. One that panics takes neither its
-//! worker nor another computation with it.
+//! **Invariant:** a computation is advanced, refused and dropped outside the lock. A panic ends neither its worker
+//! nor another computation.
 
 mod computation;
 
@@ -23,17 +23,16 @@ use crate::actors::resources::priority::give_way;
 use crate::actors::resources::work_clock;
 use crate::options::MAX_CLIENTS;
 
-/// Computations that may be here at once, waiting or running: one of each connection.
+/// Most computations at once, waiting or running: one for each connection.
 pub const MAX_ADMITTED: usize = MAX_CLIENTS;
 /// The refusal when there are too many computations.
-pub const BUSY: &str =
-    "busy: as many computations of all clients wait as may wait; try again later";
+pub const BUSY: &str = "busy: too many computations of all clients wait; try again later";
 /// Pause between two tries of computations that cannot begin.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
-/// Computations that try at a time.
+/// Computations that try at the same time.
 const TRIES: usize = 32;
 
-/// The client for which a computation is done; none for the runtime's own.
+/// The client of a computation; `None` for the runtime's own.
 pub type Owner = Option<ConnectionId>;
 /// The owner of the runtime's own computations.
 pub const RUNTIME: Owner = None;
@@ -46,7 +45,7 @@ pub struct WorkerPool {
     shared: Arc<(Mutex<Queue>, Condvar)>,
 }
 
-/// The computations that are here.
+/// The present computations.
 #[derive(Default)]
 struct Queue {
     /// Computations that wait for their next slice.
@@ -54,13 +53,13 @@ struct Queue {
     running: usize,
     /// Computations that cannot begin yet.
     waiting: VecDeque<Job>,
-    /// When the computations that cannot begin last tried.
+    /// The last time that computations that cannot begin have tried.
     tried: Option<Instant>,
     closed: Option<&'static str>,
 }
 
 impl Queue {
-    /// Lets at most `most` of the computations that could not begin try again.
+    /// Lets up to `most` computations that could not begin try again.
     fn retry(&mut self, most: usize) {
         self.tried = Some(Instant::now());
         let most = most.min(self.waiting.len());
@@ -71,7 +70,7 @@ impl Queue {
         self.ready.len() + self.running + self.waiting.len()
     }
 
-    /// Takes out the computations whose callers have gone.
+    /// Removes the computations of disconnected callers.
     fn take_abandoned(&mut self) -> Vec<Job> {
         self.retry(usize::MAX);
         let ready = std::mem::take(&mut self.ready).into_iter();
@@ -91,7 +90,7 @@ impl WorkerPool {
     /// Starts `threads` workers (at least one). They end with [`WorkerPool::close`].
     ///
     /// # Errors
-    /// The operating system's, if it refuses a thread.
+    /// The operating system's error, if it refuses a thread.
     pub fn start(threads: usize) -> std::io::Result<Self> {
         let pool = Self::without_threads();
         for number in 0..threads.max(1) {
@@ -107,14 +106,14 @@ impl WorkerPool {
         Ok(pool)
     }
 
-    /// A pool without workers, whose owner calls [`WorkerPool::turn`]. It is for a simulation that has one thread only.
+    /// A pool without workers, whose owner calls [`WorkerPool::turn`]. It is for tests with only one thread.
     #[must_use]
     pub fn without_threads() -> Self {
         Self::default()
     }
 
-    /// Does the next slice in the calling thread; false if there is none. Computations that could not begin try again
-    /// when no other has its turn.
+    /// Computes the next slice in the calling thread; `false` if there is none. Computations that could not begin try
+    /// again if there is no other slice.
     #[must_use]
     pub fn turn(&self) -> bool {
         let next = {
@@ -127,17 +126,17 @@ impl WorkerPool {
         next.map(|job| self.advance(job)).is_some()
     }
 
-    /// One worker fewer than the machine has cores, so that the arm and the gateway keep one.
+    /// The number of cores minus one, so the arm and the gateway keep one.
     #[must_use]
     pub fn default_threads() -> usize {
         thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).clamp(1, 4))
     }
 
-    /// Takes in a computation for a client; refuses it if the pool is closed, or has as many as it may have. There is
-    /// always room for the runtime's own.
+    /// Accepts a computation for a client. It is refused if the pool is closed or full. The runtime's own
+    /// computations are always accepted.
     pub fn submit(&self, of: impl Into<Owner>, mut computation: Job) {
         let is_own = of.into() == RUNTIME;
-        // Dropped behind the lock: each answers its caller.
+        // Dropped outside the lock, because each sends an answer to its caller.
         let mut abandoned = Vec::new();
         let why = {
             let mut queue = self.lock();
@@ -154,8 +153,8 @@ impl WorkerPool {
         computation.refuse(why);
     }
 
-    /// Refuses the waiting computations, and the running ones at the end of their slice, for the reason `why`. Then the
-    /// workers end.
+    /// Refuses the waiting computations, and the running ones after their slice, for the reason `why`. Then the workers
+    /// end.
     pub fn close(&self, why: &'static str) {
         let waiting = {
             let mut queue = self.lock();
@@ -169,18 +168,18 @@ impl WorkerPool {
         }
     }
 
-    /// True when nothing waits and nothing runs.
+    /// Whether no computation waits or runs.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.lock().admitted() == 0
     }
 
-    /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
+    /// The queue. A poisoned lock is used, because the queue is never half changed.
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next slice of a worker. `None` when the pool is closed.
+    /// Waits for the next computation of a worker. `None` when the pool is closed.
     fn take(&self) -> Option<Job> {
         let mut queue = self.lock();
         loop {
@@ -205,7 +204,7 @@ impl WorkerPool {
         }
     }
 
-    /// Gives a computation its slice, and puts it back into the queue unless it has ended.
+    /// Computes a slice, and queues the computation again unless it has ended.
     fn advance(&self, mut job: Job) {
         let progress = contain(|| job.advance(work_clock::now() + SLICE));
         let progress = progress.unwrap_or_else(|panic| {
@@ -227,7 +226,7 @@ impl WorkerPool {
                 }
             }
         };
-        // The end of a computation may free many megabytes.
+        // Dropping a computation may free many megabytes.
         let end = contain(move || why.map(|why| job.refuse(why)).unwrap_or_default());
         if let Err(panic) = end {
             tracing::error!(%panic, "the end of a computation failed");

@@ -1,6 +1,6 @@
-//! How the workers take turns, seen from within.
+//! Unit tests of the workers' turns.
 //!
-//! **Invariant:** what is asserted is the order that the pool decides on, never how fast a thread was.
+//! **Invariant:** the tests check the order of the pool, never the speed of a thread.
 
 use std::sync::mpsc;
 
@@ -46,14 +46,14 @@ fn computation(
     })
 }
 
-/// A computation that has begun does not keep the worker, and each gets all the turns that it wants.
+/// A computation that has begun does not occupy the worker, and each one gets all its turns.
 #[test]
 fn computations_take_turns() {
     const TURNS: usize = 100;
     let (log, seen) = mpsc::channel();
     let pool = WorkerPool::start(1).unwrap();
     {
-        // Both wait before the worker takes the first: the lock is held meanwhile.
+        // Both wait before the worker takes the first one, because the lock is held meanwhile.
         let mut queue = pool.lock();
         for name in ["a", "b"] {
             queue.ready.push_back(computation(name, TURNS, &log));
@@ -67,7 +67,7 @@ fn computations_take_turns() {
     }
 }
 
-/// Finds no room a few times.
+/// Finds no memory a few times.
 struct Hesitating {
     tries: usize,
     began: mpsc::Sender<()>,
@@ -86,7 +86,7 @@ impl Computation for Hesitating {
     fn refuse(&mut self, _why: &'static str) {}
 }
 
-/// Goes on until others are done.
+/// Continues until the others are done.
 struct Endless(mpsc::Receiver<()>);
 
 impl Computation for Endless {
@@ -132,7 +132,7 @@ fn one_too_many_is_refused_and_there_is_always_room_for_the_runtimes_own() {
     pool.close("the test is over");
 }
 
-/// Abandoned ones make room, so that clients that come and go keep nobody out.
+/// Abandoned ones are removed, so clients that disconnect do not block others.
 #[test]
 fn who_comes_when_all_are_abandoned_is_admitted() {
     let (log, seen) = mpsc::channel();

@@ -1,8 +1,8 @@
-//! The arm's parameters as every node of ROS 2 has its own told and set: `/arm_sim/get_parameters` and its like.
+//! The arm's parameters in the form of a ROS 2 node: `/arm_sim/get_parameters` and the four other services.
 //!
-//! They are asked of the arm and set by its own questions, as rosapi does: the same checks, the same words.
+//! They are read and set by the arm's own requests, as in rosapi, with the same checks and the same messages.
 //!
-//! **Invariant:** the answer has one entry for each that the question has, in its order.
+//! **Invariant:** the answer has one entry for each entry of the request, in the same order.
 
 mod wire;
 
@@ -16,10 +16,10 @@ use crate::protocol::ros::parameters::Parameter;
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Asks for the parameters that there are; answered by those that are meant.
+/// Lists the parameters. The answer has the selected ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListParameters {
-    /// Names, or what they begin with up to a full stop; none for all.
+    /// Names, or their prefixes up to a full stop; empty for all.
     pub prefixes: Vec<String>,
 }
 
@@ -30,7 +30,7 @@ impl Ask for ListParameters {
 /// The values of parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GetParameters<const N: usize> {
-    /// The parameters; none where there is none of a name.
+    /// The parameters; `None` for an unknown name.
     pub parameters: Vec<Option<Parameter>>,
 }
 
@@ -38,10 +38,10 @@ impl<const N: usize> Ask for GetParameters<N> {
     type Answer = Vec<Option<ParameterValue<N>>>;
 }
 
-/// The types of parameters; answered by what was asked, since no value is needed for it.
+/// The types of parameters. The answer is the request, because it needs no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GetParameterTypes {
-    /// The parameters; none where there is none of a name.
+    /// The parameters; `None` for an unknown name.
     pub parameters: Vec<Option<Parameter>>,
 }
 
@@ -49,10 +49,10 @@ impl Ask for GetParameterTypes {
     type Answer = Vec<Option<Parameter>>;
 }
 
-/// Descriptions of parameters; answered like their types.
+/// Descriptions of parameters, answered like their types.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DescribeParameters {
-    /// The parameters, each with its name as it was asked for.
+    /// The parameters, each with its name in the request.
     pub parameters: Vec<(String, Option<Parameter>)>,
 }
 
@@ -63,7 +63,7 @@ impl Ask for DescribeParameters {
 /// Sets parameters, one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetParameters<const N: usize> {
-    /// The changes, or why there can be none.
+    /// The changes, or why one is not possible.
     pub changes: Vec<Result<ParamChange<N>, NotSet>>,
 }
 
@@ -73,13 +73,13 @@ impl<const N: usize> Ask for SetParameters<N> {
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
-/// Serves the parameter services in the name of the arm.
+/// Serves the parameter services of the arm.
 pub struct Parameters<const N: usize> {
     arm: ArmParameters<N>,
 }
 
 impl<const N: usize> Parameters<N> {
-    /// Asks this arm.
+    /// A node for this arm.
     #[must_use]
     pub const fn new(arm: ArmParameters<N>) -> Self {
         Self { arm }
@@ -100,7 +100,7 @@ impl<const N: usize> Handler<Call<ListParameters>> for Parameters<N> {
     fn handle(&mut self, mut call: Call<ListParameters>, _: &mut Context<Self>) {
         let prefixes = call.ask.prefixes;
         let is_meant = |one: &Parameter| {
-            // No name of ours has a full stop, so only the name itself can be meant.
+            // No parameter's name has a full stop, so a prefix can only be the whole name.
             prefixes.is_empty() || prefixes.iter().any(|prefix| prefix == one.name())
         };
         let meant = Parameter::ALL.into_iter().filter(is_meant);

@@ -1,6 +1,6 @@
 //! The parameter services in JSON.
 //!
-//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration.
+//! **Invariant:** a value is read by the arm's own service, and has its declared type.
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -20,7 +20,7 @@ use crate::protocol::ros::parameters::{MAX_NAMED, Parameter, ParameterType};
 use crate::protocol::wire::json::{self, text};
 
 impl<const N: usize> Parameters<N> {
-    /// Enters this node's services into the registry's table.
+    /// Adds this node's services to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         let node = || address.clone();
         nodes.serve::<ListParameters>(Service::ListParameters, node());
@@ -33,7 +33,7 @@ impl<const N: usize> Parameters<N> {
 
 // ---- reading --------------------------------------------------------------------------------------------------------
 
-/// The texts of a request that has a list of them in the field `name`; empty where that may be absent, and is.
+/// The list of texts in the field `name` of a request; empty if an optional field is absent.
 fn read_texts(
     service: Service,
     arguments: &Arguments,
@@ -93,7 +93,7 @@ impl Callable for DescribeParameters {
     }
 }
 
-/// `rcl_interfaces/msg/Parameter`, as far as a parameter of ours has use for it.
+/// The parts of `rcl_interfaces/msg/Parameter` that the parameters here use.
 struct GivenParameter<'a> {
     name: &'a RawValue,
     kind: u8,
@@ -105,7 +105,7 @@ struct GivenParameter<'a> {
 }
 
 impl<'a> GivenParameter<'a> {
-    /// `None` if it is no parameter.
+    /// `None` if it is not a parameter.
     fn read(entry: &'a RawValue) -> Option<Self> {
         let [name, value] = json::members(entry.get(), &["name", "value"]).ok()?;
         let [kind, integer, double, text, integers, doubles] = json::members(
@@ -220,7 +220,7 @@ impl<const N: usize> From<Option<ParameterValue<N>>> for ValueMessage {
     }
 }
 
-/// The number of a parameter's type; 0, not set, for one that there is not.
+/// The number of a parameter's type; 0 (not set) for an unknown parameter.
 fn type_number(parameter: Option<Parameter>) -> u8 {
     parameter.map_or(0, |parameter| parameter.kind() as u8)
 }

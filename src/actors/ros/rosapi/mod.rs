@@ -1,10 +1,10 @@
-//! `/rosapi/*`: the topics, services, nodes and parameters that there are. Topics and services of clients are asked
-//! of the registry; parameters and time of the arm.
+//! `/rosapi/*`: lists topics, services, nodes and parameters. Topics and services of clients come from the
+//! registry; parameters and time come from the arm.
 //!
-//! Parameters are read and set by the arm's own questions: the same checks, the same words.
+//! Parameters are read and set by the arm's own requests, with the same checks and the same messages.
 //!
-//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the
-//! arm.
+//! **Invariant:** nothing is stored between two calls. Topics and services are requested from the registry, and
+//! values from the arm.
 
 mod services;
 
@@ -31,9 +31,9 @@ use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::ros::urdf;
 
-/// Pause between two tries to find room for a long list.
+/// Pause between two tries to reserve memory for a long list.
 const ROOM_RETRY: Duration = Duration::from_millis(10);
-/// Topics, services and actions of clients beyond which an answer may list more than can be written in a turn.
+/// The number of clients' topics, services and actions above which an answer may be too long to be written in one turn.
 const MANY: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -44,7 +44,7 @@ pub struct RosapiNode<const N: usize> {
     arm: ArmParameters<N>,
 }
 
-/// The arm, as far as its parameters and its time are concerned.
+/// The messages to the arm for parameters and time.
 #[derive(Clone)]
 pub struct ArmParameters<const N: usize> {
     /// Gravity, masses and lengths.
@@ -60,7 +60,7 @@ pub struct ArmParameters<const N: usize> {
 }
 
 impl<const N: usize> ArmParameters<N> {
-    /// The ways to this arm.
+    /// The recipients of this arm.
     #[must_use]
     pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
         Self {
@@ -74,13 +74,13 @@ impl<const N: usize> ArmParameters<N> {
 }
 
 impl<const N: usize> RosapiNode<N> {
-    /// A node that asks the registry who is there and the arm for its values.
+    /// A node that requests registrations from the registry and values from the arm.
     #[must_use]
     pub fn new(registry: Recipient<TakeCensus>, arm: ArmParameters<N>) -> Self {
         Self { registry, arm }
     }
 
-    /// Enters this node's services into the registry's table.
+    /// Adds this node's services to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         for question in catalog::Rosapi::ALL {
             let service = Service::Rosapi(question);
@@ -120,7 +120,7 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
             if let Ok(Some(census)) = registry.send(short).await {
                 return list(&mut reply, look, census);
             }
-            // However many wait, a census is kept alive by those alone who are at work.
+            // Only running calls keep a census in memory, not waiting ones.
             let Some(place) = WorkPermit::take(WorkKind::Listing).await else {
                 return;
             };
@@ -138,7 +138,7 @@ impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
     }
 }
 
-/// Answers with what was asked about a census.
+/// Answers a call from a census.
 fn list(reply: &mut Reply<Listing>, look: Look, census: Census) {
     let mut pieces = reply.answer_in_pieces(Listing { look, census });
     while !pieces.advance() {}
@@ -221,7 +221,7 @@ fn no_arm() -> Unserved {
     Unserved::NoAnswer(Node::ArmSim.name())
 }
 
-/// Passes on what has come of a question to the arm.
+/// Forwards the arm's answer.
 pub(super) fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
     match answer {
         Ok(answer) => reply.answer(answer),
@@ -274,7 +274,7 @@ pub(super) async fn value<const N: usize>(
     })
 }
 
-/// Has the arm change a parameter; gives what was not taken.
+/// Lets the arm change a parameter. Returns the rejections.
 pub(super) async fn change_parameter<const N: usize>(
     change: ParamChange<N>,
     arm: ArmParameters<N>,

@@ -1,7 +1,7 @@
-//! The questions to `rosapi`, how each is read, and how its answer is written.
+//! The requests to `rosapi`, their readers, and the writers of their answers.
 //!
-//! **Invariant:** a parameter's value is read as the arm's own service reads it; a question about one that does not
-//! exist gets as far as the node, which says so.
+//! **Invariant:** a parameter's value is read by the arm's own service. A request about an unknown parameter
+//! reaches the node, which refuses it.
 
 use std::borrow::Cow;
 
@@ -21,19 +21,19 @@ use crate::protocol::ros::rosapi;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::json;
 
-/// A question about what there is: topics, services, nodes and types.
+/// A request about topics, services, nodes or types.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Look {
-    /// The question.
+    /// The service of rosapi.
     pub question: catalog::Rosapi,
-    /// The name that it is about, if it is about one.
+    /// The name in the request, if it has one.
     pub name: String,
 }
 
-/// A question and the registrations of clients: its answer is made of these and of the catalog.
+/// A request with the registrations of clients. Its answer comes from these and from the catalog.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listing {
-    /// The question.
+    /// The service of rosapi.
     pub look: Look,
     /// Topics and services of clients.
     pub census: Census,
@@ -43,7 +43,7 @@ impl Ask for Look {
     type Answer = Listing;
 }
 
-/// Asks for simulation time \[s\].
+/// Requests simulation time \[s\].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GetTime;
 
@@ -54,9 +54,9 @@ impl Ask for GetTime {
 /// The value of a parameter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GetParam<const N: usize> {
-    /// The parameter; none if there is none of that name.
+    /// The parameter; `None` for an unknown name.
     pub parameter: Option<Parameter>,
-    /// The value, as JSON text, that is wanted where there is none.
+    /// The default value as JSON text, for an unknown name.
     pub default: String,
 }
 
@@ -75,18 +75,18 @@ pub enum ParameterValue<const N: usize> {
     Text(String),
 }
 
-/// There is no parameter of that name.
+/// The name is unknown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{NO_SUCH}")]
 pub struct Unknown {
-    /// The value that was wanted in that case.
+    /// The default value in the request.
     pub default: String,
 }
 
 /// Sets a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetParam<const N: usize> {
-    /// The change, or why there can be none.
+    /// The change, or why it is not possible.
     pub change: Result<ParamChange<N>, NotSet>,
 }
 
@@ -94,7 +94,7 @@ impl<const N: usize> Ask for SetParam<N> {
     type Answer = Result<(), NotSet>;
 }
 
-/// A change of one parameter, as a question to the arm.
+/// A change of one parameter, as a request to the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParamChange<const N: usize> {
     /// Gravity, masses or lengths.
@@ -110,13 +110,13 @@ pub enum ParamChange<const N: usize> {
 /// Why a parameter was not set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotSet {
-    /// There is none of that name.
+    /// The name is unknown.
     #[error("{NO_SUCH}")]
     Unknown,
-    /// It has no value of its own.
-    #[error("name: robot_description is made from lengths and masses")]
+    /// It is computed from other parameters.
+    #[error("name: robot_description is read only, made from lengths and masses")]
     Derived,
-    /// Its value is of another type.
+    /// The value has another type.
     #[error("{name} must be a {expected} (type {number}), got type {found}")]
     WrongType {
         /// The parameter's name.
@@ -125,19 +125,19 @@ pub enum NotSet {
         expected: &'static str,
         /// The number of its type.
         number: u8,
-        /// The number of the type that came.
+        /// The number of the received type.
         found: u8,
     },
-    /// The value can't be read.
+    /// The value cannot be read.
     #[error("value must be JSON text")]
     NotJson,
-    /// The arm does not take it.
+    /// The arm refuses it.
     #[error("{0}")]
     Rejected(Rejections),
 }
 
 impl NotSet {
-    /// Rejections are why a parameter was not set.
+    /// Rejections become the reason why a parameter was not set.
     pub(in crate::actors::ros) fn unless_empty(rejected: Rejections) -> Result<(), Self> {
         if rejected.is_empty() {
             Ok(())
@@ -147,10 +147,10 @@ impl NotSet {
     }
 }
 
-/// Whether there is a parameter of that name.
+/// Whether the parameter exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HasParam {
-    /// The parameter; none if there is none of that name.
+    /// The parameter; `None` for an unknown name.
     pub parameter: Option<Parameter>,
 }
 
@@ -158,10 +158,10 @@ impl Ask for HasParam {
     type Answer = bool;
 }
 
-/// Deletes a parameter, which can't be done.
+/// Deletes a parameter, which is always refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeleteParam {
-    /// The parameter; none if there is none of that name.
+    /// The parameter; `None` for an unknown name.
     pub parameter: Option<Parameter>,
 }
 
@@ -172,11 +172,11 @@ impl Ask for DeleteParam {
 /// Why a parameter was not deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotDeleted {
-    /// There is none of that name.
+    /// The name is unknown.
     #[error("{NO_SUCH}")]
     Unknown,
     /// The arm needs it.
-    #[error("name: the parameters of the arm can't be deleted")]
+    #[error("name: the parameters of the arm cannot be deleted")]
     Fixed,
 }
 
@@ -188,7 +188,7 @@ impl Ask for GetParamNames {
     type Answer = Vec<String>;
 }
 
-/// The value of a parameter that does not exist, as JSON text: clients parse it, so it has to be some.
+/// The value of an unknown parameter, as JSON text. Clients parse it, so it must be valid.
 const NO_VALUE: &str = "\"\"";
 
 // ---- what there is --------------------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ impl Callable for GetTime {
 impl Answered for GetTime {
     fn write(time: f64, to: &Address) -> Bytes {
         let Stamp { sec, nanosec } = Stamp::from_seconds(time);
-        // ROS 1 has other names for the same; some clients know only those.
+        // ROS 1 has other names for these members, and some clients know only those.
         let time = json!({"sec": sec, "nanosec": nanosec, "secs": sec, "nsecs": nanosec});
         to.response(&json!({"time": time}), "")
     }
@@ -233,7 +233,7 @@ impl Answered for GetTime {
 
 // ---- parameters -----------------------------------------------------------------------------------------------------
 
-/// The first two fields, both texts; empty where the question has no such field, or the request leaves it out.
+/// The first two fields, both texts; empty if the service has no such field or the request omits it.
 fn read_texts(
     service: Service,
     arguments: &Arguments,
@@ -306,13 +306,13 @@ impl<const N: usize> Callable for SetParam<N> {
 
 /// A value in JSON text.
 fn read_json<const N: usize>(parameter: Parameter, text: &str) -> Result<ParamChange<N>, NotSet> {
-    // As lenient about numbers as every frame: they are refused by the parameter's name.
+    // Numbers are read as leniently as in every frame. They are refused by the parameter's name.
     let text = json::accept_literals(text.to_owned());
     let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
     read_change(parameter, &value)
 }
 
-/// A value, as the arm's own service would read it.
+/// Reads a value with the arm's own service.
 pub(in crate::actors::ros) fn read_change<const N: usize>(
     parameter: Parameter,
     value: &RawValue,

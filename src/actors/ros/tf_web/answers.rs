@@ -1,6 +1,6 @@
-//! The feedback of a published wish, under the name of that wish.
+//! The feedback of a published request, under the id of the request.
 //!
-//! **Invariant:** the fields are those of the catalogue.
+//! **Invariant:** the fields are those of the catalog.
 
 use serde::Serialize;
 
@@ -36,7 +36,7 @@ pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesF
         header: Header { stamp, frame_id },
         status: WishStatus {
             goal_id: WishId { stamp, id },
-            // The status active, as ROS 1 counts.
+            // The status `active` of ROS 1.
             status: 1,
             text: "",
         },

@@ -1,14 +1,13 @@
-//! `tf2_web_republisher`: frames as web viewers want them, which can't put chains of frames together.
+//! `tf2_web_republisher`: frames for web viewers that cannot combine chains of frames.
 //!
-//! A client that asks by the service gets the name of a topic, on which every frame comes as seen from the world. A
-//! client sends a goal, by the action or by the topics of ROS 1's actions (as roslib 1 does). It gets the frames that
-//! it names as feedback, seen from the frame that it names, at its rate.
+//! The service returns the name of a topic that has every frame relative to the world. A client can also send a goal,
+//! by the action or by the topics of a ROS 1 action (as roslib 1 does). It then gets the requested frames as
+//! feedback, relative to the requested frame, at its rate.
 //!
-//! A wish belongs to its connection and ends with it. A published one also ends when that connection unsubscribes from
-//! the feedback.
+//! A request ends with its connection. A published one also ends when that connection unsubscribes from the feedback.
 //!
-//! **Invariant:** the arm is not asked while there is no wish and no subscriber. A connection has at most
-//! [`MAX_WISHES`] wishes.
+//! **Invariant:** nothing is requested from the arm without a request and a subscriber. A connection has
+//! at most [`MAX_WISHES`] requests.
 
 mod answers;
 mod wire;
@@ -31,26 +30,26 @@ use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
-/// Wishes for frames of one connection; the oldest one ends when another comes.
+/// Most requests of one connection. The oldest one ends when another arrives.
 pub const MAX_WISHES: usize = 4;
-/// Frames that one wish may name.
+/// Most frames of one request.
 pub const MAX_FRAMES: usize = 32;
-/// Time between two looks at the arm, and so the shortest between two messages.
+/// Time between two requests to the arm, and so the shortest time between two messages.
 const PERIOD: Duration = Duration::from_micros(16_667);
 /// Time between two messages of the topic.
 const TOPIC_PERIOD: Duration = Duration::from_millis(33);
-/// Messages of all goals in one look, of which 60 come in a second. A message takes up to 30 us of the gateway's
-/// thread, and one that is published goes to all subscribers.
+/// Most messages of all goals per tick, at 60 ticks a second. A message takes up to 30 us of the gateway's
+/// thread, and a published one is sent to all subscribers.
 const AT_ONCE: usize = 5;
 
-/// The end of a wish when its connection has too many.
-const TOO_MANY: &str = "the oldest of this client's goals ends: it has too many";
-/// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
+/// The reason of an evicted request.
+const TOO_MANY: &str = "this client has too many goals, so its oldest one ends";
+/// The error for a client that cancels an unknown or ended request.
 const NOT_KEPT: &str = "id must be that of a goal of this connection";
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Asks for the topic that has the frames. From clients, by `/republish_tfs`.
+/// Requests the name of the topic with the frames. From clients, by `/republish_tfs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepublishTfs;
 
@@ -64,7 +63,7 @@ impl Ask for RepublishTfs {
 pub struct WishFrames {
     /// The frames.
     pub sources: Vec<String>,
-    /// The frame that they are seen from.
+    /// The frame to which they are relative.
     pub target: String,
     /// Time between two messages.
     pub period: Duration,
@@ -74,9 +73,9 @@ pub struct WishFrames {
 
 /// A receiver of frames.
 pub enum FrameReceiver {
-    /// A client that has sent a goal of the action.
+    /// A client with a goal of the action.
     Client(Box<ActionClient>),
-    /// A client that has published a goal.
+    /// A client with a published goal.
     Topic {
         /// The goal's id.
         id: String,
@@ -87,13 +86,13 @@ pub enum FrameReceiver {
     },
 }
 
-/// The end of a wish. From clients, in the same ways.
+/// Cancels a request. From clients, in the same ways.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub enum ForgetFrames {
-    /// The goal of the action that the same client has sent; an error status goes there where there is none.
+    /// The same client's goal of the action. The client gets an error status if there is none.
     Of(Canceller),
-    /// The published goal of that id, or all of them.
+    /// The published goal with that id, or all of them.
     Published(Option<String>),
 }
 
@@ -105,13 +104,13 @@ pub struct TfRepublisher<const N: usize> {
     publish: Recipient<Publish>,
     /// Oldest first.
     wishes: VecDeque<(WishFrames, Instant)>,
-    /// When the topic is due next, while somebody subscribes to it.
+    /// When the topic is due next, while it has subscribers.
     topic: Option<Instant>,
     timer: Option<SpawnHandle>,
 }
 
 impl<const N: usize> TfRepublisher<N> {
-    /// A node that nobody has asked yet.
+    /// A node without requests.
     #[must_use]
     pub const fn new(arm: Recipient<ArmPose<N>>, publish: Recipient<Publish>) -> Self {
         Self {
@@ -207,7 +206,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl WishFrames {
-    /// A client that has sent a goal of the action hears of its end.
+    /// Informs a client with a goal of the action of its end.
     fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
         if let FrameReceiver::Client(client) = &self.by {
             client.conclude(values, status);
@@ -234,7 +233,7 @@ impl<const N: usize> TfRepublisher<N> {
         self.wishes.retain(|(wish, _)| !wish.is_gone());
     }
 
-    /// A timer while anybody wants frames, and none otherwise.
+    /// Runs a timer only while there are requests or subscribers.
     fn keep_timer(&mut self, ctx: &mut Context<Self>) {
         let is_wanted = self.topic.is_some() || !self.wishes.is_empty();
         match self.timer {
@@ -247,7 +246,7 @@ impl<const N: usize> TfRepublisher<N> {
         }
     }
 
-    /// Asks the arm where it is, and tells those who are due.
+    /// Requests the arm's pose, and sends the due messages.
     fn look(&mut self, ctx: &mut Context<Self>) {
         self.forget_gone();
         self.keep_timer(ctx);
@@ -265,7 +264,7 @@ impl<const N: usize> TfRepublisher<N> {
             let sources = sources.iter().map(String::as_str);
             seen_from(stamp, target, sources, &pose.lengths, &pose.positions)
         };
-        // At the look that is nearest: the next would be later than this is early.
+        // A message is sent at the nearest tick: the next tick would be later than this one is early.
         let soon = now + PERIOD / 2;
         if let Some(due) = self.topic.as_mut().filter(|due| **due <= soon) {
             *due = next(*due, TOPIC_PERIOD, now);
@@ -276,10 +275,10 @@ impl<const N: usize> TfRepublisher<N> {
             .iter_mut()
             .filter(|(_, due)| *due <= soon)
             .collect();
-        // The longest due come first.
+        // The longest overdue are first.
         due.sort_by_key(|(_, due)| *due);
         for (order, (wish, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
-            // A nanosecond keeps the order: wishes that are due at all times take turns.
+            // A nanosecond keeps the order, so requests that are always due take turns.
             *due = next(*due, wish.period, now + Duration::from_nanos(order));
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
@@ -293,7 +292,7 @@ impl<const N: usize> TfRepublisher<N> {
     }
 }
 
-/// The next due time of a message that was due at `due` and comes `now`. A delay of up to a period is made up for.
+/// The next due time of a message that was due at `due` and is sent `now`. A delay of up to a period is made up.
 fn next(due: Instant, period: Duration, now: Instant) -> Instant {
     (due + period).max(now)
 }

@@ -1,6 +1,6 @@
-//! Wishes for frames in JSON.
+//! Requests for frames in JSON.
 //!
-//! **Invariant:** a wish names frames that the arm has; others are refused by name.
+//! **Invariant:** a request names only frames of the arm. Others are refused by name.
 
 use std::sync::Weak;
 use std::time::Duration;
@@ -21,13 +21,13 @@ use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::op::{Arguments, MAX_ARGS};
 use crate::protocol::wire::{json, text};
 
-/// Messages a second where a wish does not say.
+/// Default rate in messages per second.
 const RATE: f64 = 10.0;
-/// Messages a second, at least: a lower rate is raised to this.
+/// Least rate in messages per second. A lower rate is raised to this.
 const LEAST_RATE: f64 = 0.1;
 
 impl<const N: usize> TfRepublisher<N> {
-    /// Enters this node's service, action and topics into the registry's table.
+    /// Adds this node's service, action and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
         let node = || address.clone().recipient();
@@ -53,10 +53,10 @@ impl Callable for RepublishTfs {
         let mut fields = Fields::read(arguments, service)?;
         let target = fields.text("target_frame");
         if let Some(target) = target.filter(|target| target.trim_start_matches('/') != WORLD) {
-            let why = format!("must be {WORLD}, got {target}: others are for the action");
+            let why = format!("must be {WORLD}, got {target}: the action supports others");
             fields.refuse("target_frame", &why);
         }
-        // The topic has a rate of its own.
+        // The topic has its own rate.
         let _ = fields.number("rate", Bound::NonNegative);
         if fields.accepted() {
             Ok(Self)
@@ -94,7 +94,7 @@ fn requests<const N: usize>(
     })
 }
 
-/// The source frames, the target frame and the period of a wish.
+/// The source frames, the target frame and the period of a request.
 fn read_wish(
     arguments: &Arguments,
     links: usize,
@@ -121,7 +121,7 @@ fn read_wish(
 
 // ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
 
-/// Goals that are published; an error status for what is none.
+/// Passes published goals to the node. An invalid message gets an error status.
 fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
     Box::new(move |message| match read_goal(&message, N) {
         Ok(goal) => wish.do_send(goal),
@@ -155,7 +155,7 @@ fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejecti
     })
 }
 
-/// Ends of such goals; an error status for what is none.
+/// Passes cancellations of such goals to the node. An invalid message gets an error status.
 fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
     Box::new(move |message| match read_cancel(message.heard.msg.raw()) {
         Ok(id) => forget.do_send(ForgetFrames::Published(id)),
@@ -163,7 +163,7 @@ fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
     })
 }
 
-/// `actionlib_msgs/GoalID`: an id, or none for all goals.
+/// `actionlib_msgs/GoalID`: an id, or empty for all goals.
 fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
     let [id] = members(msg, &["id"])?;
     let Some(id) = id else {
@@ -176,7 +176,7 @@ fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
     Ok(Some(text.into_owned()).filter(|id| !id.is_empty()))
 }
 
-/// The members of these names in a message, which may be as long as arguments.
+/// The members with these names in a message, which may be as long as arguments.
 fn members<'a, const M: usize>(
     msg: &'a RawValue,
     names: &[&str; M],

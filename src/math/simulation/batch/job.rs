@@ -1,6 +1,6 @@
-//! An arm and the steps that it is still to take.
+//! An arm and its remaining steps.
 //!
-//! **Invariant:** an arm is written back once, when its last step is taken or its result is not finite.
+//! **Invariant:** an arm is written back once: after its last step, or when a result is not finite.
 
 use crate::math::arm::State;
 use crate::math::count::partition_point;
@@ -8,18 +8,18 @@ use crate::math::integrator::Method;
 use crate::math::simulation::increments::leaves_out_first_angle;
 use crate::math::simulation::{Held, Simulation};
 
-/// How a step is taken, the same in all lanes of a register.
+/// The kind of a step, the same in all lanes of a register.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StepKind {
     pub(super) method: Method,
     /// Whether the control law runs in every step.
     pub(super) controlled: bool,
-    /// Whether the dynamics look at the first angle.
+    /// Whether the dynamics use the first angle (they do with gravity).
     pub(super) has_gravity: bool,
 }
 
 impl StepKind {
-    /// How many kinds there are.
+    /// The number of kinds.
     pub(super) const COUNT: usize = 4 * Method::ALL.len();
 
     pub(super) fn of<const N: usize>(arm: &Simulation<N>) -> Self {
@@ -48,19 +48,19 @@ impl StepKind {
     }
 }
 
-/// An arm on its way.
+/// An arm that is being stepped.
 pub(super) struct BatchJob<'a, const N: usize> {
     pub(super) arm: &'a mut Simulation<N>,
     /// Steps that have been taken, and those still to be taken.
     taken: u64,
     left: u64,
-    /// How many steps its disturbance acts in.
+    /// The number of steps with its disturbance.
     pushes: u64,
-    /// The control period that it is in, where that may have several steps.
+    /// Its present control period, if a period may have several steps.
     period: Option<HeldSteps<N>>,
 }
 
-/// A control period, or the rest of one, in which the effort is given.
+/// A control period, or the rest of one, in which the effort is held.
 struct HeldSteps<const N: usize> {
     effort: [f64; N],
     /// The arm's effort before it, and after the first step.
@@ -70,12 +70,12 @@ struct HeldSteps<const N: usize> {
     taken: u64,
     /// The integral before it \[rad s\].
     integral: [f64; N],
-    /// Whether it ends by itself: not where the controller is off or the arm is driven by hand.
+    /// Whether it ends by itself. It does not if the controller is off or a client sets the effort.
     ends: bool,
 }
 
 impl<'a, const N: usize> BatchJob<'a, N> {
-    /// An arm, and how many steps it is to take: at least one.
+    /// An arm and the number of its steps, at least one.
     pub(super) fn new(arm: &'a mut Simulation<N>, steps: u64) -> Self {
         let pushes = pushes(arm, steps);
         Self {
@@ -87,7 +87,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         }
     }
 
-    /// The effort where no law runs in every step \[N m\].
+    /// The effort if the law does not run in every step \[N m\].
     pub(super) fn given(&self) -> [f64; N] {
         match &self.period {
             Some(period) => period.effort,
@@ -95,15 +95,15 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         }
     }
 
-    /// Whether the law may be due.
+    /// Whether the control law may be due.
     pub(super) fn ends_period(&self) -> bool {
         self.period
             .as_ref()
             .is_some_and(|period| period.left() == 0)
     }
 
-    /// Begins a control period in `state`, if it has several steps; `integral` is as of now. Answers the integral in
-    /// it.
+    /// Begins a control period in `state`, if it has several steps. `integral` is the present one. Returns the
+    /// integral in this period.
     pub(super) fn begin_period(
         &mut self,
         state: &State<N>,
@@ -130,17 +130,17 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         control.integral
     }
 
-    /// Takes the steps alone, in no lane.
+    /// Takes the steps without a lane.
     pub(super) fn alone(self) {
         self.arm.advance(self.left);
     }
 
-    /// How many steps it still has to take at most.
+    /// The largest number of steps that it still takes.
     pub(super) fn left(&self) -> u64 {
         self.left
     }
 
-    /// How many steps can be taken before it is looked at: until the disturbance ends or all are taken.
+    /// The number of steps until the next check: until the disturbance ends or all steps are taken.
     pub(super) fn until_look(&self) -> u64 {
         let pushed = if self.is_pushed() {
             self.pushes - self.taken
@@ -156,7 +156,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         self.taken < self.pushes
     }
 
-    /// Counts steps that were taken. Returns whether the disturbance ended with the last of them.
+    /// Counts the taken steps. Returns whether the disturbance ended with the last of them.
     pub(super) fn count(&mut self, steps: u64) -> bool {
         let was_pushed = self.is_pushed();
         if let Some(period) = &mut self.period {
@@ -167,7 +167,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
         was_pushed && !self.is_pushed()
     }
 
-    /// Notes the steps that were taken on the arm, and whether the next one was tried and not taken.
+    /// Records the taken steps in the arm, and whether the next one was tried and not taken.
     pub(super) fn end(&mut self, diverged: bool) {
         self.arm.steps += self.taken;
         self.arm.steps_since_base += self.taken;
@@ -187,7 +187,7 @@ impl<'a, const N: usize> BatchJob<'a, N> {
 }
 
 impl<const N: usize> HeldSteps<N> {
-    /// Steps that it still has.
+    /// The remaining steps.
     fn left(&self) -> u64 {
         if self.ends {
             self.after_one.due + 1 - self.taken
@@ -209,11 +209,11 @@ impl<const N: usize> HeldSteps<N> {
     }
 }
 
-/// How many of the next `steps`, one at least, begin before the arm's disturbance ends.
+/// The number of the next `steps` (at least one) that begin before the arm's disturbance ends.
 fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     let Some(disturbance) = arm.disturbance else {
         return 0;
     };
-    // Times do not fall from step to step, rounding included.
+    // Times do not decrease from step to step, even with rounding.
     partition_point(steps, |step| arm.time_after(step) < disturbance.ends)
 }

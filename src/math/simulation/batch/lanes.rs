@@ -1,4 +1,4 @@
-//! The arms in the lanes of a pair of registers: how they get in and out, and how they step.
+//! The arms in the lanes of a pair of registers: loading, storing and stepping.
 //!
 //! **Invariant:** no lane depends on another.
 
@@ -99,9 +99,9 @@ pub(super) struct Lanes<T, const N: usize> {
     gains: Gains<N, T>,
     setpoint: Setpoint<N, T>,
     timestep: T,
-    /// The effort where no law runs: held, commanded or driven.
+    /// The effort if no law runs: held, commanded, or set by a client.
     given: [T; N],
-    /// The disturbance; -0 where there is none, which changes no number when it is added.
+    /// The disturbance. Without one it is -0, because adding -0 changes no number.
     push: [T; N],
 }
 
@@ -135,7 +135,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
         }
     }
 
-    /// Puts an arm into a lane.
+    /// Loads an arm into a lane.
     pub(super) fn place(&mut self, lane: usize, job: &mut BatchJob<'_, N>) {
         let state = job.arm.state;
         let integral = job.begin_period(&state, || [0.0; N]);
@@ -215,7 +215,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 }
 
 impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
-    /// The state that the next step leads to.
+    /// The state after the next step.
     #[inline(always)]
     pub(super) fn next<const HAS_GRAVITY: bool>(
         &self,
@@ -238,7 +238,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
             }
         };
         let effort = entries!(zero, i => effort[i] + self.push[i]);
-        // All methods but Euler's share one copy of the dynamics here too, not eight.
+        // All methods except Euler's share one copy of the dynamics here too, instead of eight.
         let (state, carry) = if method == Method::Euler {
             stepped(
                 #[inline(always)]

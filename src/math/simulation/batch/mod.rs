@@ -1,14 +1,13 @@
-//! Many simulations advanced side by side, a lane of the machine's registers for each.
+//! Many simulations advanced side by side, with one SIMD lane each.
 //!
-//! Arms share a register if they have the same method, the controller alike on or off, and gravity alike or none.
-//! State, parameters, gains, setpoint, timestep, disturbance and number of steps are each arm's own. The processor
-//! decides at run time how many lanes there are: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
+//! Arms share a register if they have the same method, if all controllers are on or all are off, and if all have
+//! gravity or none has. State, parameters, gains, setpoint, timestep, disturbance and number of steps may differ.
+//! The number of lanes depends on the processor at run time: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
-//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time. A few
-//! such pairs take each step in turn, so that the processor works at one while another waits for its own results.
+//! The formulas are those of one arm, with another number type ([`crate::math::number`]): two registers at a time. A
+//! few such pairs take each step in turn, so the processor executes one pair while another waits for its results.
 //!
-//! **Invariant:** every simulation ends in the state that [`Simulation::advance`] gives, bit for bit, in every
-//! batch.
+//! **Invariant:** every simulation ends in the state of [`Simulation::advance`], bit for bit, in every batch.
 
 mod job;
 mod lanes;
@@ -23,14 +22,15 @@ use self::runner::BatchRunner;
 use super::Simulation;
 use crate::math::number::Registers;
 
-/// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
+/// Fewest evaluations for which an arm is loaded into a lane. Loading and storing take about as long as
+/// these evaluations alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// Most arms that wait for a lane: enough that empty lanes at the end count for little.
+/// Most arms that wait for a lane. With so many, empty lanes at the end have little effect.
 const QUEUE: usize = 1024;
 
 impl Registers {
-    /// Does [`advance`] in these registers.
+    /// Runs [`advance`] with registers of one width.
     pub fn advance<'a, const N: usize>(
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>,
@@ -43,7 +43,7 @@ impl Registers {
             }
             let evaluations = steps.saturating_mul(arm.method.evaluations().into());
             let kind = StepKind::of(arm);
-            // A lane has no clock.
+            // A lane keeps no time, so the number of steps is bounded first.
             let alone = evaluations < WORTH_A_LANE || arm.steps_with_time(steps) < steps;
             let job = BatchJob::new(arm, steps);
             if alone {
@@ -63,20 +63,20 @@ impl Registers {
         }
     }
 
-    /// Takes the steps of arms of one kind, who then have left the queue.
+    /// Takes the steps of all arms of one kind, and removes them from the queue.
     fn run<const N: usize>(self, kind: StepKind, queue: &mut Vec<BatchJob<'_, N>>) {
         if queue.len() < 2 {
-            // There is no other arm to share a register with.
+            // No other arm could share a register.
             queue.drain(..).for_each(BatchJob::alone);
             return;
         }
-        // The arm that takes longest begins first, so that the last ones end together.
+        // The arm with the most steps begins first, so the last arms end at about the same time.
         queue.sort_by_key(|job| Reverse(job.left()));
         dispatch!(self.level(), simd => BatchRunner::new(simd, queue.drain(..)).run(kind));
     }
 }
 
-/// Takes up to `steps` steps with every arm. An arm takes fewer only if it has diverged or diverges.
+/// Takes up to `steps` steps with every arm. An arm takes fewer steps only if it diverges or has diverged.
 ///
 /// ```
 /// use pendularm::math::{arm::Arm, pid::Gains, simulation::{Simulation, batch}};

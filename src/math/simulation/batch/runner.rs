@@ -1,9 +1,9 @@
-//! Arms in the lanes of a few pairs of registers: which arm gets a lane, and when one leaves it.
+//! Assigns arms to the lanes of a few pairs of registers.
 //!
-//! A lane whose arm has left goes to the next arm that waits. So no lane is empty before the last arms are at work.
+//! When an arm leaves a lane, the next waiting arm gets it. So no lane is empty until the last arms have one.
 //!
-//! **Invariant:** a lane without an arm holds one that rests without gravity, so that it can go on stepping beside the
-//! others without ever diverging.
+//! **Invariant:** a lane without an arm holds an arm at rest without gravity, which is stepped with the others and
+//! never diverges.
 
 #![allow(
     clippy::indexing_slicing,
@@ -18,12 +18,12 @@ use super::job::{BatchJob, StepKind};
 use super::lanes::{Lanes, Moving};
 use crate::math::number::{Number, Wide};
 
-/// Registers that do each operation one behind the other.
+/// Registers whose operations alternate.
 const K: usize = 2;
 /// Pairs of registers that take each step in turn.
 pub(super) const PAIRS: usize = 2;
 
-/// A few pairs' worth of arms of one kind, and those that wait for a lane.
+/// The arms of one kind: those in the lanes of a few pairs, and those that wait for a lane.
 pub(super) struct BatchRunner<'q, 'a, S: Simd, const N: usize> {
     pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     /// The arm in each lane, pair after pair.
@@ -32,7 +32,7 @@ pub(super) struct BatchRunner<'q, 'a, S: Simd, const N: usize> {
 }
 
 impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
-    /// Gives as many arms a lane as there are.
+    /// Loads an arm into every lane, as far as there are arms.
     #[inline(always)]
     pub(super) fn new(simd: S, mut waiting: Drain<'q, BatchJob<'a, N>>) -> Self {
         let mut pairs = [Lanes::resting(Wide::<S, K>::splat(simd, 0.0)); PAIRS];
@@ -66,7 +66,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
         }
     }
 
-    /// How many steps all arms take before one of them is looked at.
+    /// The number of steps that all arms take before the next check.
     fn until_look(&self) -> Option<u64> {
         self.jobs.iter().flatten().map(BatchJob::until_look).min()
     }
@@ -85,7 +85,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
                 }
                 let mut next = lanes.next::<HAS_GRAVITY>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
-                    // This is moved out of the way, so that nothing else has to be in memory.
+                    // This part is a separate function, so the loop's other values stay in registers.
                     let mut parted = next;
                     let first = index * Wide::<S, K>::LANES;
                     part(lanes, &mut parted, &mut self.jobs[first..], step);
@@ -96,7 +96,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
         }
     }
 
-    /// Counts the steps, has arms leave that are done, and gives their lanes to the next.
+    /// Counts the steps, removes arms that are done, and gives their lanes to the next ones.
     fn look(&mut self, steps: u64) {
         let chunks = self.jobs.chunks_mut(Wide::<S, K>::LANES);
         for (lanes, jobs) in self.pairs.iter_mut().zip(chunks) {
@@ -128,7 +128,7 @@ impl<'q, 'a, S: Simd, const N: usize> BatchRunner<'q, 'a, S, N> {
     }
 }
 
-/// Has the arms leave whose next state is not finite; before it they took `step` steps of this run.
+/// Removes the arms whose next state is not finite. They took `step` steps of this run before it.
 #[cold]
 #[inline(never)]
 fn part<T: Number, const N: usize>(

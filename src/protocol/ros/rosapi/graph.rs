@@ -1,7 +1,7 @@
-//! The graph of nodes, topics and services, of the catalog and of clients together.
+//! The graph of nodes, topics and services, from the catalog and from clients.
 //!
-//! **Invariant:** the runtime's own come first, in the order of the documentation; clients appear as the node
-//! `/gateway`.
+//! **Invariant:** the runtime's entries come first, in the order of the documentation. Clients appear as the
+//! node `/gateway`.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::protocol::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
 use crate::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
 use crate::protocol::names;
 
-/// Topics, and services, of clients in one answer: more than any screen shows. The first by name are listed.
+/// Most topics of clients in one answer, and most services: more than a screen shows. The first by name are listed.
 pub const MAX_LISTED: usize = 4096;
 
-/// The topics, services and actions that clients have registered; at most [`MAX_LISTED`] of each. Names are shared
+/// The topics, services and actions that clients have registered, at most [`MAX_LISTED`] of each. Names are shared
 /// with the registry.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Census {
@@ -28,7 +28,7 @@ pub struct Census {
 }
 
 impl Census {
-    /// The most bytes that a list of it can take: every byte of a name may be written as six.
+    /// The most bytes of a list of it: every byte of a name may be escaped as six.
     #[must_use]
     pub fn most_bytes(&self) -> usize {
         let length = |name: &str, type_name: Option<&str>| {
@@ -47,7 +47,7 @@ impl Census {
 pub struct ListedTopic {
     /// Its name.
     pub name: Arc<str>,
-    /// Its type, as the first client to name one had it.
+    /// Its type, from the first client that named one.
     pub type_name: Option<Arc<str>>,
     /// Whether a client advertises it.
     pub published: bool,
@@ -64,19 +64,19 @@ pub struct ListedService {
     pub type_name: Option<Arc<str>>,
 }
 
-/// The nodes, topics and services that are there.
+/// All nodes, topics and services.
 pub(super) struct Graph<'a> {
     pub(super) census: &'a Census,
 }
 
 impl Graph<'_> {
-    /// Topics of clients alone.
+    /// Topics that only clients use.
     fn foreign(&self) -> impl Iterator<Item = &ListedTopic> {
         let topics = self.census.topics.iter();
         topics.filter(|topic| Topic::from_name(&topic.name).is_none())
     }
 
-    /// The topic as clients use it, if they do.
+    /// Clients' use of the topic, if there is any.
     fn listed(&self, name: &str) -> Option<&ListedTopic> {
         let name = names::absolute(name);
         let mut topics = self.census.topics.iter();
@@ -160,7 +160,7 @@ impl Graph<'_> {
         })
     }
 
-    /// A service's type and node; both empty where there is no such service.
+    /// A service's type and node; both are empty if there is no such service.
     pub(super) fn service(&self, name: &str) -> (String, String) {
         let own = Service::from_name(name);
         if let Some(service) = own {
@@ -190,7 +190,7 @@ impl Graph<'_> {
         own.into_iter().chain(foreign).collect()
     }
 
-    /// An action's type; empty where there is no such action, or nobody has said its type.
+    /// An action's type; empty if there is no such action or its type is unknown.
     pub(super) fn action_type(&self, name: &str) -> String {
         if let Some(action) = Action::from_name(name) {
             return action.type_name().to_owned();
@@ -202,7 +202,7 @@ impl Graph<'_> {
         type_name.unwrap_or_default().to_owned()
     }
 
-    /// All lists are empty where there is no such node.
+    /// All lists are empty if there is no such node.
     pub(super) fn node_details(&self, name: &str) -> Value {
         let name = names::relative(name);
         let Some(node) = Node::ALL.into_iter().find(|node| node.name() == name) else {
@@ -237,14 +237,14 @@ impl Graph<'_> {
 /// The runtime's nodes that publish a topic.
 fn publishing_nodes(topic: Topic) -> Vec<Node> {
     match (topic, topic.direction()) {
-        // Goals send their setpoints there.
+        // Goals publish their setpoints there.
         (Topic::JointTrajectory, _) => vec![Node::IkAction],
         (_, Direction::Published) => vec![topic.owner()],
         (_, Direction::Subscribed) => vec![],
     }
 }
 
-/// A node's name, as the answers have it.
+/// A node's name in the answers.
 pub(super) fn node_name(node: Node) -> String {
     format!("/{}", node.name())
 }
@@ -259,7 +259,7 @@ fn own_services_of(type_name: &str) -> impl Iterator<Item = Service> {
     own_services().filter(move |service| same_service_type(service.type_name(), type_name))
 }
 
-/// The names of a service: a question of rosapi has two.
+/// The names of a service. A service of rosapi has two.
 fn service_names(service: Service) -> Vec<String> {
     match service {
         Service::Rosapi(question) => [PREFIX, PRIVATE_PREFIX]
@@ -269,7 +269,7 @@ fn service_names(service: Service) -> Vec<String> {
     }
 }
 
-/// The same type; older clients say `rosapi` for `rosapi_msgs`.
+/// The same type. Older clients use `rosapi` for `rosapi_msgs`.
 pub(super) fn same_service_type(own: &str, name: &str) -> bool {
     let older = own
         .strip_prefix("rosapi_msgs/")

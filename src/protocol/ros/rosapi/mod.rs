@@ -1,10 +1,9 @@
-//! Answers to the questions of rosapi, from the catalog and from what clients have registered.
+//! Answers of rosapi's services, from the catalog and the clients' registrations.
 //!
-//! Clients appear as the node `/gateway`, as they do behind any rosbridge. Questions for the arm (parameters, time) are
+//! Clients appear as the node `/gateway`, as in other rosbridge servers. Calls for the arm (parameters, time) are
 //! answered elsewhere.
 //!
-//! **Invariant:** what an answer lists is served: the lists are made from the catalog and the registry's own, for every
-//! answer.
+//! **Invariant:** every listed entry is served. The lists are made from the catalog and the registry for every answer.
 
 mod graph;
 mod typedef;
@@ -19,13 +18,13 @@ pub use self::typedef::TypeDef;
 use self::typedef::{details, interfaces};
 use crate::protocol::catalog::{Node, Rosapi, Service, types};
 
-/// The ROS that all this looks like.
+/// The reported ROS version.
 const ROS_VERSION: u8 = 2;
-/// The distribution that the answer names: clients refuse one that they have not heard of, and the types and their
-/// definitions here are those of this one.
+/// The reported distribution. Clients refuse unknown ones. The types here and their definitions are those of this
+/// distribution.
 pub(crate) const DISTRO: &str = "jazzy";
 
-/// Why a question has no answer.
+/// Why a call has no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AnswerError {
     /// The catalog has no type of that name.
@@ -34,15 +33,15 @@ pub enum AnswerError {
         /// The field that named it.
         field: &'static str,
     },
-    /// The question is one that the arm answers.
+    /// The call is for the arm.
     #[error("the arm was not asked")]
     OfTheArm,
 }
 
-/// The `values` that answer a question about `asked`, the name in its request; empty for one that has none.
+/// The `values` for a call about `asked`, the name in its request; `asked` is empty if the request has no name.
 ///
 /// # Errors
-/// If it is about a type that is not known, or about something that the arm has.
+/// If the type is unknown, or if the call is for the arm.
 pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, AnswerError> {
     let graph = Graph { census };
     let fields = Service::Rosapi(question).fields();
@@ -57,7 +56,7 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         Rosapi::TopicsForType => json!({"topics": graph.topics_of(asked)}),
         Rosapi::TopicsAndRawTypes => {
             let (topics, types) = graph.topics();
-            // Few types, but topics by the thousand that have them.
+            // There are few types, but thousands of topics with them.
             let mut known = BTreeMap::new();
             for name in &types {
                 let text = known.entry(name.as_str());

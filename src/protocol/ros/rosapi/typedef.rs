@@ -1,6 +1,6 @@
-//! Types as rosapi lays them out, of messages, services and actions.
+//! Types of messages, services and actions, in the format of rosapi.
 //!
-//! **Invariant:** a type comes with every type inside it, each once.
+//! **Invariant:** a type is returned with every type inside it, each once.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::protocol::catalog::types::{self, Count, Type};
 use crate::protocol::catalog::{Action, Field, Rosapi, Service};
 use crate::protocol::names;
 
-/// A type as rosapi lays it out, field by field.
+/// A type in the format of rosapi, field by field.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TypeDef {
     /// Its name, without the middle part.
@@ -21,9 +21,9 @@ pub struct TypeDef {
     pub fieldnames: Vec<&'static str>,
     /// Their types, without brackets.
     pub fieldtypes: Vec<String>,
-    /// -1 for one value, 0 for any number, or how many there are.
+    /// -1 for one value, 0 for any number, or the number of entries.
     pub fieldarraylen: Vec<i32>,
-    /// A value that each may have.
+    /// An example value of each.
     pub examples: Vec<&'static str>,
     /// Names of the constants.
     pub constnames: Vec<&'static str>,
@@ -31,7 +31,7 @@ pub struct TypeDef {
     pub constvalues: Vec<&'static str>,
 }
 
-/// A type of that name, field by field; `None` if the runtime knows none.
+/// The type of that name, field by field; `None` if it is unknown.
 pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
     let service = || service_of_type(name);
     let action = || {

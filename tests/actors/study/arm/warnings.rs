@@ -38,7 +38,7 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
                 assert_eq!(
                     warning,
                     if level == 1 {
-                        "the timestep 0.005 s exceeds 0.004 s, up to which rk4 is predicted to be stable at the present setpoint"
+                        "the timestep 0.005 s exceeds 0.004 s, the predicted stability limit of rk4 at the present setpoint"
                     } else {
                         ""
                     }
@@ -73,20 +73,20 @@ fn a_warning_names_the_clock_that_is_too_slow() {
             (
                 0.01,
                 0.001,
-                "the control period 0.01 s exceeds 0.008 s, up to which the controller is predicted to be stable at \
+                "the control period 0.01 s exceeds 0.008 s, the predicted stability limit of the controller at \
                  the present setpoint",
             ),
             (0.006, 0.001, ""),
             (
                 0.006,
                 0.006,
-                "the timestep 0.006 s exceeds 0.004 s, up to which rk4 is predicted to be stable at the present \
+                "the timestep 0.006 s exceeds 0.004 s, the predicted stability limit of rk4 at the present \
                  setpoint with a control period of 0.006 s",
             ),
             (
                 0.012,
                 0.006,
-                "the control period 0.012 s exceeds 0.008 s, up to which the controller is predicted to be stable \
+                "the control period 0.012 s exceeds 0.008 s, the predicted stability limit of the controller \
                  at the present setpoint",
             ),
         ] {
@@ -139,7 +139,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
             assert!((0.05..0.15).contains(&limit), "{limit}");
             let warning = value(message, "warning");
             assert_eq!(!warning.is_empty(), warned, "{warning}");
-            let said = "up to which rk4 is predicted to carry a motion of 16.403 rad/s";
+            let said = "the predicted limit of rk4 for a motion of 16.403 rad/s";
             assert_eq!(warning.contains(said), warned, "{warning}");
         }
         // Beyond both limits the smaller one is told.
