@@ -60,7 +60,7 @@ pub struct Outbox {
     /// The client's limits, by topic.
     limits: HashMap<Arc<str>, TopicLimits>,
     held: HeldBack,
-    /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
+    /// The next number. A lower number leaves first, and is dropped first.
     produced: u64,
     /// Counted bytes of queued topic messages, without held ones.
     topic_bytes: usize,
@@ -340,8 +340,8 @@ impl Outbox {
         }
     }
 
-    /// Gives the throttle each message by itself. Once one has to wait, those behind it have to wait too, and only the
-    /// newest of them are kept.
+    /// Passes each message to the throttle separately. Once one is held back, the following ones are too, and only the
+    /// newest of these remain.
     fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
         let is_series = first_message(&frames) < frames.len();
         while !frames.is_empty() {
