@@ -10,10 +10,9 @@
     reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
 )]
 
-mod complex;
 mod eigenvalues;
 
-pub use complex::Complex;
+pub use eigenvalues::Complex;
 
 use std::ops::{Index, IndexMut};
 
