@@ -23,8 +23,8 @@ pub struct RunOutcome {
     pub timestep: f64,
     /// Evaluations of the dynamics, counted.
     pub evaluations: u64,
-    /// Largest error over all comparisons and joints \[rad\] (\[m\] for a particle); infinite if the run was lost or left
-    /// the finite numbers.
+    /// Largest error over all comparisons and joints \[rad\] (\[m\] for a particle); infinite if the run was lost or
+    /// left the finite numbers.
     pub error: f64,
     /// The last angles, summed \[rad\].
     pub end: f64,

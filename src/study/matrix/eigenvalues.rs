@@ -12,29 +12,9 @@
 
 use std::ops::RangeInclusive;
 
+use super::complex::Complex;
 use super::{Matrix, largest};
-use crate::math::elementary::{exp2, hypot, log2};
-
-/// A complex number.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Complex {
-    /// Real part.
-    pub re: f64,
-    /// Imaginary part.
-    pub im: f64,
-}
-
-impl Complex {
-    const fn real(re: f64) -> Self {
-        Self { re, im: 0.0 }
-    }
-
-    /// Modulus, without overflow on the way.
-    #[must_use]
-    pub fn modulus(self) -> f64 {
-        hypot(self.re, self.im)
-    }
-}
+use crate::math::elementary::{exp2, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.
 const MAX_SWEEPS: usize = 60;
@@ -99,8 +79,8 @@ impl Matrix {
         }
     }
 
-    /// Reflects from both sides so that a vector, whose first entry belongs to row `start`, turns into a multiple of its
-    /// first axis. Of the matrix the rows and columns in `block` are kept up to date.
+    /// Reflects from both sides so that a vector, whose first entry belongs to row `start`, turns into a multiple of
+    /// its first axis. Of the matrix the rows and columns in `block` are kept up to date.
     fn reflect(&mut self, start: usize, across: &mut [f64], block: RangeInclusive<usize>) {
         let size = largest(across.iter().map(|u| u.abs()));
         if size == 0.0 {

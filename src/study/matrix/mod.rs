@@ -10,9 +10,10 @@
     reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
 )]
 
+mod complex;
 mod eigenvalues;
 
-pub use eigenvalues::Complex;
+pub use complex::Complex;
 
 use std::ops::{Index, IndexMut};
 

@@ -161,8 +161,8 @@ pub struct ReferenceMotion<const N: usize> {
 }
 
 impl<const N: usize> ReferenceMotion<N> {
-    /// The motion from `start` under `law` for `duration` \[s\], or with a held effort for the number of control periods
-    /// that is nearest to it.
+    /// The motion from `start` under `law` for `duration` \[s\], or with a held effort for the number of control
+    /// periods that is nearest to it.
     #[must_use]
     pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Self {
         let [fine, coarse] = SETTINGS.map(|setting| follow(arm, start, law, duration, setting));
