@@ -89,7 +89,8 @@ impl LimitPair {
 
     fn of(predicted: Option<f64>, growth: impl Fn(f64) -> Option<f64>) -> Self {
         let predicted = predicted.filter(|limit| *limit > 0.0);
-        let measure = |guess| boundary(guess, |limit| decays(growth(limit)));
+        // The prediction itself is none of the values that are tried.
+        let measure = |predicted: f64| boundary(0.9 * predicted, |limit| decays(growth(limit)));
         Self {
             predicted,
             measured: predicted.and_then(measure),
