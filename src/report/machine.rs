@@ -3,7 +3,6 @@
 //! **Invariant:** what cannot be found out is called unknown, never guessed.
 
 use std::fs;
-use std::process::Command;
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +33,6 @@ impl Machine {
             ("Version", Some(format!("pendularm {VERSION}"))),
             ("Build", Some(build.to_owned())),
             ("Target", Some(format!("{ARCH} {OS}, {}", features()))),
-            ("Compiler on the path", output("rustc", &["--version"])),
             ("Processor", processor()),
             ("Cores", cores.map(|cores| cores.to_string())),
             ("Load when started", load),
@@ -50,12 +48,6 @@ impl Machine {
             facts: facts.to_vec(),
         }
     }
-}
-
-fn output(program: &str, arguments: &[&str]) -> Option<String> {
-    let output = Command::new(program).args(arguments).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    output.status.success().then(|| text.trim().to_owned())
 }
 
 fn processor() -> Option<String> {

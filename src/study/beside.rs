@@ -17,36 +17,34 @@ const MAX_COEFFICIENTS: u64 = 40_000_000;
 
 /// A run that can be stepped and seen.
 pub(crate) trait Steppable<const N: usize>: Send {
-    /// Takes a step. Returns its cost in evaluations of the dynamics; none if the run has diverged.
-    fn step(&mut self) -> Option<u64>;
-    fn state(&self) -> &State<N>;
     /// Takes up to `steps` steps. Returns how many it took before the run diverged.
-    #[cfg(feature = "report")]
-    fn advance(&mut self, steps: u64) -> u64 {
-        (0..steps)
-            .take_while(|_| self.step().is_some())
-            .fold(0, |taken, _| taken + 1)
-    }
+    fn advance(&mut self, steps: u64) -> u64;
+    /// The cost of all steps so far, in evaluations of the dynamics.
+    fn evaluations(&self) -> u64;
+    fn state(&self) -> &State<N>;
 }
 
 impl<const N: usize> Steppable<N> for Simulation<N> {
-    fn step(&mut self) -> Option<u64> {
-        Simulation::step(self).then(|| self.method().evaluations().into())
+    fn advance(&mut self, steps: u64) -> u64 {
+        Simulation::advance(self, steps)
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.steps() * u64::from(self.method().evaluations())
     }
 
     fn state(&self) -> &State<N> {
         Simulation::state(self)
     }
-
-    #[cfg(feature = "report")]
-    fn advance(&mut self, steps: u64) -> u64 {
-        Simulation::advance(self, steps)
-    }
 }
 
 impl<const N: usize> Steppable<N> for ContinuousLoop<N> {
-    fn step(&mut self) -> Option<u64> {
-        ContinuousLoop::step(self).then(|| self.control.method.evaluations().into())
+    fn advance(&mut self, steps: u64) -> u64 {
+        (0..steps).take_while(|_| self.step()).count() as u64
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.steps() * u64::from(self.control.method.evaluations())
     }
 
     fn state(&self) -> &State<N> {
@@ -63,11 +61,20 @@ pub(super) struct FreeMotion<const N: usize> {
 }
 
 impl<const N: usize> Steppable<N> for FreeMotion<N> {
-    fn step(&mut self) -> Option<u64> {
-        let before = self.taylor.coefficients();
-        let is_followed = self.taylor.follow(&self.arm, &[0.0; N], self.timestep);
-        let after = self.taylor.coefficients();
-        (is_followed && after <= MAX_COEFFICIENTS).then_some(after - before)
+    fn advance(&mut self, steps: u64) -> u64 {
+        let Self {
+            arm,
+            taylor,
+            timestep,
+        } = self;
+        let mut follow = || {
+            taylor.follow(arm, &[0.0; N], *timestep) && taylor.coefficients() <= MAX_COEFFICIENTS
+        };
+        (0..steps).take_while(|_| follow()).count() as u64
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.taylor.coefficients()
     }
 
     fn state(&self) -> &State<N> {
@@ -83,25 +90,23 @@ pub(super) async fn largest_distance<const N: usize>(
     (mut truth, truth_steps): (Box<dyn Steppable<N>>, u64),
     allowed: f64,
 ) -> f64 {
-    let mut step = || {
-        let mut work = run.step()?;
-        for _ in 0..truth_steps {
-            work += truth.step()?;
+    let (mut largest, mut work, mut piece) = (0.0, 0, PieceWork::default());
+    for _ in 0..steps {
+        if run.advance(1) < 1 || truth.advance(truth_steps) < truth_steps {
+            return f64::INFINITY;
         }
         let [one, other] = [&run, &truth].map(|it| forward(arm.lengths(), &it.state().position));
         let apart = one.position.distance(other.position);
-        Some((work, if apart.is_nan() { f64::INFINITY } else { apart }))
-    };
-    let (mut largest, mut piece) = (0.0, PieceWork::default());
-    for _ in 0..steps {
-        let Some((work, apart)) = step() else {
-            return f64::INFINITY;
+        largest = if apart.is_nan() {
+            f64::INFINITY
+        } else {
+            apart.max(largest)
         };
-        largest = apart.max(largest);
         if largest > allowed {
             break;
         }
-        piece.spend(work).await;
+        let before = std::mem::replace(&mut work, run.evaluations() + truth.evaluations());
+        piece.spend(work - before).await;
     }
     largest
 }
@@ -115,8 +120,12 @@ mod tests {
     struct Diverged(State<2>);
 
     impl Steppable<2> for Diverged {
-        fn step(&mut self) -> Option<u64> {
-            None
+        fn advance(&mut self, _: u64) -> u64 {
+            0
+        }
+
+        fn evaluations(&self) -> u64 {
+            0
         }
 
         fn state(&self) -> &State<2> {

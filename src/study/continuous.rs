@@ -26,6 +26,7 @@ pub struct ContinuousLoop<const N: usize> {
     pub integral: [f64; N],
     /// The rounding error of the state, carried into the next step as the live arm does it.
     carry: State<N>,
+    steps: u64,
 }
 
 impl<const N: usize> ContinuousLoop<N> {
@@ -37,7 +38,14 @@ impl<const N: usize> ContinuousLoop<N> {
             state,
             integral,
             carry: State::rest(),
+            steps: 0,
         }
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if the arm has more
@@ -109,6 +117,7 @@ impl<const N: usize> ContinuousLoop<N> {
         let finite = next.is_finite();
         if finite {
             self.state = next;
+            self.steps += 1;
             self.carry = State {
                 position: position_carry,
                 velocity: velocity_carry,

@@ -126,23 +126,30 @@ impl Linear {
     /// velocities, integrals.
     #[must_use]
     pub fn flow(&self) -> Matrix {
+        self.closed(&self.plant(), 0.0)
+    }
+
+    /// The loop that the law closes about an arm under constant efforts. The law runs once in a period `T` \[s\]:
+    /// `s ↦ s - T x`, then `u = -kp x - kd v + ki s`. States are as in [`Linear::flow`].
+    pub(super) fn closed(&self, arm: &Matrix, period: f64) -> Matrix {
         let n = self.joints();
-        let mut flow = Matrix::zeros(self.states());
-        for i in 0..n {
-            flow[(i, n + i)] = 1.0;
+        let mut closed = Matrix::zeros(self.states());
+        for row in 0..2 * n {
             for j in 0..n {
-                let inverse = self.inverse_mass[(i, j)];
-                flow[(n + i, j)] = -(self.gravity[(i, j)] + inverse * self.kp[j]);
-                flow[(n + i, n + j)] = -inverse * self.kd[j];
+                let effort = arm[(row, 2 * n + j)];
+                closed[(row, j)] = arm[(row, j)] - effort * self.kp[j];
+                closed[(row, n + j)] = arm[(row, n + j)] - effort * self.kd[j];
             }
             for (k, &(joint, ki)) in self.integrals.iter().enumerate() {
-                flow[(n + i, 2 * n + k)] = self.inverse_mass[(i, joint)] * ki;
+                let effort = arm[(row, 2 * n + joint)] * ki;
+                closed[(row, 2 * n + k)] = effort;
+                closed[(row, joint)] -= effort * period;
             }
         }
         for (k, &(joint, _)) in self.integrals.iter().enumerate() {
-            flow[(2 * n + k, joint)] = -1.0;
+            closed[(2 * n + k, joint)] = -1.0;
         }
-        flow
+        closed
     }
 
     /// The matrix of the arm alone under constant efforts: `x` holds positions, velocities, efforts \[N m\].

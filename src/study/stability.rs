@@ -190,31 +190,27 @@ impl<'a> Stepping<'a> {
         match self.sampling {
             Sampling::Continuous => free,
             Sampling::Held if self.delayed => self.close_late(self.repeated(&free, h), period),
-            Sampling::Held => self.close(&self.repeated(&free, h), period),
+            Sampling::Held => self.linear.closed(&self.repeated(&free, h), period),
         }
     }
 
     /// Velocity Verlet, its predictor and one correction, on the states in [`Linear`]'s order.
     fn verlet(&self, h: f64) -> Matrix {
         let (n, a) = (self.linear.joints(), &self.stepped);
-        let size = a.size();
-        let moves_slowly = |row: usize| !(n..2 * n).contains(&row);
+        // The rows of velocities, and all others.
+        let rows = |others: &Matrix, velocities: &Matrix| {
+            Matrix::from_fn(a.size(), |row, column| {
+                let matrix = if (n..2 * n).contains(&row) {
+                    velocities
+                } else {
+                    others
+                };
+                matrix[(row, column)]
+            })
+        };
         let second = a.clone().plus(0.5 * h, &a.product(a));
-        let predicted = Matrix::from_fn(size, |row, column| {
-            if moves_slowly(row) {
-                second[(row, column)]
-            } else {
-                a[(row, column)]
-            }
-        });
-        let mean = a.clone().plus(0.5 * h, &a.product(&predicted));
-        Matrix::from_fn(size, |row, column| {
-            if moves_slowly(row) {
-                second[(row, column)]
-            } else {
-                mean[(row, column)]
-            }
-        })
+        let predicted = rows(&second, a);
+        rows(&second, &a.clone().plus(0.5 * h, &a.product(&predicted)))
     }
 
     /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period.
@@ -226,29 +222,6 @@ impl<'a> Stepping<'a> {
         }
         let size = sum.size();
         Matrix::zeros(size).plus(1.0 / f64::from(self.substeps), &sum)
-    }
-
-    /// The law acts once a period: `s ↦ s - T x`, then `u = -kp x - kd v + ki s` held.
-    fn close(&self, arm: &Matrix, period: f64) -> Matrix {
-        let linear = self.linear;
-        let n = linear.joints();
-        let mut closed = Matrix::zeros(linear.states());
-        for row in 0..2 * n {
-            for j in 0..n {
-                let effort = arm[(row, 2 * n + j)];
-                closed[(row, j)] = arm[(row, j)] - effort * linear.kp[j];
-                closed[(row, n + j)] = arm[(row, n + j)] - effort * linear.kd[j];
-            }
-            for (k, &(joint, ki)) in linear.integrals.iter().enumerate() {
-                let effort = arm[(row, 2 * n + joint)] * ki;
-                closed[(row, 2 * n + k)] = effort;
-                closed[(row, joint)] -= effort * period;
-            }
-        }
-        for (k, &(joint, _)) in linear.integrals.iter().enumerate() {
-            closed[(2 * n + k, joint)] = -1.0;
-        }
-        closed
     }
 
     /// The law acts once a period, for the next period: efforts are states, `u ↦ -kp x - kd v`.
@@ -303,7 +276,7 @@ impl<'a> Stepping<'a> {
             // midpoint.
             let tiny = 1e-3 * start;
             return if self.growth(tiny) < -NEUTRAL {
-                Some(self.bisect(tiny, start))
+                Some(self.boundary(tiny, start))
             } else {
                 Some(0.0)
             };
@@ -317,29 +290,38 @@ impl<'a> Stepping<'a> {
             };
             let next = step * stable;
             if !self.is_stable(next) {
-                return Some(self.bisect(stable, next));
+                return Some(self.boundary(stable, next));
             }
             stable = next;
         }
         None
     }
 
-    /// The boundary between a stable and an unstable period, to some units of rounding.
-    fn bisect(&self, mut stable: f64, mut unstable: f64) -> f64 {
+    fn boundary(&self, stable: f64, unstable: f64) -> f64 {
         // A thousandfold interval takes 60 halvings of its logarithm to come down to 1e-14.
-        for _ in 0..60 {
-            let middle = (stable * unstable).sqrt();
-            if middle <= stable || middle >= unstable || unstable - stable < 1e-13 * stable {
-                break;
-            }
-            if self.is_stable(middle) {
-                stable = middle;
-            } else {
-                unstable = middle;
-            }
-        }
-        stable
+        bisect((stable, unstable), 60, |period| self.is_stable(period))
     }
+}
+
+/// The boundary between a value for which something holds and a larger one for which it does not, to some units of
+/// rounding or after so many halvings of its logarithm.
+pub(crate) fn bisect(
+    (mut holding, mut failing): (f64, f64),
+    halvings: u32,
+    holds: impl Fn(f64) -> bool,
+) -> f64 {
+    for _ in 0..halvings {
+        let middle = (holding * failing).sqrt();
+        if middle <= holding || middle >= failing || failing - holding < 1e-13 * holding {
+            break;
+        }
+        *(if holds(middle) {
+            &mut holding
+        } else {
+            &mut failing
+        }) = middle;
+    }
+    holding
 }
 
 /// `A + h/2 A² + … + h^(p-1)/p! A^p`, by Horner's rule.

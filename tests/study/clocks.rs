@@ -112,7 +112,7 @@ fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_orde
             reference: true,
         };
         let made = at_once(rollout(request)).unwrap();
-        let method = made.deviation.unwrap().largest();
+        let method = made.deviation.unwrap().error;
         (method, made.from_ideal.unwrap().known().unwrap())
     };
     for (method, order) in [

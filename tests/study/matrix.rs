@@ -54,6 +54,43 @@ fn widely_scaled_states_keep_their_slow_eigenvalues() {
     assert!((values[1].0 / -1e-3 - 1.0).abs() < 1e-14);
 }
 
+/// Sums of the eigenvalues and of their squares are traces of the matrix and of its square, however its states are
+/// scaled: some hundred units of rounding of sums of 81 products.
+#[test]
+fn eigenvalues_of_random_matrices_have_the_traces() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    for case in 0..5000 {
+        let n = 1 + case % 9;
+        let scales: Vec<f64> = (0..n).map(|_| 10_f64.powi(rng.i32(-6..=6))).collect();
+        let even = Matrix::from_fn(n, |_, _| 2.0 * rng.f64() - 1.0);
+        let square = even.product(&even);
+        let values = Matrix::from_fn(n, |i, j| even[(i, j)] * scales[i] / scales[j]).eigenvalues();
+        let trace = |matrix: &Matrix| (0..n).map(|i| matrix[(i, i)]).sum::<f64>();
+        let sum: f64 = values.iter().map(|value| value.re).sum();
+        let squares: f64 = values.iter().map(|it| it.re * it.re - it.im * it.im).sum();
+        assert!((sum - trace(&even)).abs() < 1e-12, "{case}: {values:?}");
+        assert!(
+            (squares - trace(&square)).abs() < 1e-12,
+            "{case}: {values:?}"
+        );
+        let crossed: f64 = values.iter().map(|value| value.im).sum();
+        assert_eq!(crossed, 0.0, "{case}: {values:?}");
+    }
+}
+
+/// Without exceptional shifts the iteration never converges on a cyclic permutation.
+#[test]
+fn a_cycle_has_the_roots_of_one_for_eigenvalues() {
+    for n in 3..10 {
+        let cycle = Matrix::from_fn(n, |row, column| {
+            f64::from(u8::from(row == (column + 1) % n))
+        });
+        for value in cycle.eigenvalues() {
+            assert!((value.modulus() - 1.0).abs() < 1e-13, "{n}: {value:?}");
+        }
+    }
+}
+
 #[test]
 fn a_nilpotent_matrix_has_zeros_for_eigenvalues() {
     let matrix = Matrix::from_fn(6, |row, column| f64::from(u8::from(column == row + 3)));

@@ -41,7 +41,7 @@ fn error_within<const N: usize>(
     let every = (steps / 50).max(1);
     let count = steps / every;
     let spacing = candidate.timestep * every as f64;
-    let truth = ReferenceMotion::of(&task.control.arm, &task.start, law, spacing, count);
+    let truth = ReferenceMotion::new(&task.control.arm, &task.start, law, spacing * count as f64);
     let control = task.control.with_method(candidate.method);
     let mut live = control
         .with_timestep(candidate.timestep)
@@ -49,10 +49,10 @@ fn error_within<const N: usize>(
     let tip = |state: &State<N>| -> DVec2 {
         forward(task.control.arm.lengths(), &state.position).position
     };
-    (0..count)
-        .map(|index| {
+    (1..=count)
+        .map(|sample| {
             live.advance(every as u64);
-            tip(live.state()).distance(tip(&truth.state(index).unwrap()))
+            tip(live.state()).distance(tip(&truth.state(spacing * sample as f64)))
         })
         .fold(0.0, f64::max)
 }

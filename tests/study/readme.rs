@@ -28,7 +28,7 @@ fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
 
 /// The fewest steps within `error`, between `least` and the first run of ever half the timestep that is within it.
 fn fewest_steps(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
-    let is_enough = |steps| scene.run_within(method, steps, error).error <= error;
+    let is_enough = |steps| scene.task.run(method, steps, error).error <= error;
     let mut most = OUTPUTS;
     while !is_enough(most) {
         most *= 2;
@@ -40,7 +40,7 @@ fn fewest_steps(scene: &Scene, method: Method, error: f64, least: u64) -> u64 {
 fn the_timestep_and_the_evaluations_are_runs() {
     let all = scenes();
     let swing = all.iter().find(|scene| scene.name == "swing-2").unwrap();
-    let duration = swing.duration;
+    let duration = swing.task.duration;
     let evaluations = |method: Method| {
         let coarse = fewest_steps(swing, method, 1e-2, 1);
         let steps = fewest_steps(swing, method, 1e-4, coarse);
@@ -59,7 +59,7 @@ fn the_timestep_and_the_evaluations_are_runs() {
     // Euler is not within the error in as many steps as a search tries, and takes an evaluation in each.
     let over = printed(README, "as many and Euler over ");
     let tried = 1 << 17;
-    assert!(swing.run_within(Method::Euler, tried, 1e-4).error > 1e-4);
+    assert!(swing.task.run(Method::Euler, tried, 1e-4).error > 1e-4);
     assert!((over * rk4 / tried as f64 - 1.0).abs() < 5e-3, "{over}");
 }
 

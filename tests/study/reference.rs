@@ -31,18 +31,14 @@ fn compare<const N: usize>(case: &Value) {
         position: array(&case["q0"]),
         velocity: array(&case["qdot0"]),
     };
-    let mut before = 0.0;
-    let intervals: Vec<f64> = numbers(&case["times"])
-        .into_iter()
-        .map(|t| t - std::mem::replace(&mut before, t))
-        .collect();
+    let times = numbers(&case["times"]);
     let law = Law::Constant(array(&case["tau"]));
-    let reference = ReferenceMotion::between(&arm, &start, &law, &intervals);
-    for index in 0..reference.samples.len() {
-        let state = reference.state(index).unwrap();
+    let reference = ReferenceMotion::new(&arm, &start, &law, *times.last().unwrap());
+    for (index, time) in times.into_iter().enumerate() {
+        let state = reference.state(time);
         let growth = case["growth_max"][index].as_f64().unwrap();
-        // Stored values are rounded to the nearest double, and so are ours. The intervals are differences of rounded
-        // times, off by up to an ulp of the time: times the rate, that is an error of the same size.
+        // Stored values are rounded to the nearest double, and so are ours. The times are rounded too, by up to an ulp:
+        // times the rate, that is an error of the same size.
         let (exact_q, exact_v) = (
             array::<N>(&case["q"][index]),
             array::<N>(&case["qdot"][index]),
@@ -59,7 +55,7 @@ fn compare<const N: usize>(case: &Value) {
             assert!(v <= v_bound, "{name} {N} {index} {i}: {v:e} > {v_bound:e}");
         }
         // The stored sensitivity bounds what rounding at 106 bits can have done on the way.
-        let own = reference.uncertainty[index];
+        let own = reference.uncertainty(time);
         assert!(
             own <= 1e-27 * growth,
             "{name} {N} {index}: {own:e}, growth {growth:e}"
@@ -105,16 +101,15 @@ fn start() -> State<2> {
 fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     let arm = Arm::<2>::default();
     let continuous = Law::Continuous(GAINS, SETPOINT);
-    let exact = ReferenceMotion::of(&arm, &start(), &continuous, 0.125, 4);
+    let exact = ReferenceMotion::new(&arm, &start(), &continuous, 0.5);
     let distance = |period: f64| {
         let law = Law::Held {
             gains: GAINS,
             setpoint: SETPOINT,
             period,
         };
-        let held = ReferenceMotion::of(&arm, &start(), &law, 0.125, 4);
-        let state = held.state(3).unwrap();
-        exact.angle_error(3, &state.position).unwrap()
+        let held = ReferenceMotion::new(&arm, &start(), &law, 0.5);
+        exact.angle_error(0.5, &held.state(0.5).position)
     };
     let ratio = distance(1.0 / 512.0) / distance(1.0 / 1024.0);
     assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
@@ -154,8 +149,12 @@ fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
 #[test]
 fn a_reference_knows_far_more_digits_than_a_double() {
     let arm = Arm::<3>::default();
-    let reference = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 0.5, 4);
-    assert!(reference.uncertainty.iter().all(|own| *own < 1e-26));
-    assert!(reference.angle_error(0, &[f64::NAN; 3]).unwrap().is_nan());
+    let reference = ReferenceMotion::new(&arm, &State::rest(), &Law::FREE, 2.0);
+    assert!(
+        [0.5, 1.0, 1.5, 2.0]
+            .into_iter()
+            .all(|time| reference.uncertainty(time) < 1e-26)
+    );
+    assert!(reference.angle_error(0.5, &[f64::NAN; 3]).is_nan());
     assert_eq!(DoubleDouble::from(1.5).to_f64(), 1.5);
 }

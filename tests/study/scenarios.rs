@@ -58,7 +58,7 @@ fn scenes_are_shown_by_live_arms() {
             continue;
         };
         assert!(watched.samples.len() > 1, "{}", scene.id);
-        let fragment = scene.fragment();
+        let fragment = &watched.fragment;
         for name in [
             "links", "method", "timestep", "masses", "period", "position",
         ] {

@@ -7,7 +7,7 @@ use pendularm::math::arm::Arm;
 use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::report::experiments::measure::{growth_per_period, measured_limit};
+use pendularm::report::experiments::measure::{LimitPair, growth_per_period};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
@@ -214,12 +214,10 @@ fn measure_all<const N: usize>(pose: [f64; N]) -> f64 {
         for method in Method::ALL {
             for sampling in Sampling::ALL {
                 let control = control.with_method(method);
-                let linear = Linear::at_setpoint(&control);
-                let predicted = largest_timestep(&linear, method, sampling).unwrap();
-                let measured = measured_limit(&control, sampling, 0.9 * predicted).unwrap();
-                let error = (measured / predicted - 1.0).abs();
+                let limit = LimitPair::of_timestep(&control, sampling);
+                let error = limit.off().unwrap();
                 println!(
-                    "{N} {kind} {method} {}: {measured:.5e} measured, {predicted:.5e} predicted, {error:.1e}",
+                    "{N} {kind} {method} {}: {limit}, {error:.1e}",
                     sampling.name()
                 );
                 worst = worst.max(error);

@@ -57,10 +57,10 @@ fn start<const N: usize>() -> State<N> {
 }
 
 fn reference<const N: usize>() {
-    let motion = ReferenceMotion::of(&Arm::<N>::default(), &start(), &Law::FREE, DURATION, 1);
-    let end = motion.state(0).expect("one sample").position;
+    let motion = ReferenceMotion::new(&Arm::<N>::default(), &start(), &Law::FREE, DURATION);
+    let end = motion.state(DURATION).position;
     let angles: Vec<String> = end.iter().map(|q| format!("{q:?}")).collect();
-    println!("{} {:e}", angles.join(" "), motion.uncertainty[0]);
+    println!("{} {:e}", angles.join(" "), motion.uncertainty(DURATION));
 }
 
 /// A line for a setting: its error, and the shortest time of its runs. False if the sweep has come to its end.
@@ -128,9 +128,9 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
         "pendularm in twice the digits (twice)",
         1e-32,
         || {
-            let motion =
-                ReferenceMotion::of(&arm, &black_box(start::<N>()), &Law::FREE, DURATION, 1);
-            motion.state(0).map(|state| state.position)
+            let start = black_box(start::<N>());
+            let motion = ReferenceMotion::new(&arm, &start, &Law::FREE, DURATION);
+            Some(motion.state(DURATION).position)
         },
     );
     ode_solvers::<N, M>(truth, &arm);

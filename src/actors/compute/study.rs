@@ -13,14 +13,14 @@ use tokio::sync::oneshot;
 use super::answering::answer;
 use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
-use crate::actors::node::{Call, Reply, Unserved};
+use crate::actors::node::{Call, Unserved};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
+use crate::services::study::Computed;
 pub use crate::services::study::{
     NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
     RunOffline, SuggestGains, Suggested,
 };
-use crate::services::study::{Present, RolloutWork, Work};
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
 
@@ -39,21 +39,7 @@ impl<const N: usize> Study<N> {
         Self { arm, workers }
     }
 
-    /// Requests the arm's present settings, then passes the work to the workers.
-    fn begin<T: Send + 'static, W: Work<T> + 'static>(
-        &self,
-        mut reply: Reply<T>,
-        ctx: &mut Context<Self>,
-        work: impl FnOnce(Present<N>) -> W + 'static,
-    ) {
-        let present = self.arm.send(ArmSettings).into_actor(self);
-        ctx.spawn(present.map(move |present, study, _| match present {
-            Ok(present) => answer(&study.workers, reply, work(present)),
-            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
-        }));
-    }
-
-    /// Adds this node's services to the registry's table.
+    /// Enters this node's services into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
         nodes.serve_long::<RunOffline<N>>(Service::Rollout, address.clone());
@@ -70,39 +56,17 @@ impl<const N: usize> Actor for Study<N> {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Call<PredictStability<N>>> for Study<N> {
+/// Asks the arm for its present settings, then hands the work to the workers.
+impl<const N: usize, A: Computed<N>> Handler<Call<A>> for Study<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<PredictStability<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| ask.work(present));
-    }
-}
-
-impl<const N: usize> Handler<Call<RunOffline<N>>> for Study<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<RunOffline<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        self.begin(reply, ctx, move |present| RolloutWork::new(&ask, present));
-    }
-}
-
-impl<const N: usize> Handler<Call<SuggestGains<N>>> for Study<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<SuggestGains<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| ask.work(present));
-    }
-}
-
-impl<const N: usize> Handler<Call<PlanRun<N>>> for Study<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<PlanRun<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        self.begin(reply, ctx, |present| ask.work(present));
+    fn handle(&mut self, call: Call<A>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        let present = self.arm.send(ArmSettings).into_actor(self);
+        ctx.spawn(present.map(move |present, study, _| match present {
+            Ok(present) => answer(&study.workers, reply, ask.work(present)),
+            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
+        }));
     }
 }
 

@@ -10,10 +10,10 @@
 
 use super::error::{REACH_GAINS, REACH_SETPOINT};
 use super::reference::{
-    Law, ReferenceMotion, ReferencePath, distance, exact_steps, largest_difference,
+    DoubleDouble, Law, ReferenceMotion, distance, exact_steps, largest_difference,
 };
 use crate::math::arm::{Arm, State};
-use crate::math::count::{in_f64, length_in_f64};
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::largest;
@@ -41,7 +41,7 @@ pub struct Parts {
 pub struct Budget {
     control: ControlLoop<2>,
     duration: f64,
-    law: ReferencePath<2>,
+    law: ReferenceMotion<2>,
 }
 
 impl Budget {
@@ -57,7 +57,7 @@ impl Budget {
         Self {
             control,
             duration,
-            law: ReferencePath::new(&control.arm, &State::rest(), &law, duration),
+            law: ReferenceMotion::new(&control.arm, &State::rest(), &law, duration),
         }
     }
 
@@ -68,9 +68,12 @@ impl Budget {
         let timestep = self.duration / in_f64(steps);
         let looks = usize::try_from(steps).map_or(MOST_LOOKS, |steps| steps.clamp(1, MOST_LOOKS));
         let every = steps / looks as u64;
-        let law: Vec<_> = (1..=looks as u64)
-            .map(|look| self.law.after(look * every, timestep))
-            .collect();
+        let angles = |motion: &ReferenceMotion<2>| -> Vec<[DoubleDouble; 2]> {
+            let steps = (1..=looks as u64).map(|look| in_f64(look * every));
+            let times = steps.map(|steps| DoubleDouble::from(timestep) * steps);
+            times.map(|time| motion.angles(time)).collect()
+        };
+        let law = angles(&self.law);
         let held = Law::Held {
             gains: self.control.gains,
             setpoint: self.control.setpoint,
@@ -79,9 +82,7 @@ impl Budget {
         let plant = if self.control.is_free() {
             law.clone()
         } else {
-            let spacing = self.duration / length_in_f64(looks);
-            let plant = ReferenceMotion::of(arm, &start, &held, spacing, looks).samples;
-            plant.into_iter().map(|(angles, _)| angles).collect()
+            angles(&ReferenceMotion::new(arm, &start, &held, self.duration))
         };
         let parts = |&method| {
             let exact = exact_steps(arm, &start, &held, method, timestep, every, looks);

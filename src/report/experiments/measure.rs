@@ -9,12 +9,14 @@
 //! How fast a deviation grows per control period shows once it is scaled back to the size of the nudge after every
 //! period. So the fastest mode alone is left, and neither dies in rounding nor leaves the linear range.
 //!
-//! **Invariant:** no prediction enters but the equilibrium and a timestep to start the search from.
+//! **Invariant:** no prediction enters a measurement but the equilibrium and a value to start the search from.
 
 #![allow(
     clippy::indexing_slicing,
     reason = "indices run over 0..N and 0..2N of arrays of these lengths"
 )]
+
+use std::fmt;
 
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{gravity_load, mass_matrix};
@@ -23,9 +25,9 @@ use crate::math::simulation::{Checkpoint, ControlPeriod, Held, Simulation};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
-use crate::study::linear::{Equilibrium, equilibrium, gravity_gradient};
+use crate::study::linear::{Equilibrium, Linear, equilibrium, gravity_gradient};
 use crate::study::matrix::largest;
-use crate::study::stability::Sampling;
+use crate::study::stability::{Sampling, Stepping, bisect, largest_timestep};
 
 /// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold
 /// meanwhile.
@@ -53,32 +55,72 @@ const HALVINGS: u32 = 15;
 /// Widenings of the search interval before the search is given up.
 const WIDENINGS: u32 = 12;
 
-/// The largest timestep \[s\] at which a deviation of the loop decays, searched around `guess`. `None` if no timestep
-/// within a factor of about a thousand separates decay from growth.
-#[must_use]
-pub fn measured_limit<const N: usize>(
-    control: &ControlLoop<N>,
-    sampling: Sampling,
-    guess: f64,
-) -> Option<f64> {
-    boundary(guess, |timestep| {
-        decays(growth(&control.with_timestep(timestep), sampling))
-    })
+/// A limit of a loop \[s\], predicted and measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitPair {
+    /// By the linearised loop; none where no timestep is stable, or none limits.
+    pub predicted: Option<f64>,
+    /// By the arm itself, searched around the prediction; none if no value within a factor of about a thousand of it
+    /// separates decay from growth.
+    pub measured: Option<f64>,
 }
 
-/// As [`measured_limit`] for the control period, with `substeps` steps of the method in each; `delay`: every effort
-/// acts one period late.
-#[must_use]
-pub fn measured_period<const N: usize>(
-    control: &ControlLoop<N>,
-    guess: f64,
-    substeps: u32,
-    delay: bool,
-) -> Option<f64> {
-    boundary(guess, |period| {
-        let control = in_substeps(&control.with_timestep(period), substeps, delay);
-        decays(growth(&control, Sampling::Held))
-    })
+impl LimitPair {
+    /// Of the timestep, with the law held for a step or in every stage.
+    #[must_use]
+    pub fn of_timestep<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Self {
+        let linear = Linear::at_setpoint(control);
+        let predicted = largest_timestep(&linear, control.method, sampling);
+        Self::of(predicted, |timestep| {
+            growth(&control.with_timestep(timestep), sampling)
+        })
+    }
+
+    /// Of the control period, with `substeps` steps of the method in each; `delay`: every effort acts one period late.
+    #[must_use]
+    pub fn of_period<const N: usize>(control: &ControlLoop<N>, substeps: u32, delay: bool) -> Self {
+        let linear = Linear::at_setpoint(control);
+        let stepping = Stepping::held(&linear, control.method, substeps, delay);
+        Self::of(stepping.limit(), |period| {
+            let control = in_substeps(&control.with_timestep(period), substeps, delay);
+            growth(&control, Sampling::Held)
+        })
+    }
+
+    fn of(predicted: Option<f64>, growth: impl Fn(f64) -> Option<f64>) -> Self {
+        let predicted = predicted.filter(|limit| *limit > 0.0);
+        // The prediction itself is none of the values that are tried.
+        let measure = |predicted: f64| boundary(0.9 * predicted, |limit| decays(growth(limit)));
+        Self {
+            predicted,
+            measured: predicted.and_then(measure),
+        }
+    }
+
+    /// How far the measured limit is from the predicted one, as a part of it; none without a limit.
+    #[must_use]
+    pub fn off(&self) -> Option<f64> {
+        let measured = self.measured.unwrap_or(f64::INFINITY);
+        Some((measured / self.predicted? - 1.0).abs())
+    }
+
+    /// Whether both are there, and agree to 1 %.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.off().is_some_and(|off| off < 0.01)
+    }
+}
+
+impl fmt::Display for LimitPair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [predicted, measured] = [self.predicted, self.measured].map(short);
+        write!(f, "predicted {predicted} s, measured {measured} s")
+    }
+}
+
+/// A limit as a table shows it.
+pub(super) fn short(value: Option<f64>) -> String {
+    value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4e}"))
 }
 
 /// Whether a deviation with this growth of its energy dies out.
@@ -120,8 +162,8 @@ pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> O
     };
     let (mut early, mut late) = (0.0_f64, 0.0_f64);
     for period in 0..STEPS {
-        for _ in 0..every {
-            run.step()?;
+        if run.advance(every) < every {
+            return None;
         }
         let energy = energy_of(run.state())?;
         if energy == 0.0 {
@@ -265,15 +307,7 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
         } else if holds(above) {
             (below, above) = (above, 2.0 * above);
         } else {
-            for _ in 0..HALVINGS {
-                let middle = (below * above).sqrt();
-                *(if holds(middle) {
-                    &mut below
-                } else {
-                    &mut above
-                }) = middle;
-            }
-            return Some(below);
+            return Some(bisect((below, above), HALVINGS, holds));
         }
     }
     None

@@ -5,6 +5,7 @@
 //! | [`measure`] | the largest stable timestep and the growth per control period, measured on the arm itself |
 //! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
 //! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
+//! | [`task`] | error and cost of a run of a motion by any solver |
 //! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
 //! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
 //! | [`budget`] | truncation, rounding and control hold, apart |
@@ -28,3 +29,4 @@ pub mod reference;
 pub mod scenarios;
 pub mod step_scene;
 pub mod stiff;
+pub mod task;

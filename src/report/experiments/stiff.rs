@@ -17,26 +17,29 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "indices run over the four states and the four stages of arrays of these lengths"
+    reason = "indices run over the four states of arrays of that length"
 )]
 
 use std::f64::consts::FRAC_PI_2;
 
+use super::task::{Task, TaskRun};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, mass_matrix};
-use crate::math::integrator::{Method, increment};
+use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
+use crate::study::beside::Steppable;
+use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, gravity_gradient};
-use crate::study::matrix::Matrix;
+use crate::study::matrix::{Matrix, largest};
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// Simulated time of a run \[s\].
 pub const DURATION: f64 = 2.0;
 
 /// Instants at which a run is compared.
-pub const OUTPUTS: u64 = 8;
+const OUTPUTS: u64 = 8;
 
 /// Steps of the reference.
 const REFERENCE_STEPS: u64 = 1 << 15;
@@ -96,26 +99,12 @@ pub enum By {
 type Whole = [f64; 4];
 
 /// A braked arm.
-#[derive(Debug, Clone)]
 pub struct StiffScene {
     control: ControlLoop<2>,
     /// The elbow's rate per that of the swing.
     pub ratio: f64,
-    /// Positions at the outputs.
-    reference: Vec<[f64; 2]>,
-    /// How far two references of different methods are apart \[rad\].
-    pub uncertainty: f64,
-}
-
-/// A run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StiffRun {
-    /// Steps taken.
-    pub steps: u64,
-    /// Evaluations of the dynamics.
-    pub evaluations: u64,
-    /// Largest error of a joint at the outputs \[rad\]; infinite where the run left the finite numbers.
-    pub error: f64,
+    /// The motion, whose reference is known at eight instants.
+    pub task: Task<Solver>,
 }
 
 const START: State<2> = State {
@@ -150,27 +139,35 @@ impl StiffScene {
             kd: [0.0, brake],
         };
         let (swing, mobility) = rates(&arm);
-        let mut scene = Self {
-            control: ControlLoop::new(arm, gains, Setpoint::default()),
-            ratio: brake * mobility / swing,
-            reference: vec![],
-            uncertainty: 0.0,
+        let control = ControlLoop::new(arm, gains, Setpoint::default());
+        let outputs = |solver| -> Vec<Vec<f64>> {
+            let mut run = ready(&control, solver, REFERENCE_STEPS);
+            let output = |_| {
+                run.advance(REFERENCE_STEPS / OUTPUTS);
+                run.place().to_vec()
+            };
+            (0..OUTPUTS).map(output).collect()
         };
-        let fine = scene.march(Solver::Rodas3, REFERENCE_STEPS).0;
-        let other = scene.march(Solver::ImplicitMidpoint, REFERENCE_STEPS).0;
-        scene.uncertainty = apart(&fine, &other);
-        scene.reference = fine;
-        scene
-    }
-
-    /// A run of `steps` steps, a multiple of [`OUTPUTS`].
-    #[must_use]
-    pub fn run(&self, solver: Solver, steps: u64) -> StiffRun {
-        let (positions, evaluations) = self.march(solver, steps);
-        StiffRun {
-            steps,
-            evaluations,
-            error: apart(&self.reference, &positions),
+        let [fine, other] = [Solver::Rodas3, Solver::ImplicitMidpoint].map(outputs);
+        let differences = fine
+            .iter()
+            .zip(&other)
+            .map(|(one, other)| apart(one, other));
+        Self {
+            control,
+            ratio: brake * mobility / swing,
+            task: Task {
+                duration: DURATION,
+                uncertainty: largest(differences),
+                looks: OUTPUTS,
+                unit: OUTPUTS,
+                ready: Box::new(move |solver, steps| ready(&control, solver, steps)),
+                distance: Box::new(move |done, steps, place| {
+                    let output = usize::try_from(done * OUTPUTS / steps).unwrap_or(0);
+                    fine.get(output.saturating_sub(1))
+                        .map_or(f64::NAN, |fine| apart(fine, place))
+                }),
+            },
         }
     }
 
@@ -184,90 +181,109 @@ impl StiffScene {
         let limit = largest_timestep(&linear, method, Sampling::Continuous)?;
         Some(DURATION / limit)
     }
+}
 
-    /// Positions at the outputs, as far as numbers go, and evaluations.
-    fn march(&self, solver: Solver, steps: u64) -> (Vec<[f64; 2]>, u64) {
-        let h = DURATION / in_f64(steps);
-        let every = (steps / OUTPUTS).max(1);
-        let (mut positions, mut evaluations) = (Vec::new(), 0);
-        let [a, b] = START.position;
-        let mut y = [a, b, 0.0, 0.0];
-        for step in 1..=steps {
-            let finite = match solver {
-                Solver::Explicit(method) => self.explicit(method, &mut y, h, &mut evaluations),
-                Solver::Rodas3 => self.rodas3(&mut y, h, &mut evaluations),
-                Solver::ImplicitMidpoint => self.implicit_midpoint(&mut y, h, &mut evaluations),
-            };
-            if finite.is_none() {
-                break;
-            }
-            if step.is_multiple_of(every) {
-                positions.push([y[0], y[1]]);
+/// A run of a solver with so many steps, before its first.
+fn ready(control: &ControlLoop<2>, solver: Solver, steps: u64) -> Box<dyn TaskRun> {
+    let h = DURATION / in_f64(steps);
+    let step: fn(&mut Implicit) -> Option<Whole> = match solver {
+        Solver::Explicit(method) => {
+            let control = control.with_method(method).with_timestep(h);
+            let run = ContinuousLoop::new(control, START, [0.0; 2]);
+            let run: Box<dyn Steppable<2>> = Box::new(run);
+            return Box::new(run);
+        }
+        Solver::ImplicitMidpoint => Implicit::midpoint,
+        Solver::Rodas3 => Implicit::rodas3,
+    };
+    let [a, b] = START.position;
+    Box::new(Implicit {
+        control: *control,
+        step,
+        h,
+        y: [a, b, 0.0, 0.0],
+        evaluations: 0,
+    })
+}
+
+/// The run of a baseline.
+struct Implicit {
+    control: ControlLoop<2>,
+    /// The change in a step; none where it can't be computed.
+    step: fn(&mut Self) -> Option<Whole>,
+    /// Length of a step \[s\].
+    h: f64,
+    y: Whole,
+    evaluations: u64,
+}
+
+impl TaskRun for Implicit {
+    fn advance(&mut self, steps: u64) -> u64 {
+        for taken in 0..steps {
+            let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
+            self.y = moved(&self.y, 1.0, &change);
+            if !self.y.iter().all(|y| y.is_finite()) {
+                return taken;
             }
         }
-        (positions, evaluations)
+        steps
     }
 
-    /// A step of the law in every stage.
-    fn explicit(&self, method: Method, y: &mut Whole, h: f64, evaluations: &mut u64) -> Option<()> {
-        let acceleration = |_: f64, q: &[f64; 2], v: &[f64; 2]| {
-            let [.., a, b] = self.slope(&[q[0], q[1], v[0], v[1]], evaluations);
-            [a, b]
-        };
-        let (q, v) = ([y[0], y[1]], [y[2], y[3]]);
-        let (dq, dv) = increment(method, acceleration, 0.0, &q, &v, h);
-        add(y, &[dq[0], dq[1], dv[0], dv[1]])
+    fn place(&self) -> &[f64] {
+        &self.y[..2]
     }
 
-    fn slope(&self, y: &Whole, evaluations: &mut u64) -> Whole {
-        *evaluations += 1;
+    fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+}
+
+impl Implicit {
+    fn slope(&mut self, y: &Whole) -> Whole {
+        self.evaluations += 1;
         let (q, v) = ([y[0], y[1]], [y[2], y[3]]);
         let kd = &self.control.gains.kd;
         let a = forward_dynamics(&self.control.arm, &q, &v, &[-kd[0] * v[0], -kd[1] * v[1]]);
         [v[0], v[1], a[0], a[1]]
     }
 
-    /// `∂f/∂y` by differences, `f` at `y` being known.
-    fn jacobian(&self, y: &Whole, f: &Whole, evaluations: &mut u64) -> Matrix {
+    /// `f` at the present state, and `∂f/∂y` by differences.
+    fn jacobian(&mut self) -> (Whole, Matrix) {
+        let y = self.y;
+        let f = self.slope(&y);
         let mut jacobian = Matrix::zeros(4);
         for column in 0..4 {
             let nudge = 1e-7 * (1.0 + y[column].abs());
-            let mut near = *y;
+            let mut near = y;
             near[column] += nudge;
-            let moved = self.slope(&near, evaluations);
+            let moved = self.slope(&near);
             for row in 0..4 {
                 jacobian[(row, column)] = (moved[row] - f[row]) / (near[column] - y[column]);
             }
         }
-        jacobian
+        (f, jacobian)
     }
 
-    fn implicit_midpoint(&self, y: &mut Whole, h: f64, evaluations: &mut u64) -> Option<()> {
-        let start = self.slope(y, evaluations);
-        let jacobian = self.jacobian(y, &start, evaluations);
+    fn midpoint(&mut self) -> Option<Whole> {
+        let (y, h) = (self.y, self.h);
+        let (mut k, jacobian) = self.jacobian();
         let newton = jacobian.shifted_identity(-0.5 * h);
-        let mut k = start;
         for _ in 0..MAX_ITERATIONS {
-            let middle = std::array::from_fn(|i| y[i] + 0.5 * h * k[i]);
-            let f = self.slope(&middle, evaluations);
+            let f = self.slope(&moved(&y, 0.5 * h, &k));
             let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
-            let change = newton.solve(&left)?;
-            let mut done = true;
-            for i in 0..4 {
-                k[i] += change[i];
-                done &= (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs());
-            }
-            if done {
+            let change: Whole = newton.solve(&left)?.try_into().ok()?;
+            k = moved(&k, 1.0, &change);
+            if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
                 break;
             }
         }
-        add(y, &std::array::from_fn(|i| h * k[i]))
+        Some(k.map(|k| h * k))
     }
 
     /// In the form `(I/(γh) - J) k = f(y + …) + …/h`, γ = 1/2.
-    fn rodas3(&self, y: &mut Whole, h: f64, evaluations: &mut u64) -> Option<()> {
-        let start = self.slope(y, evaluations);
-        let jacobian = self.jacobian(y, &start, evaluations);
+    fn rodas3(&mut self) -> Option<Whole> {
+        let (y, h) = (self.y, self.h);
+        let (start, jacobian) = self.jacobian();
         let matrix = Matrix::from_fn(4, |i, j| {
             let diagonal = if i == j { 2.0 / h } else { 0.0 };
             diagonal - jacobian[(i, j)]
@@ -278,31 +294,25 @@ impl StiffScene {
         };
         let k1 = stage(&start, &[0.0; 4])?;
         let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let ahead: Whole = std::array::from_fn(|i| y[i] + 2.0 * k1[i]);
-        let f3 = self.slope(&ahead, evaluations);
+        let f3 = self.slope(&moved(&y, 2.0, &k1));
         let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead: Whole = std::array::from_fn(|i| y[i] + 2.0 * k1[i] + k3[i]);
-        let f4 = self.slope(&ahead, evaluations);
+        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
+        let f4 = self.slope(&ahead);
         let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
         let k4 = stage(&f4, &others)?;
-        add(y, &std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
+        Some(std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
     }
 }
 
-/// Adds a step; none where numbers end.
-fn add(y: &mut Whole, change: &Whole) -> Option<()> {
-    for (y, change) in y.iter_mut().zip(change) {
-        *y += change;
-    }
-    y.iter().all(|y| y.is_finite()).then_some(())
+fn moved(y: &Whole, length: f64, way: &Whole) -> Whole {
+    std::array::from_fn(|i| y[i] + length * way[i])
 }
 
-/// Largest distance of a joint \[rad\]; infinite where one ended early.
-fn apart(reference: &[[f64; 2]], positions: &[[f64; 2]]) -> f64 {
-    if positions.len() < reference.len() {
-        return f64::INFINITY;
-    }
-    let both = reference.iter().flatten().zip(positions.iter().flatten());
-    both.map(|(one, other)| (one - other).abs())
-        .fold(0.0, f64::max)
+/// Largest distance of a joint \[rad\].
+fn apart(one: &[f64], other: &[f64]) -> f64 {
+    largest(
+        one.iter()
+            .zip(other)
+            .map(|(one, other)| (one - other).abs()),
+    )
 }

@@ -53,9 +53,9 @@ pub(super) fn make(section: &mut Section) {
         digits => number(digits),
     };
     section.find(format!(
-        "**With a last link 10⁹ times lighter or heavier than the others, bent and stretched arms lose at most {} of \
-         16 digits**. With the second link folded back onto the first they lose up to {}. At most {} of them are the \
-         arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix loses up to {dense}.",
+        "**With a last link up to 10⁹ times lighter or heavier than the others, bent and stretched arms lose at most \
+         {} of 16 digits**. With the second link folded back onto the first they lose up to {}. At most {} of them are \
+         the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix loses up to {dense}.",
         number(straight),
         number(folded),
         number(own),

@@ -3,11 +3,12 @@
 //! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
 //! nothing is interpolated between two runs.
 
-use super::fit::{fewest_of, slope, worst};
+use super::fit::{slope, worst};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::error::{OUTPUTS, REACH, RunOutcome, Scene, scenes};
-use crate::report::section::{Cell, Section, Table, by_method};
+use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes};
+use crate::report::experiments::task::{LOST, RunOutcome};
+use crate::report::section::{Cell, Section, Table};
 use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, scientific, seconds};
 use crate::report::timing::{Effort, Timing, time};
 
@@ -53,7 +54,6 @@ pub(super) fn make(section: &mut Section) {
     section.table(&cheapest(&data));
     against_time(section, &data);
     against_timestep(section, &data);
-    section.table(&orders(&data));
     section.table(&scene_list(&data));
 }
 
@@ -62,13 +62,13 @@ impl Data {
         let run = |method, outcome: RunOutcome| Run {
             method,
             outcome,
-            timing: time(effort, || scene.replay(method, outcome.steps)),
+            timing: time(effort, || scene.task.replay(method, outcome.steps)),
         };
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
         let steps = steps.filter(|steps| *steps <= scene.most_steps);
         let both = steps.flat_map(|steps| Method::ALL.map(|method| (method, steps)));
         let runs: Vec<Run> = both
-            .map(|(method, steps)| run(method, scene.run(method, steps)))
+            .map(|(method, steps)| run(method, scene.task.run(method, steps, LOST)))
             .collect();
         let mut reached = Vec::new();
         for method in Method::ALL {
@@ -82,11 +82,8 @@ impl Data {
                         *of == method && it.error <= target && it.steps <= MOST_SEARCHED
                     });
                 let fewest = enough.and_then(|(_, outcome)| {
-                    fewest_of(
-                        (least, outcome.steps, RESOLUTION),
-                        |steps| scene.run_within(method, steps, target),
-                        |outcome| outcome.error <= target,
-                    )
+                    let steps = (least, outcome.steps);
+                    scene.task.fewest(method, target, steps, RESOLUTION)
                 });
                 least = fewest.map_or(least, |outcome| outcome.steps);
                 reached.extend(fewest.map(|outcome| (target, run(method, outcome))));
@@ -130,7 +127,7 @@ impl Data {
     /// Time of one step \[s\]: the least that any long run shows.
     fn step_time(&self, method: Method) -> Option<f64> {
         let runs = self.long_runs().filter(|run| run.method == method);
-        runs.filter(|run| run.outcome.diverged.is_none())
+        runs.filter(|run| run.outcome.error.is_finite())
             .map(|run| run.timing.minimum / in_f64(run.outcome.steps))
             .min_by(f64::total_cmp)
     }
@@ -181,36 +178,14 @@ fn cheapest(data: &[Data]) -> Table {
                 let more = number(evaluations(next) / evaluations(run));
                 format!("; {} ×{more}", next.method)
             });
-            let per_second = (evaluations(run) / data.scene.duration).round();
+            let per_second = (evaluations(run) / data.scene.task.duration).round();
             Cell::method(run.method).detail(format!(
                 "dt {}; {} evaluations, {} per s{}",
                 seconds(run.outcome.timestep),
                 number(per_second),
-                seconds(run.timing.minimum / data.scene.duration),
+                seconds(run.timing.minimum / data.scene.task.duration),
                 next.unwrap_or_default()
             ))
-        });
-        let title = Cell::new(data.scene.title);
-        table.rows.push([title].into_iter().chain(cells).collect());
-    }
-    table
-}
-
-fn orders(data: &[Data]) -> Table {
-    let mut table = Table::new(
-        "orders",
-        "Fitted orders",
-        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad. Under it: the \
-         smallest error that any timestep gave.",
-        by_method(&["Scene"]),
-    );
-    for data in data {
-        let cells = Method::ALL.map(|method| {
-            let errors = data.of(method).map(|run| run.outcome.error);
-            let order = data.order(method).map(|order| format!("{order:.2}"));
-            let least = scientific(errors.fold(f64::INFINITY, f64::min));
-            let order = Cell::new(order.unwrap_or_else(|| "too few points".to_owned()));
-            order.detail(format!("down to {least}"))
         });
         let title = Cell::new(data.scene.title);
         table.rows.push([title].into_iter().chain(cells).collect());
@@ -226,7 +201,7 @@ fn scene_list(data: &[Data]) -> Table {
         ["Scene", "Parameters", "Uncertainty"],
     );
     let row = |Data { scene, .. }: &Data| {
-        let uncertainty = scientific(scene.uncertainty);
+        let uncertainty = scientific(scene.task.uncertainty);
         vec![
             Cell::new(scene.title),
             Cell::new(&scene.about),
@@ -291,7 +266,7 @@ fn against_time(section: &mut Section, data: &[Data]) {
             "An error of 10⁻⁶ rad costs RK4 {} and Verlet {} of computing time for {} s of a free swing",
             seconds(rk4.timing.minimum),
             seconds(verlet.timing.minimum),
-            number(data.scene.duration)
+            number(data.scene.task.duration)
         ),
         _ => "Error against time".to_owned(),
     };
@@ -315,7 +290,7 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
     let mut plots = plots(data, &x, |run| (run.outcome.timestep, None));
     for (plot, data) in plots.iter_mut().zip(data) {
         let ends = [plot.y.min, plot.y.max];
-        let limits = data.scene.predicted_limits().map(|(method, limit)| {
+        let limits = data.scene.limits.iter().map(|&(method, limit)| {
             let key = Key::line(method.name(), "").dashed();
             Curve::line(key, ends.map(|y| (limit, y)))
         });
@@ -361,9 +336,9 @@ fn findings(section: &mut Section, data: &[Data]) {
         section.find(format!(
             "**To stay within 10⁻⁴ rad of the true motion on a free 2-link swing of {} s RK4 takes steps of {}**, and \
              {} evaluations per simulated second. Verlet needs {} times as many and Euler {euler} times.",
-            number(swing.scene.duration),
+            number(swing.scene.task.duration),
             seconds(rk4.outcome.timestep),
-            number((evaluations(rk4) / swing.scene.duration).round()),
+            number((evaluations(rk4) / swing.scene.task.duration).round()),
             times(evaluations(verlet)),
         ));
     }
@@ -423,7 +398,7 @@ fn verdicts(section: &mut Section, data: &[Data]) {
     let smallest = errors
         .filter(|error| *error > 0.0)
         .fold(f64::INFINITY, f64::min);
-    let uncertainty = worst(data.iter().map(|data| data.scene.uncertainty));
+    let uncertainty = worst(data.iter().map(|data| data.scene.task.uncertainty));
     section.claim(
         "References are at least 100 times better known than the smallest error shown",
         format!(

@@ -1,28 +1,8 @@
-//! Slopes of lines through points, cells of a map, the cheapest of runs, and the worst of many numbers.
+//! Slopes of lines through points, cells of a map, and the worst of many numbers.
 //!
 //! **Invariant:** there is one more edge than cells, and a cell is measured between two of them.
 
 use crate::math::count::length_in_f64;
-use crate::study::fewest::fewest;
-use crate::study::paused::at_once;
-
-/// The run with the fewest steps among those of a search that are good enough; see [`fewest`] for its numbers.
-pub(super) fn fewest_of<R: Copy>(
-    (first, most, part): (u64, u64, u64),
-    run: impl Fn(u64) -> R,
-    is_enough: impl Fn(&R) -> bool,
-) -> Option<R> {
-    let mut best = None;
-    at_once(fewest(first, most, part, |steps| {
-        let made = run(steps);
-        let is_enough = is_enough(&made);
-        if is_enough {
-            best = Some(made);
-        }
-        is_enough
-    }));
-    best
-}
 
 /// Slope of the least-squares line through `(log x, log y)` of positive numbers; `None` for fewer than two.
 pub(super) fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {

@@ -104,8 +104,8 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
         plot.add(Curve::dots(Key::line("ink", ""), lost));
     }
     let (link, note) = match watched {
-        Ok(_) => (
-            format!("{PAGE}{}", live.fragment()),
+        Ok(watched) => (
+            format!("{PAGE}{}", watched.fragment),
             format!("{}, ±{} rad", seconds(live.seconds()), number(largest)),
         ),
         Err(why) => (String::new(), why),

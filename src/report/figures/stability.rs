@@ -10,14 +10,14 @@ use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::report::experiments::measure::{
-    STEPS, decays, growth, growth_per_period, measured_limit, stiffened,
+    LimitPair, STEPS, decays, growth, growth_per_period, stiffened,
 };
 use crate::report::section::{Cell, Section, Table, by_method};
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{
-    Limits, Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
+    Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
 
 pub(super) fn make(section: &mut Section) {
@@ -29,47 +29,35 @@ pub(super) fn make(section: &mut Section) {
     section.table(&limits_table(&lines));
 }
 
-/// Predicted and measured limit of a loop \[s\], the smallest of all poses, and the advice. A loop that is stable at no
-/// timestep has none.
-struct LimitCase {
+/// A row of limits: of each method, with the smallest of all poses \[s\] and the advice \[s\].
+struct LimitRow {
     loop_name: String,
     sampling: Sampling,
-    method: Method,
-    predicted: Option<f64>,
-    measured: Option<f64>,
-    others: [Option<f64>; 2],
+    limits: [(LimitPair, [Option<f64>; 2]); Method::ALL.len()],
 }
 
-impl LimitCase {
-    /// How far the measured limit is from the predicted one, as a part of it; none without a limit.
-    fn off(&self) -> Option<f64> {
-        let measured = self.measured.unwrap_or(f64::INFINITY);
-        Some((measured / self.predicted? - 1.0).abs())
+fn cell((limit, others): &(LimitPair, [Option<f64>; 2])) -> Cell {
+    let Some(predicted) = limit.predicted else {
+        return Cell::new("none").class("bad");
+    };
+    let measured = limit.measured.map_or_else(|| "none".to_owned(), seconds);
+    let mut details = vec![format!("measured {measured}")];
+    for (name, limit) in ["all poses", "advised"].into_iter().zip(others) {
+        details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
     }
-
-    fn cell(&self) -> Cell {
-        let Some(predicted) = self.predicted else {
-            return Cell::new("none").class("bad");
-        };
-        let said = |limit: Option<f64>| limit.map_or_else(|| "none".to_owned(), seconds);
-        let mut details = vec![format!("measured {}", said(self.measured))];
-        for (name, limit) in ["all poses", "advised"].into_iter().zip(self.others) {
-            details.extend(limit.map(|limit| format!("{name} {}", seconds(limit))));
-        }
-        Cell::new(seconds(predicted)).detail(details.join(", "))
-    }
+    Cell::new(seconds(predicted)).detail(details.join(", "))
 }
 
 /// The loops of 2 links and of 3.
-fn loops() -> Vec<LimitCase> {
-    let two = |name, kp, kd| cases(name, proportional(kp, kd), [0.4, 0.8]);
-    let three = |name, kp, kd| cases(name, proportional(kp, kd), [0.4, 0.8, -0.5]);
+fn loops() -> Vec<LimitRow> {
+    let two = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8]);
+    let three = |name, kp, kd| rows(name, proportional(kp, kd), [0.4, 0.8, -0.5]);
     [
         two("mild", [200.0, 100.0], [30.0, 12.0]),
-        cases("default", Gains::default(), [0.4, 0.8]),
+        rows("default", Gains::default(), [0.4, 0.8]),
         two("stiff", [1e4; 2], [200.0, 60.0]),
         two("overdamped", [200.0; 2], [500.0; 2]),
-        cases("default", Gains::default(), [0.4, 0.8, -0.5]),
+        rows("default", Gains::default(), [0.4, 0.8, -0.5]),
         three("stiff", [1e4; 3], [300.0, 100.0, 30.0]),
         three("overdamped", [200.0; 3], [500.0; 3]),
     ]
@@ -83,34 +71,27 @@ fn proportional<const N: usize>(kp: [f64; N], kd: [f64; N]) -> Gains<N> {
     Gains { kp, ki, kd }
 }
 
-/// The cases of a loop: each kind of control with each method.
-fn cases<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> Vec<LimitCase> {
+/// The rows of a loop: one for each kind of control.
+fn rows<const N: usize>(name: &str, gains: Gains<N>, setpoint: [f64; N]) -> [LimitRow; 2] {
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(setpoint));
     let all = Method::ALL.map(|method| {
         let control = control.with_method(method);
         (control, limits(&control))
     });
-    let case = |sampling, (control, limits): &(ControlLoop<N>, Limits<N>)| {
-        let (predicted, others) = match sampling {
-            Sampling::Held => (limits.held, [limits.minimum_held, limits.advised]),
-            Sampling::Continuous => (limits.continuous, [limits.minimum_continuous, None]),
-        };
-        let predicted = predicted.filter(|limit| *limit > 0.0);
-        LimitCase {
-            loop_name: format!("{N} links, {name} gains"),
-            sampling,
-            method: control.method,
-            predicted,
-            measured: predicted.and_then(|limit| measured_limit(control, sampling, limit)),
-            others,
-        }
-    };
-    let both = Sampling::ALL.into_iter();
-    both.flat_map(|sampling| all.each_ref().map(|one| case(sampling, one)))
-        .collect()
+    Sampling::ALL.map(|sampling| LimitRow {
+        loop_name: format!("{N} links, {name} gains"),
+        sampling,
+        limits: all.each_ref().map(|(control, limits)| {
+            let others = match sampling {
+                Sampling::Held => [limits.minimum_held, limits.advised],
+                Sampling::Continuous => [limits.minimum_continuous, None],
+            };
+            (LimitPair::of_timestep(control, sampling), others)
+        }),
+    })
 }
 
-fn limits_table(cases: &[LimitCase]) -> Table {
+fn limits_table(rows: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
@@ -120,58 +101,44 @@ fn limits_table(cases: &[LimitCase]) -> Table {
          period: the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         by_method(&["Loop", "Control"]),
     );
-    for cases in cases
-        .chunk_by(|one, other| (&one.loop_name, one.sampling) == (&other.loop_name, other.sampling))
-    {
-        let Some(LimitCase {
-            loop_name,
-            sampling,
-            ..
-        }) = cases.first()
-        else {
-            continue;
-        };
-        let control = match sampling {
+    table.rows.extend(rows.iter().map(|row| {
+        let control = match row.sampling {
             Sampling::Held => "effort held for the step (as the live arm does)",
             Sampling::Continuous => "law in every stage",
         };
-        let head = [Cell::new(loop_name), Cell::new(control)];
-        let cells = cases.iter().map(LimitCase::cell);
-        table.rows.push(head.into_iter().chain(cells).collect());
-    }
+        let head = [Cell::new(&row.loop_name), Cell::new(control)];
+        head.into_iter()
+            .chain(row.limits.iter().map(cell))
+            .collect()
+    }));
     table
 }
 
-fn findings(section: &mut Section, cases: &[LimitCase]) {
-    let at = |sampling, method| {
-        cases.iter().find(|case| {
-            let looks = (case.loop_name.as_str(), case.sampling, case.method);
-            looks == ("2 links, default gains", sampling, method)
-        })
+fn findings(section: &mut Section, rows: &[LimitRow]) {
+    let default = |sampling| {
+        let mut rows = rows.iter();
+        rows.find(|row| row.loop_name == "2 links, default gains" && row.sampling == sampling)
     };
-    let limit = |sampling, method| at(sampling, method)?.predicted;
-    if let (Some(verlet), Some(rk4), Some(continuous)) = (
-        limit(Sampling::Held, Method::Verlet),
-        limit(Sampling::Held, Method::Rk4),
-        limit(Sampling::Continuous, Method::Rk4),
-    ) {
-        let all_poses = at(Sampling::Held, Method::Rk4).and_then(|case| case.others[0]);
+    if let [Some(held), Some(continuous)] = Sampling::ALL.map(default) {
+        let ([.., verlet, rk4], [.., in_stages]) = (&held.limits, &continuous.limits);
+        let said = |limit: Option<f64>| seconds(limit.unwrap_or(f64::NAN));
         section.find(format!(
             "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
              Verlet**. Both limits are the same, since the effort is held for the step. With the law in every stage \
              RK4 would be stable up to {}. That limit belongs to the simulation. The first one belongs to the \
              controller, and a real arm would show it. The smallest limit of all poses is {}.",
-            seconds(rk4),
-            seconds(verlet),
-            seconds(continuous),
-            seconds(all_poses.unwrap_or(f64::NAN)),
+            said(rk4.0.predicted),
+            said(verlet.0.predicted),
+            said(in_stages.0.predicted),
+            said(rk4.1[0]),
         ));
     }
-    let off: Vec<f64> = cases.iter().filter_map(LimitCase::off).collect();
+    let all = rows.iter().flat_map(|row| &row.limits);
+    let off: Vec<f64> = all.filter_map(|(limit, _)| limit.off()).collect();
     let (count, furthest) = (off.len(), worst(off));
     section.find(format!(
         "**The linearised loop predicts the arm's own limit to {} %** in {count} cases: 2 and 3 links, mild to \
-         overdamped gains, all methods, both kinds of control.",
+         overdamped gains, all methods, both kinds of control. The search for a limit ends at 0.004 %.",
         number(100.0 * furthest),
     ));
     section.claim(

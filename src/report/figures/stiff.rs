@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** a run that would take too many steps is shown as a prediction, and said to be one.
 
-use super::fit::{fewest_of, worst};
+use super::fit::worst;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
+use crate::report::experiments::stiff::{By, DURATION, Solver, StiffScene};
+use crate::report::experiments::task::RunOutcome;
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, power, scientific};
 use crate::report::timing::{Effort, time};
@@ -26,7 +27,7 @@ struct Cost {
     by: By,
     ratio: f64,
     solver: Solver,
-    run: Option<(StiffRun, f64)>,
+    run: Option<(RunOutcome, f64)>,
     /// Steps that stability asks for at least.
     fewest: Option<f64>,
 }
@@ -39,22 +40,24 @@ pub(super) fn make(section: &mut Section) {
     for (by, _) in FAMILIES {
         for exponent in (0..=8).step_by(stride) {
             let scene = StiffScene::new(by, 10_f64.powi(exponent));
-            uncertainty = uncertainty.max(scene.uncertainty);
+            let task = &scene.task;
+            uncertainty = uncertainty.max(task.uncertainty);
             costs.extend(Solver::ALL.map(|solver| {
                 let fewest = scene.fewest_stable_steps(solver);
                 // A run that stability forbids for all that may be taken is not begun.
                 let is_possible = fewest.is_none_or(|fewest| fewest <= in_f64(most));
-                let run = is_possible
-                    .then(|| cheapest(&scene, solver, most))
-                    .flatten();
+                let cheapest = || task.fewest(solver, TARGET, (1, most), RESOLUTION);
+                let run = is_possible.then(cheapest).flatten();
+                let run = run.map(|run| {
+                    let timing = time(effort, || task.replay(solver, run.steps));
+                    (run, timing.minimum)
+                });
+                let ratio = scene.ratio;
                 Cost {
                     by,
-                    ratio: scene.ratio,
+                    ratio,
                     solver,
-                    run: run.map(|run| {
-                        let timing = time(effort, || scene.run(solver, run.steps));
-                        (run, timing.minimum)
-                    }),
+                    run,
                     fewest,
                 }
             }));
@@ -73,20 +76,10 @@ pub(super) fn make(section: &mut Section) {
             "2 links let go from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. Run time \
              is that of the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines of this report \
              and cannot be chosen on the live arm. Their Jacobians are taken by differences, and counted. Lines end \
-             where more than half a million steps would be needed."
+             where more than {most} steps would be needed."
         ),
         &panels,
     );
-}
-
-/// The run within the error with the fewest steps, found to a part of [`RESOLUTION`].
-fn cheapest(scene: &StiffScene, solver: Solver, most: u64) -> Option<StiffRun> {
-    // A run is compared at the outputs: its steps are a multiple of them.
-    fewest_of(
-        (1, most / OUTPUTS, RESOLUTION),
-        |steps| scene.run(solver, OUTPUTS * steps),
-        |run| run.error <= TARGET,
-    )
 }
 
 fn of(costs: &[Cost], by: By, solver: Solver) -> impl Iterator<Item = &Cost> {

@@ -31,7 +31,6 @@ pub(crate) enum Marker {
     Square,
     Triangle,
     Diamond,
-    Wedge,
 }
 
 impl Marker {
@@ -47,7 +46,6 @@ impl Marker {
             }
             Self::Square => format!("M{:.1} {:.1}h6.4v6.4h-6.4z", x - 3.2, y - 3.2),
             Self::Triangle => format!("M{x:.1} {:.1}l4.2 7.4h-8.4z", y - 4.6),
-            Self::Wedge => format!("M{x:.1} {:.1}l4.2 -7.4h-8.4z", y + 4.6),
             Self::Diamond => format!("M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z", y - 4.6),
         }
     }
@@ -67,13 +65,11 @@ pub(crate) struct Key {
 impl Key {
     /// A method's colour and marker.
     pub(crate) fn of(method: Method) -> Self {
-        use Marker::{Circle, Diamond, Square, Triangle, Wedge};
-        let mut markers = [Circle, Square, Triangle, Diamond, Wedge]
-            .into_iter()
-            .cycle();
-        let place = Method::ALL.into_iter().position(|one| one == method);
-        let marker = place.and_then(|place| markers.nth(place));
-        Self::line(method.name(), method.name()).marked(marker.unwrap_or(Circle))
+        use Marker::{Circle, Diamond, Square, Triangle};
+        let markers = [Circle, Square, Triangle, Diamond];
+        let mut all = Method::ALL.into_iter().zip(markers.into_iter().cycle());
+        let marker = all.find(|(one, _)| *one == method);
+        Self::line(method.name(), method.name()).marked(marker.map_or(Circle, |it| it.1))
     }
 
     /// A line without markers.

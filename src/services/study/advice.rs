@@ -6,7 +6,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::reading::{taken, with_period};
-use super::{Present, StudyWork};
+use super::{Computed, Present, StudyWork};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -233,10 +233,10 @@ const DEFAULT_MOVE: f64 = 4.0;
 
 // ---- gains ----------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> SuggestGains<N> {
-    /// The computation for this request and the `present` arm.
-    #[must_use]
-    pub fn work(self, present: Present<N>) -> StudyWork<Result<Suggested<N>, NotSuggested>> {
+impl<const N: usize> Computed<N> for SuggestGains<N> {
+    type Work = StudyWork<Self::Answer>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
         let computation = Paused::new(async move {
             let (control, requirements) = demands(&self, &present.control)?;
             let found = search_gains(control, requirements).await?;
@@ -275,10 +275,10 @@ fn demands<const N: usize>(
 
 // ---- plan -----------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> PlanRun<N> {
-    /// The computation for this request and the `present` arm.
-    #[must_use]
-    pub fn work(self, present: Present<N>) -> StudyWork<Result<PlannedRun, NotPlanned>> {
+impl<const N: usize> Computed<N> for PlanRun<N> {
+    type Work = StudyWork<Self::Answer>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
         let computation = Paused::new(async move {
             let task = task(&self, &present)?;
             let planned = plan(task).await?;

@@ -14,6 +14,7 @@ use std::time::Duration;
 pub use self::advice::{NotPlanned, NotSuggested, PlanRun, PlannedRun, SuggestGains, Suggested};
 pub use self::rollout::{NotRun, Ran, RolloutWork, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
+use super::Ask;
 use crate::math::arm::State;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
@@ -31,7 +32,17 @@ pub trait Work<T>: Send {
     fn advance(&mut self, clock: fn() -> Duration) -> Option<T>;
 }
 
-/// A computation that needs no clock.
+/// A question whose answer is computed.
+pub trait Computed<const N: usize>: Ask {
+    /// The computation.
+    type Work: Work<Self::Answer> + 'static;
+
+    /// The work that this asks for, of an arm that is `present` so.
+    #[must_use]
+    fn work(self, present: Present<N>) -> Self::Work;
+}
+
+/// A computation of the study, which needs no clock.
 pub struct StudyWork<T> {
     most_bytes: usize,
     computation: Paused<T>,

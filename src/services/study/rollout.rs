@@ -10,7 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use super::reading::{taken, with_period};
-use super::{NUMBER_BYTES, Present, Work};
+use super::{Computed, NUMBER_BYTES, Present, Work};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -253,6 +253,14 @@ impl<const N: usize> RolloutWork<N> {
             took: Duration::ZERO,
             compared: is_compared.then(|| run(true)),
         }
+    }
+}
+
+impl<const N: usize> Computed<N> for RunOffline<N> {
+    type Work = RolloutWork<N>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
+        RolloutWork::new(&self, present)
     }
 }
 

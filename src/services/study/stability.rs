@@ -9,7 +9,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::reading::{taken, with_period};
-use super::{Present, StudyWork};
+use super::{Computed, Present, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -148,10 +148,10 @@ impl StabilityValues {
 
 // ---- work -----------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> PredictStability<N> {
-    /// The computation for this request and the `present` arm.
-    #[must_use]
-    pub fn work(self, present: Present<N>) -> StudyWork<Result<Box<Predicted<N>>, ArmError>> {
+impl<const N: usize> Computed<N> for PredictStability<N> {
+    type Work = StudyWork<Self::Answer>;
+
+    fn work(self, present: Present<N>) -> Self::Work {
         let computation = Paused::new(async move {
             let control = control_loop(&self, &present.control)?;
             Ok(Box::new(Predicted {

@@ -1,6 +1,5 @@
 //! Eigenvalues of a small real matrix, in three textbook stages: balancing by powers of two, Householder reduction to
-//! Hessenberg form, and the QR iteration. Wilkinson's shift in complex arithmetic treats real and complex eigenvalues
-//! alike.
+//! Hessenberg form, and Francis' QR iteration. Its double shifts keep a pair of complex eigenvalues in real arithmetic.
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.4 and 7.5.
 //!
@@ -11,8 +10,11 @@
     reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
 )]
 
-use super::{Complex, Matrix, largest};
-use crate::math::elementary::{exp2, hypot, log2};
+use std::ops::RangeInclusive;
+
+use super::complex::Complex;
+use super::{Matrix, largest};
+use crate::math::elementary::{exp2, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.
 const MAX_SWEEPS: usize = 60;
@@ -27,7 +29,7 @@ impl Matrix {
         let mut matrix = self.clone();
         matrix.balance();
         matrix.reduce_to_hessenberg();
-        Hessenberg::new(&matrix).eigenvalues()
+        matrix.iterate()
     }
 
     /// A diagonal similarity, in powers of two and so exact, that makes rows and columns alike in size. Velocities
@@ -66,146 +68,126 @@ impl Matrix {
     fn reduce_to_hessenberg(&mut self) {
         let n = self.n;
         for k in 0..n.saturating_sub(2) {
-            let largest = (k + 1..n).fold(0.0, |max: f64, i| max.max(self[(i, k)].abs()));
-            if (k + 2..n).all(|i| self[(i, k)] == 0.0) || largest == 0.0 {
+            if (k + 2..n).all(|i| self[(i, k)] == 0.0) {
                 continue;
             }
-            let mut u: Vec<f64> = (k + 1..n).map(|i| self[(i, k)] / largest).collect();
-            let norm = u.iter().map(|u| u * u).sum::<f64>().sqrt();
-            u[0] += norm.copysign(u[0]);
-            let per_square = 2.0 / u.iter().map(|u| u * u).sum::<f64>();
-            for column in 0..n {
-                let dot: f64 = (k + 1..n).map(|i| u[i - k - 1] * self[(i, column)]).sum();
-                for i in k + 1..n {
-                    self[(i, column)] -= per_square * dot * u[i - k - 1];
-                }
-            }
-            for row in 0..n {
-                let dot: f64 = (k + 1..n).map(|j| u[j - k - 1] * self[(row, j)]).sum();
-                for j in k + 1..n {
-                    self[(row, j)] -= per_square * dot * u[j - k - 1];
-                }
-            }
+            let mut across: Vec<f64> = (k + 1..n).map(|i| self[(i, k)]).collect();
+            self.reflect(k + 1, &mut across, 0..=n - 1);
             for i in k + 2..n {
                 self[(i, k)] = 0.0;
             }
         }
     }
-}
 
-/// A complex matrix with zeros below the subdiagonal, on the way to its eigenvalues.
-struct Hessenberg {
-    n: usize,
-    entries: Vec<Complex>,
-    /// Largest modulus of an entry at the start.
-    norm: f64,
-}
-
-impl Hessenberg {
-    fn new(matrix: &Matrix) -> Self {
-        let entries = matrix.entries.iter().map(|&entry| Complex::real(entry));
-        Self {
-            n: matrix.n,
-            entries: entries.collect(),
-            norm: largest(matrix.entries.iter().map(|entry| entry.abs())),
+    /// Reflects from both sides so that a vector, whose first entry belongs to row `start`, turns into a multiple of
+    /// its first axis. Of the matrix the rows and columns in `block` are kept up to date.
+    fn reflect(&mut self, start: usize, across: &mut [f64], block: RangeInclusive<usize>) {
+        let size = largest(across.iter().map(|u| u.abs()));
+        if size == 0.0 {
+            return;
+        }
+        across.iter_mut().for_each(|u| *u /= size);
+        let norm = across.iter().map(|u| u * u).sum::<f64>().sqrt();
+        across[0] += norm.copysign(across[0]);
+        let per_square = 2.0 / across.iter().map(|u| u * u).sum::<f64>();
+        for column in block.clone() {
+            let rows = (start..).zip(&*across);
+            let dot: f64 = rows.clone().map(|(row, u)| u * self[(row, column)]).sum();
+            rows.for_each(|(row, u)| self[(row, column)] -= per_square * dot * u);
+        }
+        for row in block {
+            let columns = (start..).zip(&*across);
+            let dot: f64 = columns
+                .clone()
+                .map(|(column, u)| u * self[(row, column)])
+                .sum();
+            columns.for_each(|(column, u)| self[(row, column)] -= per_square * dot * u);
         }
     }
 
-    fn at(&self, row: usize, column: usize) -> Complex {
-        self.entries[row * self.n + column]
-    }
-
-    fn eigenvalues(mut self) -> Vec<Complex> {
+    /// The eigenvalues of a matrix with zeros below the subdiagonal: blocks of one or two rows split off at its end.
+    fn iterate(mut self) -> Vec<Complex> {
+        let norm = largest(self.entries.iter().map(|entry| entry.abs()));
         let mut values = vec![Complex::real(f64::NAN); self.n];
-        let mut active = self.n;
-        let mut sweeps = 0;
+        let (mut active, mut sweeps) = (self.n, 0);
         while active > 0 {
             let last = active - 1;
             let first = (1..active)
                 .rev()
-                .find(|&i| self.is_negligible(i, sweeps))
-                .unwrap_or(0);
-            if first == last {
-                values[last] = self.at(last, last);
-                active = last;
-                sweeps = 0;
-            } else if sweeps == MAX_SWEEPS {
-                break;
-            } else {
-                sweeps += 1;
-                let shift = self.shift(last, sweeps);
-                self.sweep(first, last, shift);
+                .find(|&i| self.is_negligible(i, sweeps, norm));
+            let first = first.unwrap_or(0);
+            match last - first {
+                0 => values[last] = Complex::real(self[(last, last)]),
+                1 => [values[first], values[last]] = self.pair(last),
+                _ if sweeps == MAX_SWEEPS => break,
+                _ => {
+                    sweeps += 1;
+                    self.sweep(first, last, sweeps);
+                    continue;
+                }
             }
+            (active, sweeps) = (first, 0);
         }
         values
     }
 
     /// Whether the entry left of the diagonal in row `i` can be taken for zero.
-    fn is_negligible(&self, i: usize, sweeps: usize) -> bool {
-        let beside = self.at(i, i).modulus() + self.at(i - 1, i - 1).modulus();
+    fn is_negligible(&self, i: usize, sweeps: usize, norm: f64) -> bool {
+        let beside = self[(i, i)].abs() + self[(i - 1, i - 1)].abs();
         // Nothing is small beside two eigenvalues that are zero: then the size of the whole matrix is taken.
         let scale = if sweeps < MAX_SWEEPS / 3 {
             beside
         } else {
-            beside.max(self.norm)
+            beside.max(norm)
         };
-        self.at(i, i - 1).modulus() <= f64::EPSILON * scale
+        self[(i, i - 1)].abs() <= f64::EPSILON * scale
     }
 
-    /// Wilkinson's shift: the eigenvalue of the last 2×2 block that is nearer to its last entry. Every tenth sweep
-    /// takes another, to break a cycle.
-    fn shift(&self, last: usize, sweeps: usize) -> Complex {
-        let d = self.at(last, last);
-        let product = self.at(last - 1, last) * self.at(last, last - 1);
-        if sweeps.is_multiple_of(10) {
-            return d + Complex::real(self.at(last, last - 1).modulus());
+    /// The eigenvalues of the block of two rows that ends at `last`.
+    fn pair(&self, last: usize) -> [Complex; 2] {
+        let d = self[(last, last)];
+        let half = 0.5 * (self[(last - 1, last - 1)] - d);
+        let product = self[(last - 1, last)] * self[(last, last - 1)];
+        let square = half * half + product;
+        let root = square.abs().sqrt();
+        if square < 0.0 {
+            return [root, -root].map(|im| Complex { re: d + half, im });
         }
-        let half = (self.at(last - 1, last - 1) - d).scaled(0.5);
-        let root = (half * half + product).sqrt();
-        let toward = half.re * root.re + half.im * root.im;
-        let denominator = if toward >= 0.0 {
-            half + root
+        // The larger part is computed first, so that the other follows without cancellation.
+        let larger = half + root.copysign(half);
+        let other = if larger == 0.0 { 0.0 } else { product / larger };
+        [d + larger, d - other].map(Complex::real)
+    }
+
+    /// A step of the iteration with two shifts at once on rows and columns `first..=last`: the first column of the
+    /// product of both factors is reflected to one entry, then each column below whose subdiagonal this leaves a bulge.
+    fn sweep(&mut self, first: usize, last: usize, sweeps: usize) {
+        // The shifts are the eigenvalues of the last block, by its diagonal and the product of its other entries. Every
+        // tenth sweep takes others, to break a cycle.
+        let (diagonal, product) = if sweeps.is_multiple_of(10) {
+            let size = self[(last, last - 1)].abs() + self[(last - 1, last - 2)].abs();
+            ([0.75 * size; 2], -0.4375 * size * size)
         } else {
-            half - root
+            let product = self[(last - 1, last)] * self[(last, last - 1)];
+            ([last - 1, last].map(|i| self[(i, i)]), product)
         };
-        let square = denominator.re * denominator.re + denominator.im * denominator.im;
-        if square == 0.0 {
-            return d;
-        }
-        d - (product * denominator.conjugate()).scaled(1.0 / square)
-    }
-
-    /// One step `H - σI = QR`, `H ← RQ + σI` on rows and columns `first..=last`, by plane rotations.
-    fn sweep(&mut self, first: usize, last: usize, shift: Complex) {
-        let n = self.n;
-        for i in first..=last {
-            self.entries[i * n + i] = self.at(i, i) - shift;
-        }
-        let mut rotations = Vec::with_capacity(last - first);
+        let at = |i: usize, j: usize| self[(first + i, first + j)];
+        let [one, other] = diagonal.map(|entry| entry - at(0, 0));
+        let mut bulge = [
+            (one * other - product) / at(1, 0) + at(0, 1),
+            at(1, 1) - at(0, 0) - one - other,
+            at(2, 1),
+        ];
+        let mut height = bulge.len();
         for k in first..last {
-            let (a, b) = (self.at(k, k), self.at(k + 1, k));
-            let length = hypot(a.modulus(), b.modulus());
-            let (c, s) = if length == 0.0 {
-                (Complex::real(1.0), Complex::ZERO)
-            } else {
-                (a.scaled(1.0 / length), b.scaled(1.0 / length))
-            };
-            rotations.push((c, s));
-            for column in k..=last {
-                let (upper, lower) = (self.at(k, column), self.at(k + 1, column));
-                self.entries[k * n + column] = c.conjugate() * upper + s.conjugate() * lower;
-                self.entries[(k + 1) * n + column] = c * lower - s * upper;
+            self.reflect(k, &mut bulge[..height], first..=last);
+            if k > first {
+                (1..height).for_each(|i| self[(k + i, k - 1)] = 0.0);
             }
-        }
-        for (k, (c, s)) in (first..last).zip(rotations) {
-            for row in first..=(k + 1).min(last) {
-                let (left, right) = (self.at(row, k), self.at(row, k + 1));
-                self.entries[row * n + k] = c * left + s * right;
-                self.entries[row * n + k + 1] = c.conjugate() * right - s.conjugate() * left;
+            height = bulge.len().min(last - k);
+            for (row, entry) in (k + 1..).zip(&mut bulge[..height]) {
+                *entry = self[(row, k)];
             }
-        }
-        for i in first..=last {
-            self.entries[i * n + i] = self.at(i, i) + shift;
         }
     }
 }

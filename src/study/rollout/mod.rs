@@ -36,14 +36,15 @@ use crate::math::simulation::{Divergence, Held, Hold, Simulation};
 /// Longest span that a reference without control is asked to follow at once \[s\].
 const MAX_SPAN: f64 = 0.05;
 
-/// How far the samples are from the reference: an entry per sample, or fewer if the reference was lost on the way.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// How far a run is from a reference.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviation {
-    /// Largest error of a joint position, per sample \[rad\].
-    pub errors: Vec<f64>,
-    /// How far the errors may be off, per sample \[rad\]: the distance between the references, at least a last
-    /// digit.
-    pub uncertainties: Vec<f64>,
+    /// Samples at which the reference was known: fewer than those of the run if it was lost on the way.
+    pub samples: usize,
+    /// Largest error of a joint position \[rad\].
+    pub error: f64,
+    /// How far the errors may be off at most \[rad\]: the distance between the references, at least a last digit.
+    pub uncertainty: f64,
 }
 
 /// References of a run.
@@ -59,20 +60,13 @@ impl Deviation {
     /// The largest error \[rad\], if the references know it: `None` if it is about as large as their difference.
     #[must_use]
     pub fn known(&self) -> Option<f64> {
-        let error = self.largest();
-        (error >= ABOVE_UNCERTAINTY * self.largest_uncertainty()).then_some(error)
+        (self.error >= ABOVE_UNCERTAINTY * self.uncertainty).then_some(self.error)
     }
 
-    /// The largest error \[rad\].
-    #[must_use]
-    pub fn largest(&self) -> f64 {
-        largest(self.errors.iter().copied())
-    }
-
-    /// The largest uncertainty \[rad\].
-    #[must_use]
-    pub fn largest_uncertainty(&self) -> f64 {
-        largest(self.uncertainties.iter().copied())
+    fn take(&mut self, error: f64, uncertainty: f64) {
+        self.samples += 1;
+        self.error = largest([self.error, error].into_iter());
+        self.uncertainty = largest([self.uncertainty, uncertainty].into_iter());
     }
 }
 
@@ -193,15 +187,13 @@ impl<const N: usize> Rollout<N> {
         {
             let states = references.each_ref().map(|one| one.taylor.state());
             let spread = SPREAD * largest_distance(&states);
-            deviation.errors.push(apart(state, states[0]));
-            deviation.uncertainties.push(spread.max(last_digit));
+            deviation.take(apart(state, states[0]), spread.max(last_digit));
         }
         if let (Some(deviation), Some([first, second])) = (&mut self.from_ideal, ideals)
             && let (Some(first), Some(second)) = (&first.run, &second.run)
         {
             let uncertainty = apart(&first.state, &second.state).max(last_digit);
-            deviation.errors.push(apart(state, &second.state));
-            deviation.uncertainties.push(uncertainty);
+            deviation.take(apart(state, &second.state), uncertainty);
         }
     }
 
@@ -209,11 +201,9 @@ impl<const N: usize> Rollout<N> {
     /// An error of some of them can't be compared with another run's.
     #[must_use]
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
-        let whole = deviation.filter(|deviation| deviation.errors.len() == self.times.len());
-        (
-            whole.and_then(Deviation::known),
-            whole.map(Deviation::largest_uncertainty),
-        )
+        let whole = deviation.filter(|deviation| deviation.samples == self.times.len());
+        let uncertainty = whole.map(|deviation| deviation.uncertainty);
+        (whole.and_then(Deviation::known), uncertainty)
     }
 }
 

@@ -127,18 +127,12 @@ pub(crate) struct Taylor<T, const N: usize> {
     coefficients: u64,
     /// The last length of a step that a series allowed \[s\].
     step: f64,
-    ahead: Ahead,
-    /// The series of the last step.
-    pub(crate) series: PowerSeries<T, N>,
-}
-
-/// The rest of a span.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Ahead {
-    /// The whole span \[s\].
+    /// The present span \[s\].
     span: f64,
     /// How much of it is left \[s\], and what rounding took from that.
-    rest: (f64, f64),
+    pub(crate) rest: (f64, f64),
+    /// The series of the last step.
+    pub(crate) series: PowerSeries<T, N>,
 }
 
 impl<T: Precision, const N: usize> Taylor<T, N> {
@@ -158,27 +152,21 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             cuts: 1.0,
             coefficients: 0,
             step: f64::INFINITY,
-            ahead: Ahead::default(),
+            span: 0.0,
+            rest: (0.0, 0.0),
             series: PowerSeries::new(),
         }
     }
 
     /// Begins a span \[s\].
     pub(crate) fn begin(&mut self, span: f64) {
-        self.ahead = Ahead {
-            span,
-            rest: (span, 0.0),
-        };
-    }
-
-    /// What is left of the span \[s\], and what rounding took from that.
-    pub(crate) fn rest(&self) -> (f64, f64) {
-        self.ahead.rest
+        self.span = span;
+        self.rest = (span, 0.0);
     }
 
     /// Goes on with the span by a step.
     pub(crate) fn step(&mut self, arm: &Arm<N>, drive: &impl Drive<T, N>) {
-        let Ahead { span, rest } = self.ahead;
+        let (span, rest) = (self.span, self.rest);
         let whole = (span / self.cuts).min(rest.0);
         let (position, velocity) = (self.position, self.velocity);
         let effort = drive.efforts(&position, &velocity);
@@ -230,7 +218,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             (self.velocity[i], velocity[i]) = self.velocity[i].plus_carried(velocity[i], dv[i]);
         }
         let (left, lost) = two_sum(rest.0, -h);
-        self.ahead.rest = if is_last {
+        self.rest = if is_last {
             (0.0, 0.0)
         } else {
             two_sum(left, rest.1 + lost)
@@ -359,7 +347,7 @@ impl<const N: usize> TaylorReference<N> {
     ) -> bool {
         let bound = self.coefficients().saturating_add(MAX_COEFFICIENTS);
         self.taylor.begin(span);
-        while self.taylor.rest().0 > 0.0 {
+        while self.taylor.rest.0 > 0.0 {
             if self.coefficients() > bound || !self.state.is_finite() {
                 return false;
             }

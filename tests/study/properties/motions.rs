@@ -46,11 +46,11 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         let steps = (duration / candidate.timestep).round() as usize;
         let every = (steps / 10).max(1);
         let spacing = candidate.timestep * every as f64;
-        let truth = ReferenceMotion::of(&arm, &start, &Law::FREE, spacing, steps / every);
+        let truth = ReferenceMotion::new(&arm, &start, &Law::FREE, duration);
         let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
-        for index in 0..truth.samples.len() {
+        for sample in 1..=steps / every {
             live.advance(every as u64);
-            let off = tip(live.state()).distance(tip(&truth.state(index).unwrap()));
+            let off = tip(live.state()).distance(tip(&truth.state(spacing * sample as f64)));
             assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
         }
         tally.tried += 1;
@@ -79,17 +79,9 @@ fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Ta
         tally.open += 1;
         return;
     };
-    let mut before = 0.0;
-    let times = &made.times[1..];
-    let intervals: Vec<f64> = times
-        .iter()
-        .map(|time| time - std::mem::replace(&mut before, *time))
-        .collect();
-    let truth = ReferenceMotion::between(&arm, &start, &Law::FREE, &intervals);
-    let off = (0..truth.samples.len()).map(|index| {
-        let position = &made.positions[index + 1];
-        truth.angle_error(index, position).unwrap()
-    });
+    let truth = ReferenceMotion::new(&arm, &start, &Law::FREE, duration);
+    let samples = made.times.iter().zip(&made.positions);
+    let off = samples.map(|(time, position)| truth.angle_error(*time, position));
     let off = off.fold(0.0, f64::max);
     tally.tried += 1;
     if (error - off).abs() > uncertainty {

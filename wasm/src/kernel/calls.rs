@@ -12,7 +12,7 @@ use pendularm::services::arm::{
     Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
-use pendularm::services::study::{PlanRun, PredictStability, RunOffline, SuggestGains, Work};
+use pendularm::services::study::{Computed, PlanRun, PredictStability, RunOffline, SuggestGains};
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
 use pendularm::services::{Address, Answered, Callable, NoService};
 
@@ -74,18 +74,9 @@ impl<const N: usize> Kernel<N> {
             Service::TrialStop => {
                 self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
             }
-            Service::Stability => {
-                self.compute_short::<PredictStability<N>, _>(
-                    own,
-                    &args,
-                    to,
-                    PredictStability::work,
-                );
-            }
-            Service::SuggestGains => {
-                self.compute_short::<SuggestGains<N>, _>(own, &args, to, SuggestGains::work);
-            }
-            Service::Plan => self.compute_short::<PlanRun<N>, _>(own, &args, to, PlanRun::work),
+            Service::Stability => self.compute_short::<PredictStability<N>>(own, &args, to),
+            Service::SuggestGains => self.compute_short::<SuggestGains<N>>(own, &args, to),
+            Service::Plan => self.compute_short::<PlanRun<N>>(own, &args, to),
             Service::Rollout => match RunOffline::<N>::read(own, &args) {
                 Ok(ask) => {
                     let work = Repeated::new(ask, self.arm.present());
@@ -142,18 +133,17 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    fn compute_short<A: Answered, W: Work<A::Answer> + 'static>(
+    fn compute_short<A: Answered + Computed<N>>(
         &mut self,
         service: Service,
         args: &Arguments,
         to: Address,
-        work: impl FnOnce(A, pendularm::services::study::Present<N>) -> W,
     ) {
         match A::read(service, args) {
             Ok(ask) => {
-                let work = work(ask, self.arm.present());
+                let work = ask.work(self.arm.present());
                 self.computations
-                    .push_back(Box::new(Short::<A, W>::new(work, to)));
+                    .push_back(Box::new(Short::<A, A::Work>::new(work, to)));
             }
             Err(rejected) => self.send(to.failure(&rejected.status())),
         }

@@ -1,10 +1,10 @@
 //! Reference motions: the same arm, another derivation, twice the digits, and a bound on their own error.
 //!
 //! An error, in the report, is a distance to one of these. The study's Taylor integrator computes a motion from the
-//! equation of motion, in double-double arithmetic ([`ReferenceMotion::of`]). It does so twice, with different order
-//! and tolerance. The distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every
-//! instant, or its effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the
-//! steps of the methods in the same arithmetic: their truncation error without rounding.
+//! equation of motion, in double-double arithmetic ([`ReferenceMotion`]). It does so twice, with different order and
+//! tolerance. The distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant,
+//! or its effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of
+//! the methods in the same arithmetic: their truncation error without rounding.
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 
@@ -19,7 +19,7 @@ pub use double_double::DoubleDouble;
 
 use self::DoubleDouble as Real;
 use crate::math::arm::{Arm, State};
-use crate::math::count::{in_f64, length_in_f64};
+use crate::math::count::{length_in_f64, steps_in};
 use crate::math::integrator::{Method, increment};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::study::control_loop::no_control;
@@ -64,7 +64,14 @@ struct ExactLaw<const N: usize> {
 }
 
 impl<const N: usize> ExactLaw<N> {
-    fn new(gains: Gains<N>, setpoint: Setpoint<N>) -> Self {
+    fn of(law: &Law<N>) -> Self {
+        let (gains, setpoint) = match law {
+            Law::Constant(_) => (no_control(), Setpoint::default()),
+            Law::Continuous(gains, setpoint)
+            | Law::Held {
+                gains, setpoint, ..
+            } => (*gains, *setpoint),
+        };
         Self {
             gains,
             setpoint,
@@ -135,200 +142,140 @@ fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
     )
 }
 
-/// A step of a motion: when it begins \[s\], the joint angles then \[rad\], and the coefficients of their change.
-type PathPiece<const N: usize> = (Real, [Real; N], Vec<[Real; N]>);
-
-/// A motion that is followed.
-struct Followed<'a, const N: usize> {
-    arm: &'a Arm<N>,
-    taylor: Taylor<Real, N>,
-    law: ExactLaw<N>,
+/// A step of a motion.
+#[derive(Debug, Clone)]
+struct Piece<const N: usize> {
+    /// When it begins \[s\].
+    begins: Real,
+    /// The joint angles then \[rad\].
+    position: [Real; N],
+    /// The coefficients of their change, from the first order on.
+    change: Vec<[Real; N]>,
 }
 
-impl<'a, const N: usize> Followed<'a, N> {
-    fn new(
-        arm: &'a Arm<N>,
-        start: &State<N>,
-        law: &Law<N>,
-        (tolerance, order): (f64, usize),
-    ) -> Self {
-        let (position, velocity) = exact(start);
-        let (gains, setpoint) = match law {
-            Law::Constant(_) => (no_control(), Setpoint::default()),
-            Law::Continuous(gains, setpoint)
-            | Law::Held {
-                gains, setpoint, ..
-            } => (*gains, *setpoint),
-        };
-        Self {
-            arm,
-            taylor: Taylor::new(position, velocity, tolerance, order),
-            law: ExactLaw::new(gains, setpoint),
+/// A motion at any instant: the series of its steps, with both settings.
+#[derive(Debug, Clone)]
+pub struct ReferenceMotion<const N: usize> {
+    fine: Vec<Piece<N>>,
+    coarse: Vec<Piece<N>>,
+}
+
+impl<const N: usize> ReferenceMotion<N> {
+    /// The motion from `start` under `law` for `duration` \[s\], or with a held effort for the number of control
+    /// periods that is nearest to it.
+    #[must_use]
+    pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Self {
+        let [fine, coarse] = SETTINGS.map(|setting| follow(arm, start, law, duration, setting));
+        Self { fine, coarse }
+    }
+
+    /// The joint angles at `time` \[s\] \[rad\].
+    #[must_use]
+    pub fn angles(&self, time: impl Into<DoubleDouble>) -> [DoubleDouble; N] {
+        angles(&self.fine, time.into())
+    }
+
+    /// The state at `time` \[s\], rounded to doubles.
+    #[must_use]
+    pub fn state(&self, time: f64) -> State<N> {
+        let (piece, after) = at(&self.fine, time.into());
+        let zeros = [Real::ZERO; N];
+        // The derivative of Horner's rule, beside it.
+        let (_, rate) = piece
+            .change
+            .iter()
+            .rev()
+            .fold((zeros, zeros), |(sum, rate), term| {
+                let sum = plus(&sum, term);
+                let rate = std::array::from_fn(|i| rate[i] * after + sum[i]);
+                (sum.map(|sum| sum * after), rate)
+            });
+        State {
+            position: self.angles(time).map(Real::to_f64),
+            velocity: rate.map(Real::to_f64),
         }
     }
 
-    fn state(&self) -> Exact<N> {
-        (self.taylor.position, self.taylor.velocity)
+    /// The largest angle error of `position` at `time` \[s\] \[rad\].
+    #[must_use]
+    pub fn angle_error(&self, time: impl Into<DoubleDouble>, position: &[f64]) -> f64 {
+        largest_difference(&self.angles(time), position)
     }
 
-    /// Follows the motion for a time \[s\], and shows every step.
-    fn advance(
-        &mut self,
-        law: &Law<N>,
-        time: f64,
-        mut show: impl FnMut(Real, &[Real; N], &Taylor<Real, N>),
-    ) {
+    /// How far the angles at `time` \[s\] may be off: the largest difference between two settings \[rad\].
+    #[must_use]
+    pub fn uncertainty(&self, time: f64) -> f64 {
+        let [fine, coarse] = [&self.fine, &self.coarse].map(|pieces| angles(pieces, time.into()));
+        distance(&fine, &coarse)
+    }
+}
+
+/// The steps of a motion with one tolerance and order.
+fn follow<const N: usize>(
+    arm: &Arm<N>,
+    start: &State<N>,
+    law: &Law<N>,
+    duration: f64,
+    (tolerance, order): (f64, usize),
+) -> Vec<Piece<N>> {
+    let left = |taylor: &Taylor<Real, N>| Real::from(taylor.rest.0) + taylor.rest.1;
+    let (position, velocity) = exact(start);
+    let mut taylor = Taylor::new(position, velocity, tolerance, order);
+    let mut exact_law = ExactLaw::of(law);
+    let (spans, span) = match law {
+        Law::Held { period, .. } => (steps_in(duration, *period).round().max(1.0), *period),
+        Law::Constant(_) | Law::Continuous(..) => (1.0, duration),
+    };
+    let (mut pieces, mut done) = (Vec::new(), 0.0);
+    while done < spans {
+        done += 1.0;
+        let end = Real::from(span) * done;
         let held = match law {
             Law::Constant(effort) => Some(effort.map(Real::from)),
-            Law::Held { period, .. } => Some(self.law.held(&self.state(), *period)),
+            Law::Held { .. } => Some(exact_law.held(&(taylor.position, taylor.velocity), span)),
             Law::Continuous(..) => None,
         };
-        let left = |taylor: &Taylor<Real, N>| {
-            let (rest, lost) = taylor.rest();
-            Real::from(rest) + Real::from(lost)
-        };
-        self.taylor.begin(time);
-        while self.taylor.rest().0 > 0.0 {
-            let (before, position) = (left(&self.taylor), self.taylor.position);
+        taylor.begin(span);
+        while taylor.rest.0 > 0.0 {
+            let (before, position) = (left(&taylor), taylor.position);
             match &held {
-                Some(effort) => self.taylor.step(self.arm, effort),
-                None => self.taylor.step(self.arm, &self.law),
+                Some(effort) => taylor.step(arm, effort),
+                None => taylor.step(arm, &exact_law),
             }
-            let step = before - left(&self.taylor);
+            let (series, step) = (&taylor.series, before - left(&taylor));
             if held.is_none() {
-                self.law.integrate(&position, &self.taylor.series, step);
+                exact_law.integrate(&position, series, step);
             }
-            show(Real::from(time) - before, &position, &self.taylor);
+            let change = series.angle[1..=series.order()].iter().map(differences);
+            pieces.push(Piece {
+                begins: end - before,
+                position,
+                change: change.collect(),
+            });
             // A motion too wild to be followed would not end.
             if step == Real::ZERO {
                 break;
             }
         }
     }
+    pieces
 }
 
-/// A motion at chosen times.
-#[derive(Debug, Clone)]
-pub struct ReferenceMotion<const N: usize> {
-    /// Joint angles \[rad\] and rates \[rad/s\] of every sample.
-    pub samples: Vec<([DoubleDouble; N], [DoubleDouble; N])>,
-    /// How far the angles of each sample may be off: the largest difference between two settings \[rad\].
-    pub uncertainty: Vec<f64>,
-}
-
-impl<const N: usize> ReferenceMotion<N> {
-    /// The motion from `start` under `law`, at multiples of `spacing` \[s\]: `count` samples, the start not among them.
-    ///
-    /// With a held effort the samples are the control instants nearest to these times. A spacing of less than a control
-    /// period gives one sample per period.
-    #[must_use]
-    pub fn of(arm: &Arm<N>, start: &State<N>, law: &Law<N>, spacing: f64, count: usize) -> Self {
-        Self::between(arm, start, law, &vec![spacing; count])
-    }
-
-    /// The motion after each of these `intervals` \[s\], one after the other.
-    #[must_use]
-    pub fn between(arm: &Arm<N>, start: &State<N>, law: &Law<N>, intervals: &[f64]) -> Self {
-        let motion = |setting| -> Vec<Exact<N>> {
-            let mut followed = Followed::new(arm, start, law, setting);
-            let sample = |&interval| {
-                let (count, span) = match law {
-                    Law::Held { period, .. } => (whole_periods(interval, *period), *period),
-                    Law::Constant(_) | Law::Continuous(..) => (1, interval),
-                };
-                (0..count).for_each(|_| followed.advance(law, span, |_, _, _| ()));
-                followed.state()
-            };
-            intervals.iter().map(sample).collect()
-        };
-        let [fine, coarse] = SETTINGS.map(motion);
-        let off = |(a, b): (&Exact<N>, &Exact<N>)| distance(&a.0, &b.0);
-        Self {
-            uncertainty: fine.iter().zip(&coarse).map(off).collect(),
-            samples: fine,
-        }
-    }
-
-    /// The state of sample `index`, rounded to doubles.
-    #[must_use]
-    pub fn state(&self, index: usize) -> Option<State<N>> {
-        let (position, velocity) = self.samples.get(index)?;
-        let (position, velocity) = (position.map(Real::to_f64), velocity.map(Real::to_f64));
-        Some(State { position, velocity })
-    }
-
-    /// The largest angle error of `position` against sample `index` \[rad\].
-    #[must_use]
-    pub fn angle_error(&self, index: usize, position: &[f64; N]) -> Option<f64> {
-        let (exact, _) = self.samples.get(index)?;
-        Some(largest_difference(exact, position))
-    }
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a ratio of two positive times; a cast saturates"
-)]
-fn whole_periods(interval: f64, period: f64) -> u64 {
-    ((interval / period).round() as u64).max(1)
-}
-
-/// A reference motion at any instant: the series of its steps, kept.
-#[derive(Debug, Clone)]
-pub struct ReferencePath<const N: usize> {
-    pieces: Vec<PathPiece<N>>,
-    uncertainty: f64,
-}
-
-impl<const N: usize> ReferencePath<N> {
-    /// The motion from `start` under the law at every instant, or under a constant effort, for `duration` \[s\].
-    #[must_use]
-    pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Self {
-        /// Instants at which two settings are compared.
-        const COMPARED: u64 = 64;
-        let [fine, coarse] = SETTINGS.map(|setting| {
-            let mut pieces: Vec<PathPiece<N>> = Vec::new();
-            let mut followed = Followed::new(arm, start, law, setting);
-            followed.advance(law, duration, |begins, position, Taylor { series, .. }| {
-                let angles = series.angle[1..=series.order()].iter();
-                pieces.push((begins, *position, angles.map(differences).collect()));
-            });
-            pieces
-        });
-        let spacing = Real::from(duration / in_f64(COMPARED));
-        let times = (1..=COMPARED).map(|index| spacing * in_f64(index));
-        let off = times.map(|time| distance(&position(&fine, time), &position(&coarse, time)));
-        Self {
-            uncertainty: off.fold(0.0, f64::max),
-            pieces: fine,
-        }
-    }
-
-    /// The joint angles after `steps` steps of `timestep` \[s\] \[rad\]; beyond the end those at the end.
-    #[must_use]
-    pub fn after(&self, steps: u64, timestep: f64) -> [DoubleDouble; N] {
-        position(&self.pieces, Real::from(timestep) * in_f64(steps))
-    }
-
-    /// How far the angles may be off: the largest difference between two settings \[rad\].
-    #[must_use]
-    pub fn uncertainty(&self) -> f64 {
-        self.uncertainty
-    }
+/// The piece at `time` \[s\], and the time since its beginning \[s\].
+fn at<const N: usize>(pieces: &[Piece<N>], time: Real) -> (&Piece<N>, Real) {
+    let after = pieces.partition_point(|piece| (piece.begins - time).to_f64() <= 0.0);
+    let piece = &pieces[after.saturating_sub(1)];
+    (piece, time - piece.begins)
 }
 
 /// The joint angles at `time` \[s\].
-fn position<const N: usize>(pieces: &[PathPiece<N>], time: Real) -> [Real; N] {
-    let after = pieces.partition_point(|piece| (piece.0 - time).to_f64() <= 0.0);
-    let Some((begins, position, angles)) = pieces.get(after.saturating_sub(1)) else {
-        return [Real::from(f64::NAN); N];
-    };
-    let after = time - *begins;
-    let change = angles.iter().rev().fold([Real::ZERO; N], |sum, angle| {
-        std::array::from_fn(|i| (sum[i] + angle[i]) * after)
+fn angles<const N: usize>(pieces: &[Piece<N>], time: Real) -> [Real; N] {
+    let (piece, after) = at(pieces, time);
+    let change = piece.change.iter().rev();
+    let change = change.fold([Real::ZERO; N], |sum, term| {
+        plus(&sum, term).map(|sum| sum * after)
     });
-    plus(position, &change)
+    plus(&piece.position, &change)
 }
 
 fn plus<const N: usize>(x: &[Real; N], y: &[Real; N]) -> [Real; N] {
@@ -353,7 +300,7 @@ pub fn exact_acceleration<const N: usize>(
 
 /// `max |exact - value|`, the difference rounded only once it is taken; NaN if a value is.
 #[must_use]
-pub fn largest_difference<const N: usize>(exact: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
+pub fn largest_difference(exact: &[DoubleDouble], values: &[f64]) -> f64 {
     let both = exact.iter().zip(values);
     largest(both.map(|(exact, value)| exact.minus(*value).abs()))
 }
@@ -371,8 +318,8 @@ pub fn exact_steps<const N: usize>(
     count: usize,
 ) -> Vec<([DoubleDouble; N], [DoubleDouble; N])> {
     let mut state = exact(start);
-    let mut held = Followed::new(arm, start, law, SETTINGS[0]).law;
-    let step = |state: &mut Exact<N>| {
+    let mut held = ExactLaw::of(law);
+    let mut step = |state: &mut Exact<N>| {
         let effort = match law {
             Law::Constant(effort) => effort.map(Real::from),
             Law::Continuous(..) | Law::Held { .. } => held.held(state, h),
@@ -382,7 +329,6 @@ pub fn exact_steps<const N: usize>(
         let (dq, dv) = increment(method, acceleration, Real::ZERO, q, v, Real::from(h));
         *state = (plus(q, &dq), plus(v, &dv));
     };
-    let mut step = step;
     let sample = |_| {
         (0..every).for_each(|_| step(&mut state));
         state

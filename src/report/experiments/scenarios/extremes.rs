@@ -61,7 +61,7 @@ fn error(gravity: f64, start: [f64; 2], timestep: f64, duration: f64) -> Option<
         reference: true,
     };
     let made = at_once(rollout(request)).ok()?;
-    Some((made.deviation.as_ref()?.largest(), made))
+    Some((made.deviation?.error, made))
 }
 
 fn gravity() -> Observation {

@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::support::{
-    Named, Observation, apart, arm, digits_lost, each, fastest, free, held, is_near, short, states,
+    Named, Observation, apart, arm, digits_lost, each, fastest, free, held, is_near, states,
     verdict,
 };
 use crate::math::arm::{Arm, State};
@@ -19,7 +19,7 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::state_after;
 use crate::report::experiments::measure::{
-    boundary, growth, in_substeps, live_at, measured_limit, measured_period,
+    LimitPair, boundary, growth, in_substeps, live_at, short,
 };
 use crate::report::experiments::nonlinear::derivative;
 use crate::study::control_loop::ControlLoop;
@@ -209,17 +209,11 @@ fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
 fn compare(gains: Gains<2>) -> (bool, Option<f64>, String) {
     let mut worst: f64 = 0.0;
     let [held, continuous] = Sampling::ALL.map(|sampling| {
-        let measured = Method::ALL.map(|method| {
-            let control = held(gains, POSE).with_method(method);
-            let predicted = largest_timestep(&Linear::at_setpoint(&control), method, sampling);
-            let predicted = predicted.unwrap_or(f64::NAN);
-            let measured = measured_limit(&control, sampling, 0.9 * predicted);
-            let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
-            worst = worst.max((ratio - 1.0).abs());
-            measured
-        });
+        let pairs = Method::ALL
+            .map(|method| LimitPair::of_timestep(&held(gains, POSE).with_method(method), sampling));
+        worst = worst.max(furthest_off(&pairs));
         // Methods are taken in order, Runge-Kutta 4 last.
-        measured.into_iter().next_back().flatten()
+        pairs.last().and_then(|pair| pair.measured)
     });
     let words = format!(
         "off by {:.4} % at worst; Runge-Kutta 4 held {} s, continuous {} s",
@@ -228,6 +222,11 @@ fn compare(gains: Gains<2>) -> (bool, Option<f64>, String) {
         short(continuous)
     );
     (worst < 0.01, held, words)
+}
+
+/// How far a measured limit is from the predicted one at most; infinite if one is missing.
+fn furthest_off(pairs: &[LimitPair]) -> f64 {
+    largest(pairs.iter().map(|pair| pair.off().unwrap_or(f64::INFINITY)))
 }
 
 fn limits_hold(gains: Gains<2>) -> Observation {
@@ -295,23 +294,19 @@ fn undamped() -> Observation {
 }
 
 fn slow_control() -> Observation {
-    let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
-    let mut worst: f64 = 0.0;
+    let (mut predicted, mut measured) = (Vec::new(), Vec::new());
     for method in [Method::Midpoint, Method::Verlet, Method::Rk4] {
         let control = held(MODERATE, POSE).with_method(method);
+        measured.extend([1, 10].map(|steps| LimitPair::of_period(&control, steps, false)));
         let linear = Linear::at_setpoint(&control);
-        for substeps in [1, 10, 100] {
-            let stepping = Stepping::held(&linear, method, substeps, false);
-            let predicted = stepping.limit().unwrap_or(f64::NAN);
-            lowest = lowest.min(predicted);
-            highest = highest.max(predicted);
-            if substeps < 100 {
-                let measured = measured_period(&control, 0.9 * predicted, substeps, false);
-                let ratio = measured.map_or(f64::INFINITY, |measured| measured / predicted);
-                worst = worst.max((ratio - 1.0).abs());
-            }
-        }
+        predicted.push(Stepping::held(&linear, method, 100, false).limit());
     }
+    predicted.extend(measured.iter().map(|pair| pair.predicted));
+    let predicted = predicted.into_iter().map(|limit| limit.unwrap_or(f64::NAN));
+    let (lowest, highest) = predicted.fold((f64::INFINITY, 0.0_f64), |(lowest, highest), limit| {
+        (lowest.min(limit), highest.max(limit))
+    });
+    let worst = furthest_off(&measured);
     let range = format!("{lowest:.5} to {highest:.5} s over methods and substeps");
     verdict(
         worst < 0.01 && highest / lowest < 1.01,
@@ -345,20 +340,12 @@ fn held_push() -> Observation {
 
 fn late_control() -> Observation {
     let control = held(MODERATE, POSE);
-    let linear = Linear::at_setpoint(&control);
-    let [prompt, late] =
-        [false, true].map(|delayed| Stepping::held(&linear, Method::Rk4, 1, delayed).limit());
-    let predicted = late.unwrap_or(f64::NAN);
-    let measured = measured_period(&control, 0.9 * predicted, 1, true);
-    let is_less = prompt.is_some_and(|prompt| predicted < 0.5 * prompt);
-    verdict(
-        is_less && is_near(measured, predicted, 0.01),
-        format!(
-            "predicted {predicted:.4e} s, measured {} s; without delay {} s",
-            short(measured),
-            short(prompt)
-        ),
-    )
+    let prompt = Stepping::held(&Linear::at_setpoint(&control), Method::Rk4, 1, false).limit();
+    let late = LimitPair::of_period(&control, 1, true);
+    let is_less = late.predicted.zip(prompt);
+    let is_less = is_less.is_some_and(|(late, prompt)| late < 0.5 * prompt);
+    let words = format!("{late}; without delay {} s", short(prompt));
+    verdict(is_less && late.agrees(), words)
 }
 
 /// The shipped law has no cap on the effort; this scene puts one behind it.
@@ -449,19 +436,12 @@ fn light_outer_link(mass: f64) -> Observation {
         arm: arm([1.0, mass], 9.81),
         ..held(MODERATE, [0.5, 0.8])
     };
-    let linear = Linear::at_setpoint(&control);
-    let predicted = largest_timestep(&linear, Method::Rk4, Sampling::Held);
-    let limit = predicted.unwrap_or(f64::NAN);
-    let measured = measured_limit(&control, Sampling::Held, 0.9 * limit);
+    let limit = LimitPair::of_timestep(&control, Sampling::Held);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
     let alone = 2.0 * (mass / 3.0) / MODERATE.kd[1];
-    let holds = is_near(measured, limit, 0.01) && is_near(predicted, alone, 0.01);
-    let limits = format!(
-        "limit predicted {} s, measured {} s",
-        short(predicted),
-        short(measured)
-    );
-    each([loses_few(&control.arm, [0.0; 2], PI), (holds, limits)])
+    let holds = limit.agrees() && is_near(limit.predicted, alone, 0.01);
+    let limit = format!("limit {limit}");
+    each([loses_few(&control.arm, [0.0; 2], PI), (holds, limit)])
 }
 
 fn heavy_outer_link(mass: f64) -> Observation {

@@ -65,11 +65,6 @@ pub(super) fn each(cases: impl IntoIterator<Item = (bool, String)>) -> Observati
     verdict(holds.into_iter().all(|holds| holds), words.join(", "))
 }
 
-/// A number as a table shows it.
-pub(super) fn short(value: Option<f64>) -> String {
-    value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4e}"))
-}
-
 /// Whether `value` is there, and within `part` of `expected`.
 pub(super) fn is_near(value: Option<f64>, expected: f64, part: f64) -> bool {
     value.is_some_and(|value| (value / expected - 1.0).abs() < part)
