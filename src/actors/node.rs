@@ -17,7 +17,7 @@ use super::ConnectionId;
 use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 pub use crate::services::Ask;
 
 // ---- questions ------------------------------------------------------------------------------------------------------
@@ -75,42 +75,14 @@ pub fn guard() -> (Done, oneshot::Receiver<()>) {
     (Arc::new(done), ended)
 }
 
-/// An answer of megabytes, which is written piece by piece.
-pub trait Pieces: Send {
-    /// Writes a piece; true once that was the last and the answer is on its way.
-    fn advance(&mut self) -> bool;
-
-    /// Says that there is no answer after all.
-    fn refuse(&mut self, why: Unserved);
-
-    /// True once nobody waits for the answer any more.
-    fn is_gone(&self) -> bool;
-}
-
-/// An answer that needs no writing: it has been given.
-struct AlreadyGiven;
-
-impl Pieces for AlreadyGiven {
-    fn advance(&mut self) -> bool {
-        true
-    }
-
-    fn refuse(&mut self, _: Unserved) {}
-
-    fn is_gone(&self) -> bool {
-        false
-    }
-}
-
 /// The asker.
 pub trait Asker<T>: Send {
     /// Takes the one answer. The news of the call's end, where it is there, travels with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Takes an answer of megabytes, which is written by its receiver.
-    fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
+    /// Takes the one answer, and writes its response on the present thread: it may have megabytes.
+    fn answer_here(self: Box<Self>, answer: T) {
         self.answer(Ok(answer), None);
-        Box::new(AlreadyGiven)
     }
 
     /// The client that asked; none if it was a node.
@@ -196,12 +168,10 @@ impl<T> Reply<T> {
         self.send(Ok(answer), None);
     }
 
-    /// Answers with something long, which is given once the caller of this has written its pieces.
-    #[must_use]
-    pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
-        match self.take() {
-            Some(asker) => asker.answer_in_pieces(answer),
-            None => Box::new(AlreadyGiven),
+    /// Answers; the response is written on the present thread, because it may have megabytes.
+    pub fn answer_here(&mut self, answer: T) {
+        if let Some(asker) = self.take() {
+            asker.answer_here(answer);
         }
     }
 

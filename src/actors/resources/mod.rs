@@ -4,7 +4,6 @@
 //! **Invariant:** nothing in here imports a node, so that every node can use it.
 
 pub mod aside;
-pub mod awake;
 pub mod gauges;
 pub mod memory;
 pub mod priority;

@@ -163,6 +163,19 @@ const DONE: [Field; 2] = [
 ];
 
 impl Rosapi {
+    /// Whether it is about the arm's parameters.
+    #[must_use]
+    pub const fn is_about_parameters(self) -> bool {
+        matches!(
+            self,
+            Self::GetParam
+                | Self::SetParam
+                | Self::HasParam
+                | Self::DeleteParam
+                | Self::GetParamNames
+        )
+    }
+
     /// The question without a prefix: `topics`.
     #[must_use]
     pub fn short_name(self) -> &'static str {

@@ -6,34 +6,7 @@ use serde_json::value::RawValue;
 
 use crate::protocol::wire::json;
 use crate::protocol::wire::json::Entries;
-use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::text;
-
-/// A message as the runtime's own listener hears it, without the points of a long trajectory that do not count.
-#[derive(Debug, Clone)]
-pub struct NodeMessage {
-    /// The message.
-    pub msg: Payload,
-    /// How many points of it were left out, all of them before its first.
-    pub left_out: usize,
-}
-
-impl From<Payload> for NodeMessage {
-    /// The whole message.
-    fn from(msg: Payload) -> Self {
-        Self { msg, left_out: 0 }
-    }
-}
-
-impl NodeMessage {
-    /// Reads the setpoint as [`joint_trajectory`] does, and names its fields as they were in the whole message.
-    ///
-    /// # Errors
-    /// The errors of [`joint_trajectory`].
-    pub fn setpoint(&self, joints: &[&str]) -> Result<SetpointRequest, TrajectoryError> {
-        read(self.msg.raw(), self.left_out, joints)
-    }
-}
 
 /// A setpoint for an arm of n joints, in the arm's order.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,14 +77,6 @@ pub fn joint_trajectory(
     msg: &RawValue,
     joints: &[&str],
 ) -> Result<SetpointRequest, TrajectoryError> {
-    read(msg, 0, joints)
-}
-
-fn read(
-    msg: &RawValue,
-    left_out: usize,
-    joints: &[&str],
-) -> Result<SetpointRequest, TrajectoryError> {
     let [names, points] = json::members(msg.get(), &["joint_names", "points"])
         .map_err(|_| mistyped("msg".to_owned(), "an object", msg))?;
     let points = points.ok_or_else(|| TrajectoryError::Missing {
@@ -120,7 +85,7 @@ fn read(
     let points = json::entries(points, 0)
         .ok_or_else(|| mistyped("points".to_owned(), "an array", points))?;
     let last = points.last.ok_or(TrajectoryError::NoPoints)?;
-    let field = format!("points[{}]", left_out + points.count - 1);
+    let field = format!("points[{}]", points.count - 1);
     let [positions, velocities] = json::members(last.get(), &["positions", "velocities"])
         .map_err(|_| mistyped(field.clone(), "an object", last))?;
 
@@ -145,17 +110,6 @@ fn read(
         },
         None => SetpointRequest { position, velocity },
     })
-}
-
-/// The message with its last point alone, and how many points were left out. It gives the same setpoint, or the same
-/// complaint. `None` if there are no points.
-pub(crate) fn condensed(msg: &RawValue) -> Option<(String, usize)> {
-    let [names, points] = json::members(msg.get(), &["joint_names", "points"]).ok()?;
-    let points = json::entries(points?, 0)?;
-    let last = points.last?;
-    let names = names.map_or("null", RawValue::get);
-    let msg = format!("{{\"joint_names\":{names},\"points\":[{last}]}}");
-    Some((msg, points.count - 1))
 }
 
 fn mistyped(field: String, expected: &'static str, raw: &RawValue) -> TrajectoryError {

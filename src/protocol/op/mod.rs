@@ -18,19 +18,14 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
-use super::messages::trajectory::NodeMessage;
 use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
 pub use reader::{OPS, read, read_start};
 
-/// Longest `args` and trajectory for a node of ours, without the members that it has no use for: the gateway's thread
-/// reads them, within some tenth of a millisecond. For computations, which workers read, and for other clients they may
-/// be as long as a frame.
-pub const MAX_ARGS: usize = 16 * 1024;
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 /// Largest `queue_length`: the [outbox](super::outbox) bounds what is held back by bytes, and no message is shorter
@@ -69,8 +64,6 @@ pub enum Op {
         topic: String,
         /// The message, an object.
         msg: Payload,
-        /// The part of it that the runtime's own listener needs, where the message is long.
-        heard: Option<NodeMessage>,
     },
     /// Delivers messages that go out as they have come in.
     PublishLines(Series),
@@ -361,7 +354,7 @@ pub enum Problem {
         /// The value that came, shortened.
         found: String,
     },
-    /// A field is longer than it may be: [`MAX_NAME`], [`MAX_ARGS`].
+    /// A name is longer than it may be: [`MAX_NAME`].
     #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
     TooLong {
         /// The operation.

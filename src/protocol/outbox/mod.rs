@@ -26,7 +26,7 @@ use self::message::{QueuedMessage, by_itself, counted};
 pub use self::throttle::Throttle;
 use self::throttle::TopicLimits;
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
-use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
+use crate::protocol::wire::series::{first_message, last_message, messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A longer message than [`MEDIUM`] has room elsewhere, and counts as one of these: no two of them wait.
@@ -97,12 +97,16 @@ impl Outbox {
         if !self.may_fit(&frame) {
             return;
         }
-        match self.limits.get(topic) {
-            Some(limits) if limits.holds_back() => self.offer(topic, frame, now),
-            Some(_) => {
+        match self.limits.get(topic).map(TopicLimits::holds_back) {
+            Some(holds_back) => {
                 let is_series = first_message(&frame) < frame.len();
                 for frame in messages(frame) {
-                    self.enqueue(Some(topic), now, by_itself(frame, is_series));
+                    let frame = by_itself(frame, is_series);
+                    if holds_back {
+                        self.offer(topic, frame, now);
+                    } else {
+                        self.enqueue(Some(topic), now, frame);
+                    }
                 }
             }
             None => self.enqueue(Some(topic), now, frame),
@@ -343,37 +347,19 @@ impl Outbox {
         }
     }
 
-    /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
-    /// newest would be left.
-    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
-        let is_series = first_message(&frames) < frames.len();
-        while !frames.is_empty() {
-            let frame = by_itself(frames.split_to(first_message(&frames)), is_series);
-            if !self.offer_one(topic, frame, now) {
-                let limits = self.limits.get(topic);
-                let left = limits.map_or(0, |limits| limits.throttle.held_back);
-                for frame in messages(last_messages(frames, left)) {
-                    self.offer_one(topic, by_itself(frame, true), now);
-                }
-                return;
-            }
-        }
-    }
-
-    /// Gives the throttle a message; false if it is held back.
-    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
+    /// Gives the throttle a message.
+    fn offer(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         let number = self.number();
         let Some(limits) = self.limits.get_mut(topic) else {
-            return true;
+            return;
         };
         if limits.held.is_empty() && limits.is_due(now) {
             limits.last = Some(now);
-            self.enqueue(Some(topic), now, frame);
-            return true;
+            return self.enqueue(Some(topic), now, frame);
         }
         if frame.len() > MEDIUM && !limits.may_hold_long(now) {
             self.dropped += 1;
-            return false;
+            return;
         }
         self.held_count += 1;
         self.held_bytes += counted(&frame);
@@ -385,7 +371,6 @@ impl Outbox {
         });
         let surplus = limits.trim();
         self.forget_held(&surplus);
-        false
     }
 
     /// These messages are no longer held back.
@@ -513,7 +498,7 @@ impl Outbox {
         }
         // The pieces of a message stay together.
         if first_message(&message.frame) < message.frame.len() {
-            let newest = by_itself(last_messages(message.frame.clone(), 1), true);
+            let newest = by_itself(last_message(message.frame.clone()), true);
             self.dropped += message.count() - 1;
             self.topic_bytes -= counted(&message.frame);
             self.topic_bytes += counted(&newest);
@@ -539,12 +524,11 @@ impl Outbox {
     }
 
     /// Drops topic messages, the oldest first, until what is left takes at most [`MAX_TOPIC_BYTES`]. The oldest is the
-    /// queue's first or the one that was held back first. A series loses as many messages at once as have to go.
+    /// queue's first or the one that was held back first. A series loses one message after the other.
     fn keep_bounded(&mut self) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;
-            let excess = cost.saturating_sub(MAX_TOPIC_BYTES);
-            if excess == 0 {
+            if cost <= MAX_TOPIC_BYTES {
                 return;
             }
             let first = self.topics.front_mut();
@@ -556,8 +540,8 @@ impl Outbox {
                 self.forget_held(oldest.as_slice());
                 self.dropped += 1;
             } else if let Some(QueuedMessage { frame, .. }) = first {
-                let (bytes, count) = first_messages(frame, excess);
-                self.dropped += count as u64;
+                let bytes = first_message(frame);
+                self.dropped += 1;
                 if bytes < frame.len() {
                     self.topic_bytes -= counted(frame);
                     frame.advance(bytes);

@@ -20,7 +20,6 @@ use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
-use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::gauges::Gauges;
 use crate::live::{BREATHER, GoalJudged, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
@@ -152,12 +151,6 @@ impl<const N: usize> ArmSim<N> {
     pub(super) fn attend(&mut self, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         self.advance_to_now(ctx);
-    }
-
-    /// To be called at every call: a client that calls once is likely to call again at once.
-    pub(super) fn attend_call(&mut self, ctx: &mut Context<Self>) {
-        self.attend(ctx);
-        stay_awake();
     }
 
     /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.

@@ -29,7 +29,7 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 
     /// Wall time plays no part in the steps, and the arm goes on from there when it is resumed.
     fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
-        self.attend_call(ctx);
+        self.attend(ctx);
         let asked = match self.arm.begin_steps(ask) {
             Ok(asked) => asked,
             Err(rejected) => return reply.conclude(Err(rejected)),

@@ -1,7 +1,6 @@
 //! `/arm_sim/integration_step`: a method integrates `x'' = f(t)` on the worker pool, apart from the live arm.
 //!
-//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
-//! time.
+//! The request is parsed, computed and written by a worker. A connection hands over one computation at a time.
 //!
 //! **Invariant:** nothing here knows the arm. The arm and the other clients go on during every
 //! request.
@@ -44,7 +43,7 @@ impl Integration {
 
     /// Enters this node's service into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve_long::<IntegrationStep>(Service::IntegrationStep, address.clone());
+        nodes.serve::<IntegrationStep>(Service::IntegrationStep, address.clone());
     }
 }
 
