@@ -20,7 +20,7 @@ use pendularm::protocol::op::{
     self, ActionServerOp, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
 };
 use pendularm::protocol::wire::frame::FrameReader;
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 use pendularm_fuzz::json::Json;
 use pendularm_fuzz::limits::{READING, hold};
 use serde_json::value::RawValue;
@@ -96,7 +96,7 @@ fn judge(frame: &str) {
 fn check(op: &Op, json: &Json, id: Option<&Payload>) {
     match op {
         Op::PublishLines(_) => unreachable!("one frame is never read as lines"),
-        Op::Publish { topic, msg, heard } => {
+        Op::Publish { topic, msg } => {
             check_name(json, "topic", topic);
             let line = check_line(&messages::publish_raw(topic, msg));
             check_passed_on(json.get("msg"), line.get("msg"));
@@ -104,15 +104,6 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             // The runtime's own subscribers read it further; they must not fail on any text.
             if *topic == *Topic::JointTrajectory.name() {
                 check_setpoint(msg.raw());
-                if let Some(heard) = heard {
-                    let joints = ["joint1", "joint2"];
-                    let whole = joint_trajectory(msg.raw(), &joints);
-                    assert_eq!(
-                        heard.setpoint(&joints),
-                        whole,
-                        "what is left out does not count"
-                    );
-                }
             }
         }
         Op::CallService(call) => {

@@ -17,7 +17,7 @@ use super::ConnectionId;
 use crate::actors::resources::memory::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 pub use crate::services::Ask;
 
 // ---- questions ------------------------------------------------------------------------------------------------------
@@ -75,42 +75,14 @@ pub fn guard() -> (Done, oneshot::Receiver<()>) {
     (Arc::new(done), ended)
 }
 
-/// An answer of megabytes, written in pieces.
-pub trait Pieces: Send {
-    /// Writes a piece. Returns `true` after the last one, when the answer has been sent.
-    fn advance(&mut self) -> bool;
-
-    /// Sends the error that there is no answer.
-    fn refuse(&mut self, why: Unserved);
-
-    /// Whether the caller has disconnected.
-    fn is_gone(&self) -> bool;
-}
-
-/// An answer that needs no writing and has been sent.
-struct AlreadyGiven;
-
-impl Pieces for AlreadyGiven {
-    fn advance(&mut self) -> bool {
-        true
-    }
-
-    fn refuse(&mut self, _: Unserved) {}
-
-    fn is_gone(&self) -> bool {
-        false
-    }
-}
-
 /// The asker.
 pub trait Asker<T>: Send {
     /// Sends the one answer. The guard of the call, if there is one, is sent with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Sends an answer of megabytes, which its receiver writes.
-    fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
+    /// Takes the one answer, and writes its response on the present thread: it may have megabytes.
+    fn answer_here(self: Box<Self>, answer: T) {
         self.answer(Ok(answer), None);
-        Box::new(AlreadyGiven)
     }
 
     /// The client that sent the question; `None` if it was a node.
@@ -196,12 +168,10 @@ impl<T> Reply<T> {
         self.send(Ok(answer), None);
     }
 
-    /// Begins a long answer. It is sent after the caller of this function has written its pieces.
-    #[must_use]
-    pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
-        match self.take() {
-            Some(asker) => asker.answer_in_pieces(answer),
-            None => Box::new(AlreadyGiven),
+    /// Answers; the response is written on the present thread, because it may have megabytes.
+    pub fn answer_here(&mut self, answer: T) {
+        if let Some(asker) = self.take() {
+            asker.answer_here(answer);
         }
     }
 

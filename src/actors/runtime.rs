@@ -26,8 +26,7 @@ use crate::actors::arm::sim::{ArmSim, Consult};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
-use crate::actors::gateway::connection::admission::Admission;
-use crate::actors::gateway::connection::admission::slots::Slots;
+use crate::actors::gateway::connection::admission::{Admission, Slots};
 use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{self, Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
@@ -40,7 +39,7 @@ use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::give_way;
 use crate::actors::ros::parameters::Parameters;
-use crate::actors::ros::rosapi::{ArmParameters, RosapiNode};
+use crate::actors::ros::rosapi::RosapiNode;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
@@ -157,7 +156,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     #[cfg(feature = "record")]
     ends.record(options).await?;
 
-    let admission = Arc::new(admission(options, room.unauthenticated));
+    let admission = Arc::new(admission(options, room.newcomers));
     let listeners: Vec<Addr<Listener>> = sockets
         .into_iter()
         .map(|socket| {
@@ -181,7 +180,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
 }
 
 /// The conditions under which clients are admitted, by the options.
-fn admission(options: &Options, unauthenticated: usize) -> Admission {
+fn admission(options: &Options, newcomers: usize) -> Admission {
     Admission {
         token: options.token.clone(),
         #[cfg(feature = "web")]
@@ -202,8 +201,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
             };
             Site::new(access, report, &frames)
         },
-        unauthenticated: Slots::new(unauthenticated),
-        waiting: Slots::default(),
+        newcomers: Slots::new(newcomers),
     }
 }
 
@@ -262,9 +260,8 @@ where
         ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
     ArmSim::attach(&arm, nodes);
-    let parameters = ArmParameters::of(&arm);
-    Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
-    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    Parameters::attach(&Parameters::of(&arm).start(), nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);

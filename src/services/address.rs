@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, ErrorForm};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 /// Destination of a response, with the call's name and id.
 pub struct Address {

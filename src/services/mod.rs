@@ -43,27 +43,8 @@ pub trait Callable: Ask + Sized {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections>;
 }
 
-/// A question with a short answer. The registry writes the response.
+/// A question whose answer is written as a response.
 pub trait Answered: Callable {
     /// Writes the response.
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
-}
-
-/// A question whose answer may be long. The thread that computes it writes the response, a piece at a time.
-pub trait Streamed: Callable {
-    /// Begins to write the response.
-    fn begin(answer: Self::Answer, to: &Address) -> Box<dyn ResponseWriter>;
-}
-
-/// A response that is being written.
-pub trait ResponseWriter: Send {
-    /// Writes the next part. Returns the whole response after the last part.
-    fn advance(&mut self) -> Option<Bytes>;
-}
-
-/// A response that has been written.
-impl ResponseWriter for Option<Bytes> {
-    fn advance(&mut self) -> Option<Bytes> {
-        self.take()
-    }
 }

@@ -10,7 +10,7 @@ use crate::exchanges::admission;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::admission::{
-    Admission, MAX_UNAUTHENTICATED, WRONG_TOKEN_TIME,
+    Admission, MAX_NEWCOMERS, WRONG_TOKEN_TIME,
 };
 use pendularm::actors::gateway::connection::{Connection, Ends};
 use pendularm::actors::gateway::limits::{HEAD_TIME, KEPT_PLACES};
@@ -156,13 +156,13 @@ fn silent_connections_without_end_keep_out_nobody_who_has_the_token() {
         let mut holders = Vec::new();
         let mut silent = Vec::new();
         for _ in 0..10 {
-            silent.extend(guarded.silent(MAX_UNAUTHENTICATED + 7));
+            silent.extend(guarded.silent(MAX_NEWCOMERS + 7));
             holders.push(guarded.holder().await);
         }
         assert_eq!(guarded.connections(), 10);
         // All but the newest have been told at once.
         let began = Instant::now();
-        let newest = silent.split_off(silent.len() - MAX_UNAUTHENTICATED + 1);
+        let newest = silent.split_off(silent.len() - MAX_NEWCOMERS + 1);
         for mut client in silent {
             let told = rest(&mut client).await;
             assert!(told.contains("others have yet to show it"), "{told}");
@@ -179,7 +179,7 @@ fn clients_with_the_token_are_counted_apart_from_those_without() {
     in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut holders = Vec::new();
-        let silent = guarded.silent(MAX_UNAUTHENTICATED);
+        let silent = guarded.silent(MAX_NEWCOMERS);
         for _ in 0..DEFAULT_CLIENTS - KEPT_PLACES {
             holders.push(guarded.holder().await);
         }
@@ -209,7 +209,7 @@ fn who_has_sent_the_token_loses_nothing_to_those_who_come_behind() {
         let guarded = Guarded::new().await;
         let mut holder = guarded.connect();
         holder.write_all(AUTH.as_bytes()).await.unwrap();
-        let silent = guarded.silent(2 * MAX_UNAUTHENTICATED);
+        let silent = guarded.silent(2 * MAX_NEWCOMERS);
         settle().await;
         assert_eq!(guarded.connections(), 1);
         holder.write_all(b"{\"op\":\"nonsense\"}\n").await.unwrap();
@@ -288,7 +288,7 @@ fn a_flood_of_guesses_is_answered_no_faster_and_keeps_out_nobody() {
             answered += usize::from(rest(&mut client).await.contains("not this runtime's"));
         }
         assert!(
-            (100..=MAX_UNAUTHENTICATED).contains(&answered),
+            (100..=MAX_NEWCOMERS).contains(&answered),
             "{answered} of 1,000 guesses answered"
         );
     });
@@ -300,7 +300,7 @@ fn slow_requests_without_the_token_keep_out_no_page_of_who_has_it() {
     in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut slow = Vec::new();
-        for _ in 0..5 * MAX_UNAUTHENTICATED {
+        for _ in 0..5 * MAX_NEWCOMERS {
             let mut client = guarded.connect();
             client
                 .write_all(b"GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n")

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
-use pendularm::actors::gateway::connection::admission::{Admission, MAX_UNAUTHENTICATED};
+use pendularm::actors::gateway::connection::admission::{Admission, MAX_NEWCOMERS};
 use pendularm::actors::gateway::connection::{Connection, Ends};
 use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, KEPT_PLACES, OPENING_TIME};
 use pendularm::actors::gateway::messages::Publish;
@@ -91,7 +91,7 @@ fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_an
         let log = Rc::clone(&heard);
         let node = Node {
             on_message: Box::new(move |message| {
-                log.borrow_mut().push(message.heard.msg.get().to_owned());
+                log.borrow_mut().push(message.msg.get().to_owned());
             }),
             ..Node::default()
         };
@@ -208,7 +208,7 @@ fn so_many_clients_wait_for_a_place_and_no_more() {
         // The clients of a listener share what admits them.
         let admission: Arc<Admission> = Arc::default();
         let mut waiting = Vec::new();
-        for _ in 0..=MAX_UNAUTHENTICATED {
+        for _ in 0..=MAX_NEWCOMERS {
             let (ours, theirs) = duplex(1024);
             let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
             let ends = Ends::default();

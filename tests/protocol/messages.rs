@@ -8,7 +8,7 @@ use pendularm::protocol::messages::{
     Level, Stamp, action_feedback, action_result, call, failure, message_text, publish,
     publish_raw, respelled, response, status,
 };
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 use proptest::prelude::*;
 use serde::Serialize;
 use serde_json::json;

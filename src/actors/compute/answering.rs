@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use super::workers::{Computation, Progress, WorkerPool};
-use crate::actors::node::{Pieces, Reply, Unserved};
+use crate::actors::node::{Reply, Unserved};
 use crate::actors::resources::memory::NoRoom;
 use crate::actors::resources::work_clock;
 use crate::services::study::Work;
@@ -17,69 +17,41 @@ pub(super) fn answer<T: Send + 'static>(
     work: impl Work<T> + 'static,
 ) {
     let of = reply.client();
-    let stage = AnsweringStage::Asked(Box::new(work));
-    workers.submit(of, Box::new(Answering { reply, stage }));
+    let answering = Answering {
+        reply: Some(reply),
+        has_room: false,
+        work,
+    };
+    workers.submit(of, Box::new(answering));
 }
 
-struct Answering<T> {
-    reply: Reply<T>,
-    stage: AnsweringStage<T>,
+struct Answering<T, W> {
+    /// None once it has been answered.
+    reply: Option<Reply<T>>,
+    /// Whether room for the answer has been taken.
+    has_room: bool,
+    work: W,
 }
 
-enum AnsweringStage<T> {
-    /// Memory for the answer has not been taken yet.
-    Asked(Box<dyn Work<T>>),
-    Working(Box<dyn Work<T>>),
-    Writing(Box<dyn Pieces>),
-    Answered,
-}
-
-impl<T: Send> Answering<T> {
-    fn caller_is_gone(&self) -> bool {
-        match &self.stage {
-            AnsweringStage::Writing(pieces) => pieces.is_gone(),
-            _ => self.reply.caller_is_gone(),
-        }
-    }
-
-    fn end(&mut self, why: Unserved) {
-        match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
-            AnsweringStage::Asked(_) | AnsweringStage::Working(_) => self.reply.refuse(why),
-            AnsweringStage::Writing(mut pieces) => pieces.refuse(why),
-            // The pool may end between the answer and the last check of the clock.
-            AnsweringStage::Answered => {}
-        }
-    }
-}
-
-impl<T: Send> Computation for Answering<T> {
+impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
     fn advance(&mut self, deadline: Instant) -> Progress {
-        while !matches!(self.stage, AnsweringStage::Answered) {
-            if self.caller_is_gone() {
+        while let Some(reply) = &mut self.reply {
+            if reply.caller_is_gone() {
                 self.end(Unserved::CallerGone);
+                break;
             }
-            self.stage = match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
-                AnsweringStage::Asked(work) => match self.reply.reserve(work.most_bytes()) {
-                    Ok(()) => AnsweringStage::Working(work),
-                    Err(NoRoom) => {
-                        self.stage = AnsweringStage::Asked(work);
-                        return Progress::Waiting;
-                    }
-                },
-                AnsweringStage::Working(mut work) => match work.advance(work_clock::reading) {
-                    None => AnsweringStage::Working(work),
-                    Some(answer) => AnsweringStage::Writing(self.reply.answer_in_pieces(answer)),
-                },
-                AnsweringStage::Writing(mut pieces) => {
-                    if pieces.advance() {
-                        AnsweringStage::Answered
-                    } else {
-                        AnsweringStage::Writing(pieces)
-                    }
+            if !self.has_room {
+                if let Err(NoRoom) = reply.reserve(self.work.most_bytes()) {
+                    return Progress::Waiting;
                 }
-                AnsweringStage::Answered => AnsweringStage::Answered,
-            };
-            if work_clock::now() >= deadline && !matches!(self.stage, AnsweringStage::Answered) {
+                self.has_room = true;
+            } else if let Some(answer) = self.work.advance(work_clock::reading) {
+                // Megabytes take a worker some tenths of a second, in which it does nothing else.
+                reply.answer_here(answer);
+                self.reply = None;
+                break;
+            }
+            if work_clock::now() >= deadline {
                 return Progress::Unfinished;
             }
         }
@@ -87,10 +59,19 @@ impl<T: Send> Computation for Answering<T> {
     }
 
     fn is_abandoned(&self) -> bool {
-        self.caller_is_gone()
+        let reply = self.reply.as_ref();
+        reply.is_some_and(Reply::caller_is_gone)
     }
 
     fn refuse(&mut self, why: &'static str) {
         self.end(Unserved::Refused(why));
+    }
+}
+
+impl<T, W> Answering<T, W> {
+    fn end(&mut self, why: Unserved) {
+        if let Some(mut reply) = self.reply.take() {
+            reply.refuse(why);
+        }
     }
 }

@@ -42,7 +42,7 @@ impl<const N: usize> Study<N> {
     /// Enters this node's services into the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
-        nodes.serve_long::<RunOffline<N>>(Service::Rollout, address.clone());
+        nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
         nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
     }

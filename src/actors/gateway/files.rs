@@ -5,7 +5,7 @@
 //!
 //! **Invariant:** the clients that are served never need all files that there may be.
 
-use super::connection::admission::MAX_UNAUTHENTICATED;
+use super::connection::admission::MAX_NEWCOMERS;
 
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
 /// report, and the clients that are just being refused for being too many.
@@ -18,15 +18,15 @@ const REFUSED_AT_ONCE: usize = 480;
 pub struct Room {
     /// Clients that are served.
     pub clients: usize,
-    /// Connections that have not shown the token yet; they are counted apart.
-    pub unauthenticated: usize,
+    /// Connections that have not shown the token yet, or for which no place is free; they are counted apart.
+    pub newcomers: usize,
 }
 
 /// Raises the limit of open files as far as `wanted_clients` need and the system allows. Returns how many connections
 /// there can be. They are fewer where the limit stays too low, which is logged.
 #[must_use]
 pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
-    let wanted = wanted_clients + MAX_UNAUTHENTICATED + OTHER_FILES + REFUSED_AT_ONCE;
+    let wanted = wanted_clients + MAX_NEWCOMERS + OTHER_FILES + REFUSED_AT_ONCE;
     // It is never lowered.
     match raise_limit(wanted) {
         Ok(files) => {
@@ -61,19 +61,22 @@ fn raise_limit(_: usize) -> std::io::Result<usize> {
     Ok(usize::MAX)
 }
 
-/// Counts the places that `files` open files allow: at least one client. Where files are few, those without the token
-/// have half of them.
+/// Counts the places that `files` open files allow: at least one client. Where a token is asked for and files are few,
+/// those without the token have half of them.
 #[must_use]
 pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room {
     let files = files.saturating_sub(OTHER_FILES);
-    let unauthenticated = if asks_token {
-        (files / 2).clamp(1, MAX_UNAUTHENTICATED)
+    let newcomers = if asks_token {
+        (files / 2).clamp(1, MAX_NEWCOMERS)
     } else {
-        0
+        MAX_NEWCOMERS
     };
+    let kept_for_them = if asks_token { newcomers } else { 0 };
     Room {
-        clients: (files - unauthenticated.min(files)).clamp(1, wanted_clients.max(1)),
-        unauthenticated,
+        clients: files
+            .saturating_sub(kept_for_them)
+            .clamp(1, wanted_clients.max(1)),
+        newcomers,
     }
 }
 
@@ -99,21 +102,14 @@ mod tests {
 
     #[test]
     fn there_are_files_for_those_without_the_token_too() {
-        for (files, clients, unauthenticated) in [
-            (usize::MAX, WANTED, MAX_UNAUTHENTICATED),
-            (
-                1024,
-                1024 - OTHER_FILES - MAX_UNAUTHENTICATED,
-                MAX_UNAUTHENTICATED,
-            ),
+        for (files, clients, newcomers) in [
+            (usize::MAX, WANTED, MAX_NEWCOMERS),
+            (1024, 1024 - OTHER_FILES - MAX_NEWCOMERS, MAX_NEWCOMERS),
             (64, 16, 16),
             (3, 1, 1),
         ] {
             let room = room_with(files, WANTED, true);
-            assert_eq!(
-                (room.clients, room.unauthenticated),
-                (clients, unauthenticated)
-            );
+            assert_eq!((room.clients, room.newcomers), (clients, newcomers));
         }
     }
 }

@@ -76,8 +76,7 @@ pub(super) const WRITE_BYTES: usize = 64 * 1024;
 pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames of a chunk after which the reader yields.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
-/// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
-/// at again.
+/// How long after their time pieces of a message are forgotten, and how often a client without a place asks again.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Computations of one connection that wait at most behind the one that runs. The client is not read meanwhile.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

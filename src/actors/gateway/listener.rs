@@ -136,7 +136,7 @@ async fn accept(
 fn prepare(stream: &TcpStream) -> std::io::Result<()> {
     // Small frames must not wait for one another's acknowledgements.
     stream.set_nodelay(true)?;
-    // Over raw TCP nothing else tells a silent client from one whose machine is gone.
+    // Nothing else tells a silent client from one whose machine is gone.
     let keepalive = TcpKeepalive::new()
         .with_time(KEEPALIVE_IDLE)
         .with_interval(KEEPALIVE_INTERVAL)

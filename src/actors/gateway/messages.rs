@@ -20,7 +20,7 @@ use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;
 use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::Census;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 /// A new client. From its connection; the answer is its id.
 #[derive(Message)]
@@ -118,7 +118,6 @@ pub struct Request {
 #[derive(MessageResponse, Default)]
 pub struct Handled {
     effect: Option<oneshot::Receiver<()>>,
-    is_with_a_node: bool,
 }
 
 impl Handled {
@@ -128,29 +127,12 @@ impl Handled {
         Self::default()
     }
 
-    /// The op has gone to a node, or to a client that provides a service. A message may also be on its way to
-    /// subscribers.
+    /// The op has gone to a node or a client that serves it, or a message to its subscribers.
     #[must_use]
-    pub fn by_node(effect: oneshot::Receiver<()>) -> Self {
+    pub fn with(effect: oneshot::Receiver<()>) -> Self {
         Self {
             effect: Some(effect),
-            is_with_a_node: true,
         }
-    }
-
-    /// A message is on its way to subscribers.
-    #[must_use]
-    pub fn by_subscribers(effect: oneshot::Receiver<()>) -> Self {
-        Self {
-            effect: Some(effect),
-            is_with_a_node: false,
-        }
-    }
-
-    /// Whether a node has yet to perform the op.
-    #[must_use]
-    pub const fn is_with_a_node(&self) -> bool {
-        self.is_with_a_node
     }
 
     /// Waits until the op has taken effect.
@@ -162,13 +144,10 @@ impl Handled {
     }
 }
 
-/// Asks for the topics and services that clients have. From `rosapi`; there is no answer where there are more of them.
+/// Asks for the topics and services that clients have. From `rosapi`.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<Census>")]
-pub struct TakeCensus {
-    /// Most topics and services of the answer.
-    pub at_most: usize,
-}
+#[rtype(result = "Census")]
+pub struct TakeCensus;
 
 /// Something that passes the registry, as the tap gets it.
 pub enum Tapped<'a> {

@@ -3,7 +3,6 @@
 //! **Invariant:** nothing here imports a node, so every node can use it.
 
 pub mod aside;
-pub mod awake;
 pub mod gauges;
 pub mod memory;
 pub mod priority;

@@ -13,7 +13,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, Feedback, FrameOut, Respond};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{Arguments, GoalStatus};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 /// A client's goal or cancellation, forwarded by the registry.
 pub enum ActionRequest {

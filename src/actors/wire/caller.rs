@@ -12,13 +12,12 @@ use serde::Serialize;
 use tokio::sync::oneshot;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, FrameOut, Respond, Unserved, guard};
+use crate::actors::node::{Asker, Done, FrameOut, Respond, Unserved, guard};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::trajectory::NodeMessage;
 use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::op::Arguments;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::services::Address;
 
 /// A call of one of the runtime's own services, forwarded by the registry.
@@ -33,8 +32,8 @@ pub struct ServiceCall {
 
 /// A client's message on a topic of the runtime, forwarded by the registry.
 pub struct TopicMessage {
-    /// The parts of the message that the runtime needs.
-    pub heard: NodeMessage,
+    /// The message.
+    pub msg: Payload,
     /// The way back, for an error status.
     pub respond: Recipient<Respond>,
     /// The client.
@@ -65,9 +64,9 @@ impl TopicMessage {
 pub struct Caller {
     registry: Recipient<Respond>,
     connection: ConnectionId,
-    /// `None` once the answer has been sent.
-    pub(super) address: Option<Address>,
-    /// The permit for a long answer, or for the long frame of the call.
+    /// None once the answer has been given.
+    address: Option<Address>,
+    /// The room that is taken for a long answer, or else for the long frame that asked.
     permit: Option<Permit>,
     gone: Arc<AtomicBool>,
     pub(super) done: Option<Done>,
@@ -149,8 +148,8 @@ impl Caller {
         Ok(())
     }
 
-    /// Sends the caller a status, before the answer, with the reason why the request has no effect yet.
-    pub(super) fn warn(&self, why: &str) {
+    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
+    fn warn(&self, why: &str) {
         let status = Respond::status(self.connection, Level::Warning, why, self.id());
         self.registry.do_send(status);
     }
@@ -165,8 +164,8 @@ impl Caller {
         self.answer_at_once(|address| address.failure(why));
     }
 
-    /// Answers and ends the call. The registry calls `write`.
-    pub(super) fn conclude(
+    /// Answers and ends the call; `write` is called by the registry.
+    fn conclude(
         mut self,
         done: Option<Done>,
         write: impl FnOnce(&Address) -> Bytes + Send + 'static,
@@ -179,7 +178,7 @@ impl Caller {
         }
     }
 
-    pub(super) fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
+    fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
             let frame = cover(self.permit.as_ref(), write(&address));
             self.send(address.service(), frame.into(), None);
@@ -200,5 +199,45 @@ impl Caller {
 impl Drop for Caller {
     fn drop(&mut self) {
         self.answer_at_once(|address| address.failure(&Unserved::Ended.to_string()));
+    }
+}
+
+// ---- a caller that waits for a node's answer ------------------------------------------------------------------------
+
+/// A client that has asked for a `T`.
+pub(super) struct ClientAsker<T> {
+    pub(super) caller: Caller,
+    /// Writes the answer.
+    pub(super) write: fn(T, &Address) -> Bytes,
+}
+
+impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>) {
+        let Self { caller, write } = *self;
+        caller.conclude(done, move |address| match answer {
+            Ok(answer) => write(answer, address),
+            Err(why) => address.failure(&why.to_string()),
+        });
+    }
+
+    fn answer_here(self: Box<Self>, answer: T) {
+        let Self { mut caller, write } = *self;
+        caller.answer_at_once(|address| write(answer, address));
+    }
+
+    fn client(&self) -> Option<ConnectionId> {
+        Some(self.caller.connection())
+    }
+
+    fn is_gone(&self) -> bool {
+        self.caller.is_gone()
+    }
+
+    fn warn(&self, why: &str) {
+        self.caller.warn(why);
+    }
+
+    fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+        self.caller.reserve(bytes)
     }
 }

@@ -11,9 +11,7 @@
 pub mod action_client;
 mod caller;
 mod routes;
-mod served;
 
 pub use self::caller::{Caller, ServiceCall, TopicMessage};
-pub(in crate::actors) use self::routes::read_arguments;
 pub use self::routes::{Nodes, Route};
-pub use crate::services::{Address, Answered, Callable, ResponseWriter, Streamed};
+pub use crate::services::{Address, Answered, Callable};

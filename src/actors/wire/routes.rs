@@ -6,17 +6,16 @@ use std::collections::HashMap;
 
 use actix::prelude::*;
 
-use super::action_client::ActionRequest;
-use super::caller::{ServiceCall, TopicMessage};
-use super::served::{AnswerForm, ClientAsker};
-use crate::actors::node::{Call, Interest, Reply};
+use super::action_client::{ActionClient, ActionRequest, Canceller};
+use super::caller::{ClientAsker, ServiceCall, TopicMessage};
+use crate::actors::node::{Call, Done, Interest, Reply};
 use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
-use crate::services::{Answered, Callable, Streamed};
+use crate::protocol::op::Arguments;
+use crate::services::Answered;
 
-/// Longer arguments are read on another thread. Numbers near the middle between two doubles take 5 µs per 24 bytes, so
-/// this length takes at most a fifth of a millisecond. Only computations, paths and lists of parameters accept longer
-/// ones.
+/// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
+/// so these take a fifth of a millisecond. Usual ones are shorter.
 const LONG_ARGUMENTS: usize = 1024;
 
 /// Passes a message to its node.
@@ -36,27 +35,10 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// Adds a row to a node's table: calls of `service` are this question.
+    /// A row of a node's table: calls of `service` are this question. Its fields are read here, and the rejected ones
+    /// are reported.
     pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
-        self.route(service, node.into(), || AnswerForm::Short(A::write));
-    }
-
-    /// The same for a service with a possibly long answer.
-    pub fn serve_long<A: Streamed>(
-        &mut self,
-        service: Service,
-        node: impl Into<Recipient<Call<A>>>,
-    ) {
-        self.route(service, node.into(), || AnswerForm::Long(A::begin));
-    }
-
-    /// Reads the question, or returns its rejected fields.
-    fn route<A: Callable>(
-        &mut self,
-        service: Service,
-        node: Recipient<Call<A>>,
-        form: fn() -> AnswerForm<A::Answer>,
-    ) {
+        let node = node.into();
         let take = move |call: ServiceCall| {
             let node = node.clone();
             let length = call.arguments.payload().get().len();
@@ -65,8 +47,11 @@ impl Nodes {
                 match A::read(call.service, &call.arguments) {
                     Ok(ask) => {
                         let done = caller.done.take();
-                        let form = form();
-                        let reply = Reply::new(ClientAsker { caller, form }, done);
+                        let asker = ClientAsker {
+                            caller,
+                            write: A::write,
+                        };
+                        let reply = Reply::new(asker, done);
                         node.do_send(Call { ask, reply });
                     }
                     Err(rejections) => caller.refuse(&rejections.status()),
@@ -76,10 +61,41 @@ impl Nodes {
         };
         self.services.insert(service, Box::new(take));
     }
+
+    /// Messages of clients on `topic` are read by `take`.
+    pub fn listen(&mut self, topic: Topic, take: impl Fn(TopicMessage) + Clone + Send + 'static) {
+        let take = move |message: TopicMessage| {
+            let take = take.clone();
+            read_arguments(message.msg.get().len(), move || take(message));
+        };
+        self.listeners.insert(topic, Box::new(take));
+    }
+
+    /// Goals of `action` are read by `take`, and ended by `cancel`.
+    pub fn carry_out(
+        &mut self,
+        action: Action,
+        take: impl Fn(Arguments, ActionClient, Done) + Clone + Send + 'static,
+        cancel: impl Fn(Canceller, Done) + Send + 'static,
+    ) {
+        let take = move |request| match request {
+            ActionRequest::Goal {
+                arguments,
+                client,
+                done,
+            } => {
+                let take = take.clone();
+                let length = arguments.payload().get().len();
+                read_arguments(length, move || take(arguments, client, done));
+            }
+            ActionRequest::Cancel { from, done } => cancel(from, done),
+        };
+        self.actions.insert(action, Box::new(take));
+    }
 }
 
-/// Reads arguments of `length` bytes. Long ones are read on another thread, while the client's next frames wait.
-pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
+/// Reads arguments of `length` bytes: long ones on another thread, while the client's next frames wait.
+fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
     if length > LONG_ARGUMENTS {
         // The task is boxed, so only one kind is compiled, and not one for each service.
         let read: Box<dyn FnOnce() + Send> = Box::new(read);

@@ -100,12 +100,6 @@ impl Action {
         self.entry().owner
     }
 
-    /// Whether a goal may be as long as a frame. It is then read on a worker thread.
-    #[must_use]
-    pub const fn takes_long_goals(self) -> bool {
-        matches!(self, Self::FollowJointTrajectory)
-    }
-
     /// The types of a goal, a result and feedback.
     #[must_use]
     pub const fn parts(self) -> [Type; 3] {

@@ -163,7 +163,20 @@ const DONE: [Field; 2] = [
 ];
 
 impl Rosapi {
-    /// The service without a prefix: `topics`.
+    /// Whether it is about the arm's parameters.
+    #[must_use]
+    pub const fn is_about_parameters(self) -> bool {
+        matches!(
+            self,
+            Self::GetParam
+                | Self::SetParam
+                | Self::HasParam
+                | Self::DeleteParam
+                | Self::GetParamNames
+        )
+    }
+
+    /// The question without a prefix: `topics`.
     #[must_use]
     pub fn short_name(self) -> &'static str {
         let name = self.entry().name;

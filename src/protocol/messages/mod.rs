@@ -18,7 +18,7 @@ pub use self::telemetry::{
     Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState,
     JointTrajectory, JointTrajectoryPoint, KeyValue, Stamp,
 };
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.

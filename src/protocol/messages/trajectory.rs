@@ -6,34 +6,7 @@ use serde_json::value::RawValue;
 
 use crate::protocol::wire::json;
 use crate::protocol::wire::json::Entries;
-use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::text;
-
-/// A message for the runtime itself. Unused points of a long trajectory are removed.
-#[derive(Debug, Clone)]
-pub struct NodeMessage {
-    /// The message.
-    pub msg: Payload,
-    /// The number of removed points, all of them before its first.
-    pub left_out: usize,
-}
-
-impl From<Payload> for NodeMessage {
-    /// The whole message.
-    fn from(msg: Payload) -> Self {
-        Self { msg, left_out: 0 }
-    }
-}
-
-impl NodeMessage {
-    /// Reads the setpoint with [`joint_trajectory`], and names fields by their index in the whole message.
-    ///
-    /// # Errors
-    /// The errors of [`joint_trajectory`].
-    pub fn setpoint(&self, joints: &[&str]) -> Result<SetpointRequest, TrajectoryError> {
-        read(self.msg.raw(), self.left_out, joints)
-    }
-}
 
 /// A setpoint for an arm of n joints, in the arm's order.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,14 +77,6 @@ pub fn joint_trajectory(
     msg: &RawValue,
     joints: &[&str],
 ) -> Result<SetpointRequest, TrajectoryError> {
-    read(msg, 0, joints)
-}
-
-fn read(
-    msg: &RawValue,
-    left_out: usize,
-    joints: &[&str],
-) -> Result<SetpointRequest, TrajectoryError> {
     let [names, points] = json::members(msg.get(), &["joint_names", "points"])
         .map_err(|_| mistyped("msg".to_owned(), "an object", msg))?;
     let points = points.ok_or_else(|| TrajectoryError::Missing {
@@ -120,7 +85,7 @@ fn read(
     let points = json::entries(points, 0)
         .ok_or_else(|| mistyped("points".to_owned(), "an array", points))?;
     let last = points.last.ok_or(TrajectoryError::NoPoints)?;
-    let field = format!("points[{}]", left_out + points.count - 1);
+    let field = format!("points[{}]", points.count - 1);
     let [positions, velocities] = json::members(last.get(), &["positions", "velocities"])
         .map_err(|_| mistyped(field.clone(), "an object", last))?;
 
@@ -145,17 +110,6 @@ fn read(
         },
         None => SetpointRequest { position, velocity },
     })
-}
-
-/// The message with only its last point, and the number of removed points. It gives the same setpoint or the same
-/// error. `None` if there are no points.
-pub(crate) fn condensed(msg: &RawValue) -> Option<(String, usize)> {
-    let [names, points] = json::members(msg.get(), &["joint_names", "points"]).ok()?;
-    let points = json::entries(points?, 0)?;
-    let last = points.last?;
-    let names = names.map_or("null", RawValue::get);
-    let msg = format!("{{\"joint_names\":{names},\"points\":[{last}]}}");
-    Some((msg, points.count - 1))
 }
 
 fn mistyped(field: String, expected: &'static str, raw: &RawValue) -> TrajectoryError {

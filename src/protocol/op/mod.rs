@@ -17,20 +17,15 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
-use super::messages::trajectory::NodeMessage;
 use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
 pub use reader::{OPS, read, read_start};
 
-/// Longest `args` and trajectory for a node of the runtime, without unused members. The gateway's thread reads them
-/// within some tenths of a millisecond. For computations, which workers read, and for other clients they may be as long
-/// as a frame.
-pub const MAX_ARGS: usize = 16 * 1024;
-/// Longest `throttle_rate`: a year, longer than any connection.
+/// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
 /// Largest `queue_length`. The [outbox](super::outbox) bounds held messages by bytes, and no message has fewer than 40.
 pub const MAX_QUEUE_LENGTH: usize = 100_000;
@@ -67,8 +62,6 @@ pub enum Op {
         topic: String,
         /// The message, an object.
         msg: Payload,
-        /// The part that the runtime itself needs, if the message is long.
-        heard: Option<NodeMessage>,
     },
     /// Delivers messages that are forwarded unchanged.
     PublishLines(Series),
@@ -359,7 +352,7 @@ pub enum Problem {
         /// The received value, shortened.
         found: String,
     },
-    /// A field is longer than its limit: [`MAX_NAME`] or [`MAX_ARGS`].
+    /// A name is longer than it may be: [`MAX_NAME`].
     #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
     TooLong {
         /// The operation.

@@ -3,22 +3,19 @@
 //! **Invariant:** a member is read only for operations that have it. For all others only its syntax is checked.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
-use serde_json::value::{RawValue, to_raw_value};
+use serde_json::value::RawValue;
 
 use super::{
     ActionGoal, ActionServerOp, Arguments, CallService, Compression, Encoding, GoalStatus,
-    Incoming, MAX_ARGS, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
-    Subscribe, Verbosity,
+    Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, Subscribe,
+    Verbosity,
 };
-use crate::protocol::catalog::{Action, Field, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
-use crate::protocol::messages::trajectory::{self, NodeMessage};
 use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::wire::fragments::Piece;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::{json, text};
 
 /// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
@@ -116,16 +113,10 @@ impl<'a> OpReader<'a> {
     /// A call. Once its service is known, every other fault gets a `service_response`.
     fn call(&self) -> Result<Op, OpError> {
         let service = self.name("service").map_err(OpError::Status)?;
-        let fields = Service::from_name(&service)
-            .filter(|service| !service.is_computation())
-            .map(Service::fields);
-        match self
-            .timeout()
-            .and_then(|timeout| Ok((timeout, self.args(fields)?)))
-        {
-            Ok((timeout, args)) => Ok(Op::CallService(CallService {
+        match self.timeout() {
+            Ok(timeout) => Ok(Op::CallService(CallService {
                 service,
-                args,
+                args: self.args(),
                 timeout,
             })),
             Err(problem) => Err(OpError::Call { service, problem }),
@@ -142,11 +133,10 @@ impl<'a> OpReader<'a> {
             "unadvertise" => Op::Unadvertise {
                 topic: self.name("topic")?,
             },
-            "publish" => {
-                let (topic, msg) = (self.name("topic")?, self.object("msg")?);
-                let heard = self.heard(&topic, &msg)?;
-                Op::Publish { topic, msg, heard }
-            }
+            "publish" => Op::Publish {
+                topic: self.name("topic")?,
+                msg: self.object("msg")?,
+            },
             "subscribe" => Op::Subscribe(self.subscription()?),
             "unsubscribe" => Op::Unsubscribe {
                 topic: self.name("topic")?,
@@ -320,10 +310,7 @@ impl<'a> OpReader<'a> {
     }
 
     fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
-        self.within(MAX_NAME, field, text)
-    }
-
-    fn within(&self, limit: usize, field: &'static str, text: &str) -> Result<(), Problem> {
+        let limit = MAX_NAME;
         if text.len() <= limit {
             return Ok(());
         }
@@ -367,6 +354,18 @@ impl<'a> OpReader<'a> {
         Ok(length.unwrap_or(MAX_QUEUE_LENGTH).min(MAX_QUEUE_LENGTH))
     }
 
+    fn args(&self) -> Arguments {
+        let Some(args) = self.get("args").map(Payload::from) else {
+            return Arguments::none();
+        };
+        match args.get().as_bytes().first() {
+            Some(b'{') => Arguments::Object(args),
+            Some(b'[') => Arguments::Positional(args),
+            Some(b'n') => Arguments::none(),
+            _ => Arguments::Neither(args),
+        }
+    }
+
     fn timeout(&self) -> Result<Option<Duration>, Problem> {
         let expected = "a number of seconds greater than 0";
         let timeout = self.optional("timeout", expected, |raw| {
@@ -397,12 +396,9 @@ impl OpReader<'_> {
         if let Some(id) = self.get("id") {
             self.short("id", id.get())?;
         }
-        let fields = Action::from_name(action)
-            .filter(|action| !action.takes_long_goals())
-            .map(Action::goal_fields);
         Ok(ActionGoal {
             type_name: self.optional_text("action_type")?,
-            args: self.args(fields)?,
+            args: self.args(),
             feedback: match self.get("feedback") {
                 Some(_) => self.boolean("feedback")?,
                 None => false,
@@ -507,59 +503,4 @@ impl OpReader<'_> {
             status: self.get("status").and_then(json::text).map(Cow::into_owned),
         })
     }
-}
-
-// ---- for the runtime's own nodes: only the members that they have a use for, at most `MAX_ARGS` bytes ---------------
-
-/// Longer arguments and messages are reduced to the members that the runtime's nodes use.
-const USUAL: usize = 4 * 1024;
-
-impl OpReader<'_> {
-    /// The arguments. Long ones for a node of the runtime are reduced to its `fields`, which must not be too long.
-    fn args(&self, fields: Option<&'static [Field]>) -> Result<Arguments, Problem> {
-        let Some(raw) = self.get("args") else {
-            return Ok(Arguments::none());
-        };
-        let known = fields.filter(|_| raw.get().len() > USUAL);
-        let args = match known.and_then(|fields| only(raw, fields)) {
-            Some(known) => Payload::from(known),
-            None => Payload::from(raw),
-        };
-        if fields.is_some() {
-            self.within(MAX_ARGS, "args", args.get())?;
-        }
-        Ok(match args.get().as_bytes().first() {
-            Some(b'{') => Arguments::Object(args),
-            Some(b'[') => Arguments::Positional(args),
-            Some(b'n') => Arguments::none(),
-            _ => Arguments::Neither(args),
-        })
-    }
-
-    /// Returns the part of a long message that the runtime itself needs, if it subscribes to the topic.
-    fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<NodeMessage>, Problem> {
-        let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
-        if !is_ours || msg.get().len() <= USUAL {
-            return Ok(None);
-        }
-        let Some((text, left_out)) = trajectory::condensed(msg.raw()) else {
-            self.within(MAX_ARGS, "msg", msg.get())?;
-            return Ok(None);
-        };
-        self.within(MAX_ARGS, "msg", &text)?;
-        let msg = RawValue::from_string(text).ok().map(Payload::from);
-        Ok(msg.map(|msg| NodeMessage { msg, left_out }))
-    }
-}
-
-/// The object `raw`, reduced to the members in `fields`; `None` if it is not an object.
-fn only(raw: &RawValue, fields: &[Field]) -> Option<Box<RawValue>> {
-    let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
-    let mut values = vec![None; names.len()];
-    json::members_into(raw.get(), &names, &mut values).ok()?;
-    let found = names.into_iter().zip(values);
-    let found: BTreeMap<&str, &RawValue> = found
-        .filter_map(|(name, value)| Some((name, value?)))
-        .collect();
-    to_raw_value(&found).ok()
 }

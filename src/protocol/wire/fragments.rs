@@ -3,10 +3,9 @@
 //! They are [sent](split()) only to subscribers with a `fragment_size`, and accepted from any client, within
 //! bounds. The caller passes the time.
 //!
-//! **Invariant:** incomplete messages have at most [`MAX_FRAME`] bytes together. There are at most
-//! [`MAX_UNFINISHED`] of them, none older than [`MAX_AGE`].
+//! **Invariant:** what is kept is one unfinished message of at most [`MAX_FRAME`] bytes, for [`MAX_AGE`] at most.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -15,9 +14,7 @@ use serde::Serialize;
 use super::frame::start_of;
 use crate::protocol::limits::MAX_FRAME;
 
-/// Most incomplete messages of one connection. Clients send one after the other.
-pub const MAX_UNFINISHED: usize = 8;
-/// Most pieces of one message: a kilobyte each for the longest frame.
+/// Pieces of one message: each of a longest frame's has a kilobyte.
 pub const MAX_PIECES: usize = 4096;
 /// Bytes of a piece besides its text: its table entry and the allocator's overhead.
 pub const PIECE_BYTES: usize = 128;
@@ -59,22 +56,21 @@ pub enum FragmentError {
         /// The new number.
         now: usize,
     },
-    /// Too many messages at once.
-    #[error("fragment: at most {MAX_UNFINISHED} messages may be incomplete at once")]
-    TooManyMessages,
     /// Too long.
     #[error("fragment: incomplete messages must have at most {MAX_FRAME} bytes together")]
     TooLong,
 }
 
-/// The incomplete messages of one connection.
+/// The message of one connection that is still incomplete: clients send one after the other. The next one takes its
+/// place.
 #[derive(Debug, Default)]
 pub struct Fragments {
-    messages: HashMap<String, Incomplete>,
+    message: Option<Incomplete>,
 }
 
 #[derive(Debug)]
 struct Incomplete {
+    id: String,
     began: Instant,
     total: usize,
     pieces: BTreeMap<usize, String>,
@@ -116,88 +112,77 @@ impl Fragments {
         piece: Piece,
         now: Instant,
     ) -> Result<Option<Complete>, (FragmentError, Vec<u8>)> {
-        self.forget_old(now);
-        let checked = self.check(&piece);
         let Piece {
             id,
             data,
             num,
             total,
         } = piece;
-        if let Err(why) = checked {
-            let before = self.messages.remove(&id);
-            let first = before.and_then(|mut one| one.pieces.remove(&0));
-            let first = first.or_else(|| Some(data).filter(|_| num == 0));
-            return Err((why, start_of(first.unwrap_or_default().as_bytes())));
-        }
-        let begin = || Incomplete {
+        self.forget_old(now);
+        let before = self.message.take().filter(|one| one.id == id);
+        let mut message = before.unwrap_or_else(|| Incomplete {
+            id,
             began: now,
             total,
             pieces: BTreeMap::new(),
             bytes: 0,
-        };
-        let unfinished = self.messages.entry(id.clone()).or_insert_with(begin);
-        unfinished.bytes += data.len();
-        if let Some(before) = unfinished.pieces.insert(num, data) {
-            unfinished.bytes -= before.len();
+        });
+        if let Err(why) = message.check(num, total, data.len()) {
+            let first = message.pieces.remove(&0);
+            let first = first.or_else(|| Some(data).filter(|_| num == 0));
+            return Err((why, start_of(first.unwrap_or_default().as_bytes())));
         }
-        if unfinished.pieces.len() < total {
+        message.bytes += data.len();
+        if let Some(before) = message.pieces.insert(num, data) {
+            message.bytes -= before.len();
+        }
+        if message.pieces.len() < total {
+            self.message = Some(message);
             return Ok(None);
         }
-        Ok(self.messages.remove(&id).map(|whole| Complete {
-            bytes: whole.bytes,
-            pieces: whole.pieces,
+        Ok(Some(Complete {
+            bytes: message.bytes,
+            pieces: message.pieces,
         }))
     }
 
-    fn bytes(&self) -> usize {
-        self.messages.values().map(|one| one.bytes).sum()
-    }
-
-    /// Bytes of memory in use. Pieces without text and ids count too.
+    /// Bytes of memory that this takes: pieces without text take some too, and so does an id.
     #[must_use]
     pub fn allocated(&self) -> usize {
-        let beside = self.messages.iter();
-        let beside = beside.map(|(id, one)| id.len() + PIECE_BYTES * (1 + one.pieces.len()));
-        self.bytes() + beside.sum::<usize>()
+        self.message.as_ref().map_or(0, |one| {
+            one.bytes + one.id.len() + PIECE_BYTES * (1 + one.pieces.len())
+        })
     }
 
-    /// When the oldest unfinished message began.
+    /// When the unfinished message began.
     #[must_use]
-    pub fn oldest(&self) -> Option<Instant> {
-        self.messages.values().map(|one| one.began).min()
+    pub fn began(&self) -> Option<Instant> {
+        self.message.as_ref().map(|one| one.began)
     }
 
-    fn check(&self, piece: &Piece) -> Result<(), FragmentError> {
-        let &Piece { num, total, .. } = piece;
-        if num >= total {
-            return Err(FragmentError::NoSuchPiece { num, total });
-        }
-        if total > MAX_PIECES {
-            return Err(FragmentError::TooMany(total));
-        }
-        let message = self.messages.get(&piece.id);
-        match message.map(|one| one.total) {
-            Some(before) if before != total => {
-                return Err(FragmentError::Changed { before, now: total });
-            }
-            None if self.messages.len() >= MAX_UNFINISHED => {
-                return Err(FragmentError::TooManyMessages);
-            }
-            _ => {}
-        }
-        let replaced = message.and_then(|one| one.pieces.get(&num));
-        let replaced = replaced.map_or(0, String::len);
-        if self.bytes() - replaced + piece.data.len() > MAX_FRAME {
-            return Err(FragmentError::TooLong);
-        }
-        Ok(())
-    }
-
-    /// Discards messages older than [`MAX_AGE`].
+    /// Forgets a message that takes longer than [`MAX_AGE`].
     pub fn forget_old(&mut self, now: Instant) {
-        self.messages
-            .retain(|_, one| now.saturating_duration_since(one.began) <= MAX_AGE);
+        let is_young = |one: &Incomplete| now.saturating_duration_since(one.began) <= MAX_AGE;
+        self.message = self.message.take().filter(is_young);
+    }
+}
+
+impl Incomplete {
+    /// Whether there is room for a piece of that number and length.
+    fn check(&self, num: usize, total: usize, length: usize) -> Result<(), FragmentError> {
+        let before = self.total;
+        let replaced = self.pieces.get(&num).map_or(0, String::len);
+        if num >= total {
+            Err(FragmentError::NoSuchPiece { num, total })
+        } else if total > MAX_PIECES {
+            Err(FragmentError::TooMany(total))
+        } else if before != total {
+            Err(FragmentError::Changed { before, now: total })
+        } else if self.bytes - replaced + length > MAX_FRAME {
+            Err(FragmentError::TooLong)
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -293,28 +278,13 @@ mod tests {
         }
         let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
         assert_eq!(whole.map(Complete::text), Some(half.repeat(2)));
-        assert_eq!(fragments.bytes(), 0);
-    }
-
-    #[test]
-    fn pieces_make_a_message_in_whatever_order_they_come() {
-        let now = Instant::now();
-        let mut fragments = Fragments::default();
-        assert_eq!(fragments.take(piece("a", 2, 3, "z"), now), Ok(None));
-        assert_eq!(fragments.take(piece("b", 0, 2, "other"), now), Ok(None));
-        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
-        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
-        let whole = fragments.take(piece("a", 1, 3, "y"), now).unwrap();
-        assert_eq!(whole.map(Complete::text), Some("xyz".to_owned()));
-        assert_eq!(fragments.bytes(), "other".len());
+        assert_eq!(fragments.allocated(), 0);
     }
 
     #[test]
     fn what_breaks_a_bound_is_refused_and_its_message_forgotten() {
         let now = Instant::now();
         let mut fragments = Fragments::default();
-        fragments.take(piece("a", 0, 2, "x"), now).unwrap();
-        let half = "x".repeat(MAX_FRAME / 2 + 1);
         for (bad, why) in [
             (
                 piece("a", 1, 3, "y"),
@@ -325,78 +295,41 @@ mod tests {
                 FragmentError::NoSuchPiece { num: 2, total: 2 },
             ),
             (
-                piece("a", 0, 0, "y"),
+                piece("b", 0, 0, "y"),
                 FragmentError::NoSuchPiece { num: 0, total: 0 },
             ),
             (
-                piece("a", 0, MAX_PIECES + 1, "y"),
+                piece("b", 0, MAX_PIECES + 1, "y"),
                 FragmentError::TooMany(MAX_PIECES + 1),
             ),
+            (
+                piece("a", 1, 2, &"x".repeat(MAX_FRAME)),
+                FragmentError::TooLong,
+            ),
         ] {
+            fragments.take(piece("a", 0, 2, "x"), now).unwrap();
             let refused = fragments.take(bad, now).map_err(|(error, _)| error);
             assert_eq!(refused, Err(why));
-            assert!(fragments.messages.is_empty());
-            assert_eq!(fragments.bytes(), 0);
-            fragments.take(piece("a", 0, 2, "x"), now).unwrap();
+            assert_eq!((fragments.allocated(), fragments.began()), (0, None));
         }
-        fragments.take(piece("b", 0, 3, &half), now).unwrap();
-        let long = fragments.take(piece("b", 1, 3, &half), now);
-        assert_eq!(long.unwrap_err().0, FragmentError::TooLong);
-        assert_eq!(fragments.bytes(), 1);
-        for number in 1..MAX_UNFINISHED {
-            fragments
-                .take(piece(&number.to_string(), 0, 2, "x"), now)
-                .unwrap();
-        }
-        let more = fragments.take(piece("more", 0, 2, "x"), now);
-        assert_eq!(more.unwrap_err().0, FragmentError::TooManyMessages);
-        let later = now + MAX_AGE + Duration::from_secs(1);
-        assert_eq!(fragments.take(piece("more", 0, 2, "x"), later), Ok(None));
-        assert_eq!(fragments.messages.len(), 1, "old ones are forgotten");
+        let most = fragments.take(piece("a", 0, MAX_PIECES, "x"), now);
+        assert_eq!(most, Ok(None));
     }
 
     #[test]
-    fn the_bounds_themselves_are_within_bounds() {
+    fn an_unfinished_message_is_forgotten_after_a_minute_and_when_another_begins() {
         let now = Instant::now();
         let mut fragments = Fragments::default();
-        assert_eq!(
-            fragments.take(piece("a", 0, MAX_PIECES, "x"), now),
-            Ok(None)
-        );
-        let half = "x".repeat(MAX_FRAME / 2);
-        let mut fragments = Fragments::default();
-        assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
-        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
-        assert_eq!(whole.map(|whole| whole.bytes()), Some(MAX_FRAME));
-    }
-
-    #[test]
-    fn what_is_forgotten_makes_room() {
-        let now = Instant::now();
-        let much = "x".repeat(MAX_FRAME / 2 + 1);
-        let mut fragments = Fragments::default();
-        fragments.take(piece("old", 0, 2, &much), now).unwrap();
-        let at_last = now + MAX_AGE;
-        let more = fragments.take(piece("new", 0, 2, &much), at_last);
-        assert_eq!(more.unwrap_err().0, FragmentError::TooLong);
-        let later = at_last + Duration::from_nanos(1);
-        assert_eq!(fragments.take(piece("new", 0, 2, &much), later), Ok(None));
-        assert_eq!(fragments.bytes(), much.len());
-    }
-
-    #[test]
-    fn what_is_kept_is_known_by_its_bytes_and_its_oldest() {
-        let now = Instant::now();
-        let mut fragments = Fragments::default();
-        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
         fragments.take(piece("a", 0, 2, "one"), now).unwrap();
-        let later = now + Duration::from_secs(1);
-        fragments.take(piece("b", 0, 2, "three"), later).unwrap();
-        assert_eq!((fragments.bytes(), fragments.oldest()), (8, Some(now)));
+        assert_eq!(fragments.allocated(), 3 + 1 + 2 * PIECE_BYTES);
         fragments.forget_old(now + MAX_AGE);
-        assert_eq!(fragments.bytes(), 8);
-        fragments.forget_old(later + MAX_AGE);
-        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(later)));
+        assert_eq!(fragments.began(), Some(now));
+        fragments.forget_old(now + MAX_AGE + Duration::from_nanos(1));
+        assert_eq!(fragments.began(), None);
+        fragments.take(piece("a", 0, 2, "one"), now).unwrap();
+        fragments.take(piece("b", 0, 2, "{"), now).unwrap();
+        assert_eq!(fragments.take(piece("a", 1, 2, "two"), now), Ok(None));
+        assert_eq!(fragments.take(piece("b", 1, 2, "}"), now), Ok(None));
     }
 
     /// Characters of one to four bytes, split at every size, give the same text when joined.

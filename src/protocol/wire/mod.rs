@@ -6,7 +6,5 @@ pub mod fragments;
 pub mod frame;
 pub mod json;
 pub mod opening;
-pub mod payload;
 pub mod series;
-pub mod streamed;
 pub(crate) mod text;

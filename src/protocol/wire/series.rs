@@ -66,47 +66,21 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
 /// (fragments, binary, or more bytes than a series has). The time does not depend on the length of the message.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
-    first_messages(frames, 0).0
-}
-
-/// The length and number of the first messages of frames for one client that have at least `bytes` bytes together:
-/// at least one, at most all.
-#[must_use]
-pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
-        return (frames.len(), 1);
+        return frames.len();
     }
-    let from = bytes.saturating_sub(1).min(frames.len());
-    let (before, behind) = frames.split_at(from);
-    let end = behind.iter().position(|byte| *byte == b'\n');
-    let end = end.map_or(frames.len(), |end| from + end + 1);
-    (end, lines(before) + 1)
+    let end = frames.iter().position(|byte| *byte == b'\n');
+    end.map_or(frames.len(), |end| end + 1)
 }
 
-/// The number of line ends in `bytes`. They are counted in chunks whose count fits into a byte, which compiles to much
-/// faster code.
-fn lines(bytes: &[u8]) -> usize {
-    let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
-    let parts = bytes.chunks(u8::MAX.into());
-    parts.map(|part| usize::from(ends(part))).sum()
-}
-
-/// The last messages of a series, at most `count`.
+/// The last message of a series.
 #[must_use]
-pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
-    let mut start = frames.len();
-    for _ in 0..count {
-        // A message ends with its newline.
-        let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
-        start = before
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |end| end + 1);
-        if start == 0 {
-            break;
-        }
-    }
-    frames.split_off(start)
+pub fn last_message(mut frames: Bytes) -> Bytes {
+    // A message ends with a newline, its own.
+    let before = frames.len().saturating_sub(1);
+    let before = frames.get(..before).unwrap_or_default();
+    let end = before.iter().rposition(|byte| *byte == b'\n');
+    frames.split_off(end.map_or(0, |end| end + 1))
 }
 
 /// Each message of `frames`.
@@ -229,52 +203,18 @@ fn number(bytes: &[u8], start: usize) -> Option<usize> {
     (at - start <= MAX_DIGITS).then_some(at)
 }
 
-/// Eight copies of a byte.
-const fn all(byte: u8) -> u64 {
-    u64::from_le_bytes([byte; 8])
-}
-
-/// Eight bytes from `at` on, the first one lowest; zeros after the end.
-fn eight(bytes: &[u8], at: usize) -> u64 {
-    let rest = bytes.get(at..).unwrap_or_default();
-    if let Some(eight) = rest.first_chunk::<8>() {
-        return u64::from_le_bytes(*eight);
-    }
-    rest.iter()
-        .rev()
-        .fold(0, |word, byte| (word << 8) | u64::from(*byte))
-}
-
-/// The number of bytes before the first one whose top bit is set; 8 if there is none.
-const fn before_mark(marks: u64) -> usize {
-    ((marks & all(0x80)).trailing_zeros() / 8) as usize
-}
-
-/// Skips the digits at `at`, eight at a time.
+/// Goes past the digits at `at`.
 fn past_digits(bytes: &[u8], mut at: usize) -> usize {
-    loop {
-        let values = eight(bytes, at) ^ all(b'0');
-        // A value of 10 or more sets the top bit. A carry may mark bytes after the first non-digit, never one before
-        // it.
-        let digits = before_mark(values.wrapping_add(all(0x80 - 10)) | values);
-        at += digits;
-        if digits < 8 {
-            return at;
-        }
+    while matches!(bytes.get(at), Some(b'0'..=b'9')) {
+        at += 1;
     }
+    at
 }
 
-/// Skips the rest of a string of plain ASCII, from `at` inside it.
-fn string(bytes: &[u8], mut at: usize) -> Option<usize> {
-    loop {
-        let text = eight(bytes, at);
-        // The lowest mark is correct. Higher ones may come from a borrow.
-        let equal = |byte: u8| (text ^ all(byte)).wrapping_sub(all(1)) & !(text ^ all(byte));
-        let control = text.wrapping_sub(all(b' ')) & !text;
-        let plain = before_mark(equal(b'"') | equal(b'\\') | control | text);
-        at += plain;
-        if plain < 8 {
-            return (*bytes.get(at)? == b'"').then_some(at + 1);
-        }
-    }
+/// Goes past the end of a string of plain ASCII whose inside begins at `at`.
+fn string(bytes: &[u8], at: usize) -> Option<usize> {
+    let is_plain = |byte: &u8| matches!(byte, b' '..=b'!' | b'#'..=b'[' | b']'..=0x7f);
+    let inside = bytes.get(at..)?;
+    let end = at + inside.iter().position(|byte| !is_plain(byte))?;
+    (*bytes.get(end)? == b'"').then_some(end + 1)
 }

@@ -4,9 +4,10 @@
 
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::trajectory::{NodeMessage, TrajectoryError};
+use crate::protocol::messages::trajectory::{TrajectoryError, joint_trajectory};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::json::Payload;
 
 /// Names of the joints, base first.
 const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
@@ -20,10 +21,10 @@ pub fn joint_names<const N: usize>() -> [&'static str; N] {
 /// Reads a setpoint.
 ///
 /// # Errors
-/// If the message has no valid setpoint for this arm.
-pub fn read_setpoint<const N: usize>(heard: &NodeMessage) -> Result<Setpoint<N>, TrajectoryError> {
-    let request = heard.setpoint(&joint_names::<N>())?;
-    // The reader has checked their number.
+/// If the message holds none for this arm.
+pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, TrajectoryError> {
+    let request = joint_trajectory(msg.raw(), &joint_names::<N>())?;
+    // The reader has checked how many they are.
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     Ok(Setpoint {
         position: array(&request.position),
@@ -34,9 +35,9 @@ pub fn read_setpoint<const N: usize>(heard: &NodeMessage) -> Result<Setpoint<N>,
 /// Reads the efforts \[N m\] of a `std_msgs/msg/Float64MultiArray`. Its layout is ignored.
 ///
 /// # Errors
-/// If the message does not have one for each joint.
-pub fn read_effort<const N: usize>(heard: &NodeMessage) -> Result<[f64; N], Rejections> {
-    let args = Arguments::Object(heard.msg.clone());
+/// If the message does not hold one for each joint.
+pub fn read_effort<const N: usize>(msg: &Payload) -> Result<[f64; N], Rejections> {
+    let args = Arguments::Object(msg.clone());
     let mut fields = Fields::of_message(&args, Topic::EffortCommands)?;
     let effort = fields.array("data", Bound::Finite);
     effort.ok_or_else(|| fields.finish())

@@ -8,6 +8,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use serde::{Serialize, Serializer};
 
 use super::reading::{taken, with_period};
 use super::{Computed, NUMBER_BYTES, Present, Work};
@@ -17,10 +18,9 @@ use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::protocol::wire::streamed::StreamedResponse;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::field_by_field::FieldByField as _;
-use crate::services::{Address, Ask, Callable, ResponseWriter, Streamed};
+use crate::services::{Address, Answered, Ask, Callable};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
 use crate::study::paused::Paused;
@@ -82,9 +82,6 @@ pub enum NotRun {
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
-/// Samples encoded between two checks of the clock: some tens of microseconds.
-const SAMPLES_PER_LOOK: usize = 256;
-
 impl<const N: usize> Callable for RunOffline<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
@@ -105,112 +102,55 @@ impl<const N: usize> Callable for RunOffline<N> {
     }
 }
 
-impl<const N: usize> Streamed for RunOffline<N> {
-    fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Box<dyn ResponseWriter> {
-        match answer {
-            Ok(ran) => Box::new(RolloutWriter::new(*ran, to)),
-            Err(why) => Box::new(Some(to.failure(&why.to_string()))),
+impl<const N: usize> Answered for RunOffline<N> {
+    fn write(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Bytes {
+        /// The samples and the error, in the order of the documentation.
+        #[derive(Serialize)]
+        struct Values<'a, const N: usize> {
+            times: &'a [f64],
+            positions: Rows<'a, N>,
+            velocities: Rows<'a, N>,
+            efforts: Rows<'a, N>,
+            energy: &'a [f64],
+            evaluations: u64,
+            wall_time: f64,
+            error: Option<f64>,
+            error_uncertainty: Option<f64>,
+            sampling_error: Option<f64>,
+            sampling_error_uncertainty: Option<f64>,
         }
-    }
-}
-
-/// The answer, written a slice at a time: it may be 30 MB.
-struct RolloutWriter<const N: usize> {
-    run: Rollout<N>,
-    took: Duration,
-    writer: StreamedResponse,
-    /// Index of the array that is being written.
-    column: usize,
-    /// Index of its next entry.
-    entry: usize,
-}
-
-/// The arrays, in the order in which they are written.
-const ARRAYS: [&str; 5] = [
-    "{\"times\":[",
-    "],\"positions\":[",
-    "],\"velocities\":[",
-    "],\"efforts\":[",
-    "],\"energy\":[",
-];
-
-impl<const N: usize> RolloutWriter<N> {
-    fn new(Ran { run, took }: Ran<N>, to: &Address) -> Self {
-        Self {
-            run,
-            took,
-            writer: StreamedResponse::new(to.name(), to.id()),
-            column: 0,
-            entry: 0,
-        }
-    }
-
-    fn finish(&mut self) -> Bytes {
-        let method = self.run.known(self.run.deviation.as_ref());
-        let sampling = self.run.known(self.run.from_ideal.as_ref());
-        let writer = &mut self.writer;
-        writer.raw(&format!(
-            "],\"evaluations\":{},\"wall_time\":",
-            self.run.evaluations
-        ));
-        writer.number(self.took.as_secs_f64());
-        for (name, value) in [
-            ("error", method.0),
-            ("error_uncertainty", method.1),
-            ("sampling_error", sampling.0),
-            ("sampling_error_uncertainty", sampling.1),
-        ] {
-            writer.raw(&format!(",\"{name}\":"));
-            writer.number(value.unwrap_or(f64::NAN));
-        }
-        writer.raw("}");
-        std::mem::take(writer).finish(true, "")
-    }
-}
-
-impl<const N: usize> ResponseWriter for RolloutWriter<N> {
-    fn advance(&mut self) -> Option<Bytes> {
-        let Some(head) = ARRAYS.get(self.column) else {
-            return Some(self.finish());
+        let Ran { run, took } = match answer {
+            Ok(ran) => *ran,
+            Err(why) => return to.failure(&why.to_string()),
         };
-        if self.entry == 0 {
-            self.writer.raw(head);
-        }
-        let samples = self.run.times.len();
-        let end = samples.min(self.entry + SAMPLES_PER_LOOK);
-        for entry in self.entry..end {
-            if entry > 0 {
-                self.writer.raw(",");
-            }
-            let run = &self.run;
-            match self.column {
-                0 => number(&mut self.writer, run.times.get(entry)),
-                1 => row(&mut self.writer, run.positions.get(entry)),
-                2 => row(&mut self.writer, run.velocities.get(entry)),
-                3 => row(&mut self.writer, run.efforts.get(entry)),
-                _ => number(&mut self.writer, run.energy.get(entry)),
-            }
-        }
-        self.entry = end;
-        if end == samples {
-            self.column += 1;
-            self.entry = 0;
-        }
-        None
+        let method = run.known(run.deviation.as_ref());
+        let sampling = run.known(run.from_ideal.as_ref());
+        let values = Values {
+            times: &run.times,
+            positions: Rows(&run.positions),
+            velocities: Rows(&run.velocities),
+            efforts: Rows(&run.efforts),
+            energy: &run.energy,
+            evaluations: run.evaluations,
+            wall_time: took.as_secs_f64(),
+            error: method.0,
+            error_uncertainty: method.1,
+            sampling_error: sampling.0,
+            sampling_error_uncertainty: sampling.1,
+        };
+        to.response(&values, "")
     }
 }
 
-fn number(writer: &mut StreamedResponse, value: Option<&f64>) {
-    writer.number(value.copied().unwrap_or(f64::NAN));
+/// A list for each sample, with a number for each joint.
+struct Rows<'a, const N: usize>(&'a [[f64; N]]);
+
+impl<const N: usize> Serialize for Rows<'_, N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(<[f64; N]>::as_slice))
+    }
 }
 
-fn row<const N: usize>(writer: &mut StreamedResponse, values: Option<&[f64; N]>) {
-    for (joint, value) in values.into_iter().flatten().enumerate() {
-        writer.raw(if joint == 0 { "[" } else { "," });
-        writer.number(*value);
-    }
-    writer.raw("]");
-}
 // ---- work -----------------------------------------------------------------------------------------------------------
 
 /// Default duration of a run \[s\].

@@ -49,13 +49,12 @@ use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::admission::Admission;
+use pendularm::actors::gateway::connection::admission::{Admission, MAX_AUTH_BYTES};
 use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
 use pendularm::math::pid::Gains;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME};
-use pendularm::protocol::op::MAX_ARGS;
 use pendularm::protocol::op::follow::MAX_POINTS;
 use pendularm::protocol::ros::parameters::MAX_NAMED;
 #[cfg(feature = "web")]
@@ -73,7 +72,7 @@ const SOON: Duration = Duration::from_millis(10);
 
 /// Limits that a repetition or a loop may have as its count.
 const LIMITS: [(&str, usize); 7] = [
-    ("MAX_ARGS", MAX_ARGS),
+    ("MAX_AUTH_BYTES", MAX_AUTH_BYTES),
     ("MAX_FRAME", MAX_FRAME),
     ("MAX_FRAMES", MAX_FRAMES),
     ("MAX_NAME", MAX_NAME),

@@ -110,7 +110,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
     use pendularm::actors::ConnectionId;
     use pendularm::actors::gateway::messages::Tapped;
     use pendularm::protocol::catalog::Service;
-    use pendularm::protocol::wire::payload::Payload;
+    use pendularm::protocol::wire::json::Payload;
     use serde_json::value::RawValue;
 
     let counts = Arc::new(Mutex::new((0, 0)));

@@ -1,4 +1,4 @@
-//! HTTP and WebSocket where time matters: heads that do not come, peers that show no sign of life, clients that do not
+//! HTTP and WebSocket where time matters: heads that do not come, messages that do not end, clients that do not
 //! read. Here the client's end of a connection.
 //!
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
@@ -8,7 +8,6 @@
 mod closing;
 mod heads;
 mod http;
-mod life;
 mod messages;
 mod unread;
 
@@ -33,9 +32,6 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep};
 
-const PING_INTERVAL: Duration = Duration::from_secs(15);
-const PONG_TIME: Duration = Duration::from_secs(30);
-
 /// The client's end of a new connection.
 fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
     connect_through(gateway, &Arc::default(), room)
@@ -59,14 +55,9 @@ async fn send(socket: &mut Client<DuplexStream>, frame: Value) {
     socket.send(&frame).await;
 }
 
-/// The next message other than a ping, which is answered.
+/// The next message.
 async fn receive(socket: &mut Client<DuplexStream>) -> Event {
-    loop {
-        match socket.next_event().await.expect("a message") {
-            Event::Ping(_) => {}
-            message => return message,
-        }
-    }
+    socket.next_event().await.expect("a message")
 }
 
 /// The same, which must be a text.

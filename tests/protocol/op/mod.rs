@@ -5,7 +5,6 @@
 //! **Invariant:** every bad field is tried in every operation that has it.
 
 mod hostile;
-mod long;
 mod members;
 
 use std::time::Duration;
@@ -16,7 +15,7 @@ use pendularm::protocol::op::{
     Compression, Encoding, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Verbosity,
     read,
 };
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 
 const FRAMES: &str = include_str!("frames.txt");
 

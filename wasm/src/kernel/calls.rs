@@ -7,17 +7,17 @@ use pendularm::math::kinematics::solve;
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::messages;
 use pendularm::protocol::op::{Arguments, CallService};
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 use pendularm::services::arm::{
     Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{Computed, PlanRun, PredictStability, RunOffline, SuggestGains};
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
-use pendularm::services::{Address, Answered, Callable, NoService};
+use pendularm::services::{Address, Answered, NoService};
 
 use super::Kernel;
-use super::computing::{Short, Streaming};
+use super::computing::Answering;
 use super::repeated::Repeated;
 
 impl<const N: usize> Kernel<N> {
@@ -74,17 +74,14 @@ impl<const N: usize> Kernel<N> {
             Service::TrialStop => {
                 self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
             }
-            Service::Stability => self.compute_short::<PredictStability<N>>(own, &args, to),
-            Service::SuggestGains => self.compute_short::<SuggestGains<N>>(own, &args, to),
-            Service::Plan => self.compute_short::<PlanRun<N>>(own, &args, to),
-            Service::Rollout => match RunOffline::<N>::read(own, &args) {
-                Ok(ask) => {
-                    let work = Repeated::new(ask, self.arm.present());
-                    let run = Streaming::<RunOffline<N>>::new(work, to);
-                    self.computations.push_back(Box::new(run));
-                }
-                Err(rejected) => self.send(to.failure(&rejected.status())),
-            },
+            Service::Stability => {
+                self.begin::<PredictStability<N>, _>(own, &args, to, PredictStability::work);
+            }
+            Service::SuggestGains => {
+                self.begin::<SuggestGains<N>, _>(own, &args, to, SuggestGains::work);
+            }
+            Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, PlanRun::work),
+            Service::Rollout => self.begin::<RunOffline<N>, _>(own, &args, to, Repeated::new),
             _ => self.send(to.failure(&NoService::NotServed(to.name().to_owned()).to_string())),
         }
     }
@@ -133,7 +130,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    fn compute_short<A: Answered + Computed<N>>(
+    fn begin<A: Answered, W: Work<A::Answer> + 'static>(
         &mut self,
         service: Service,
         args: &Arguments,
@@ -143,7 +140,7 @@ impl<const N: usize> Kernel<N> {
             Ok(ask) => {
                 let work = ask.work(self.arm.present());
                 self.computations
-                    .push_back(Box::new(Short::<A, A::Work>::new(work, to)));
+                    .push_back(Box::new(Answering::<A, W>::new(work, to)));
             }
             Err(rejected) => self.send(to.failure(&rejected.status())),
         }

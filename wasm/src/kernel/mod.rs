@@ -21,7 +21,7 @@ use pendularm::math::trial::Trial;
 use pendularm::protocol::catalog::{Direction, Topic};
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{self, Op, OpError, Verbosity};
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 use pendularm::services::arm::{read_effort, read_setpoint};
 use pendularm::study::clocks::clock_limits;
 
@@ -91,10 +91,7 @@ impl<const N: usize> Kernel<N> {
         let id = incoming.id;
         match incoming.op {
             Ok(Op::CallService(call)) => self.call(call, id),
-            Ok(Op::Publish { topic, msg, heard }) => {
-                let heard = heard.unwrap_or_else(|| msg.clone().into());
-                self.take_message(&topic, &msg, &heard, id.as_ref());
-            }
+            Ok(Op::Publish { topic, msg }) => self.take_message(&topic, &msg, id.as_ref()),
             Ok(Op::Subscribe(subscribe)) => {
                 if let Some(topic) = Topic::from_name(&subscribe.topic) {
                     let world = self.arm.world();
@@ -185,14 +182,8 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Handles a published message: passes it to the subscribers and to the arm.
-    fn take_message(
-        &mut self,
-        name: &str,
-        msg: &Payload,
-        heard: &messages::trajectory::NodeMessage,
-        id: Option<&Payload>,
-    ) {
+    /// A message that the client publishes: subscribers are told of it, and so is the arm.
+    fn take_message(&mut self, name: &str, msg: &Payload, id: Option<&Payload>) {
         let topic = Topic::from_name(name);
         let Some(topic) = topic.filter(|topic| topic.direction() == Direction::Subscribed) else {
             return self.complain(&format!("topic: nobody listens to {name} here"), id);
@@ -200,11 +191,11 @@ impl<const N: usize> Kernel<N> {
         self.attend();
         self.arm.world().pass_on(topic, msg);
         let refused = match topic {
-            Topic::JointTrajectory => read_setpoint(heard)
+            Topic::JointTrajectory => read_setpoint(msg)
                 .map(|setpoint| self.arm.hold(setpoint))
                 .err()
                 .map(|why| why.to_string()),
-            Topic::EffortCommands => read_effort(heard)
+            Topic::EffortCommands => read_effort(msg)
                 .map_err(|why| why.to_string())
                 .and_then(|effort| self.arm.command(effort).map_err(|why| why.to_string()))
                 .err(),

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use pendularm::live::{GoalJudged, World};
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
-use pendularm::protocol::wire::payload::Payload;
+use pendularm::protocol::wire::json::Payload;
 
 use super::Clock;
 

@@ -7,8 +7,8 @@ use actix::prelude::*;
 use super::{FollowPath, PathFollower, StopFollowing};
 use crate::actors::arm::sim::joint_names;
 use crate::actors::node::Done;
-use crate::actors::wire::action_client::{ActionClient, ActionRequest};
-use crate::actors::wire::{Nodes, Route, read_arguments};
+use crate::actors::wire::Nodes;
+use crate::actors::wire::action_client::ActionClient;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
 use crate::protocol::op::follow::{FollowGoal, JointTolerance};
@@ -25,33 +25,17 @@ const GOAL_TIME: f64 = 5.0;
 impl<const N: usize> PathFollower<N> {
     /// Adds this node's action to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        let requests = requests(address.clone().recipient(), address.clone().recipient());
-        nodes
-            .actions
-            .insert(Action::FollowJointTrajectory, requests);
-    }
-}
-
-fn requests<const N: usize>(
-    follow: Recipient<FollowPath<N>>,
-    stop: Recipient<StopFollowing>,
-) -> Route<ActionRequest> {
-    Box::new(move |request| match request {
-        ActionRequest::Goal {
-            arguments,
-            client,
-            done,
-        } => {
-            let follow = follow.clone();
-            let length = arguments.payload().get().len();
-            let read = move || match FollowGoal::read(&arguments, &joint_names::<N>()) {
+        let follow: Recipient<FollowPath<N>> = address.clone().recipient();
+        let stop: Recipient<StopFollowing> = address.clone().recipient();
+        nodes.carry_out(
+            Action::FollowJointTrajectory,
+            move |arguments, client, done| match FollowGoal::read(&arguments, &joint_names::<N>()) {
                 Ok(goal) => follow.do_send(path(&goal, client, done)),
                 Err(rejections) => client.refuse(&rejections.status()),
-            };
-            read_arguments(length, read);
-        }
-        ActionRequest::Cancel { from, done } => stop.do_send(StopFollowing { from, done }),
-    })
+            },
+            move |from, done| stop.do_send(StopFollowing { from, done }),
+        );
+    }
 }
 
 /// The goal for an arm of `N` links. The reader has checked the number of values.

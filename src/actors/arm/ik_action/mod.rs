@@ -19,7 +19,6 @@ use self::active::ActiveGoal;
 pub use self::messages::{
     CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, Meant, SendGoal,
 };
-use self::services::requests;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
     AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names,
@@ -27,7 +26,7 @@ use crate::actors::arm::sim::{
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
 use crate::math::goal::Outcome;
-use crate::protocol::catalog::{Action, Node, Service, Topic};
+use crate::protocol::catalog::{Node, Service, Topic};
 use crate::protocol::messages::goal::setpoint_trajectory;
 use crate::protocol::op::GoalStatus;
 use crate::services::goals::AcceptedGoal;
@@ -95,8 +94,8 @@ impl<const N: usize> IkAction<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
         nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
-        let requests = requests(address.clone().recipient(), address.clone().recipient());
-        nodes.actions.insert(Action::MoveTo, requests);
+        let (send, cancel) = (address.clone().recipient(), address.clone().recipient());
+        services::attach::<N>(send, cancel, nodes);
         for topic in [Topic::IkFeedback, Topic::IkResult] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }

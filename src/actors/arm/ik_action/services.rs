@@ -9,24 +9,22 @@ use bytes::Bytes;
 
 use super::messages::{CancelGoal, CancelRejected, GoalOwner, GoalRejected, Meant, SendGoal};
 use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
-use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
-use crate::actors::wire::{Address, Answered, Callable, Route};
-use crate::protocol::catalog::Service;
+use crate::actors::wire::action_client::{ActionClient, Canceller};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::protocol::catalog::{Action, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 use crate::services::goals::{CancelRequest, GoalRequest};
 
-/// Passes the action's goals and cancellations to the node.
-pub(super) fn requests<const N: usize>(
+/// Enters the action into the registry's table.
+pub(super) fn attach<const N: usize>(
     send: Recipient<Call<SendGoal<N>>>,
     cancel: Recipient<Call<CancelGoal>>,
-) -> Route<ActionRequest> {
-    Box::new(move |request| match request {
-        ActionRequest::Goal {
-            arguments,
-            client,
-            done,
-        } => match SendGoal::read(Service::SendGoal, &arguments) {
+    nodes: &mut Nodes,
+) {
+    nodes.carry_out(
+        Action::MoveTo,
+        move |arguments, client, done| match SendGoal::read(Service::SendGoal, &arguments) {
             Ok(goal) => {
                 let client = Arc::new(client);
                 let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
@@ -36,13 +34,13 @@ pub(super) fn requests<const N: usize>(
             }
             Err(rejections) => client.refuse(&rejections.status()),
         },
-        ActionRequest::Cancel { from, done } => {
+        move |from, done| {
             let goal = Meant::Sent(from.goal.clone());
             let reply = Reply::new(GoalCanceller(from), Some(done));
             let ask = CancelGoal { goal };
             cancel.do_send(Call { ask, reply });
-        }
-    })
+        },
+    );
 }
 
 /// A client that has sent a goal by the action. Feedback shows that it was accepted.

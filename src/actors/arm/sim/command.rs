@@ -7,15 +7,19 @@ use std::sync::Weak;
 use actix::prelude::*;
 
 use super::node::ArmSim;
-use crate::actors::wire::{Nodes, Route, TopicMessage};
+use crate::actors::wire::{Nodes, TopicMessage};
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_effort;
 
 /// Adds this file's topic to the registry's table.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
-    let commands = commands(arm.clone().recipient());
-    nodes.listeners.insert(Topic::EffortCommands, commands);
+    let arm: Recipient<CommandEffort<N>> = arm.clone().recipient();
+    let take = move |message: TopicMessage| match read_effort(&message.msg) {
+        Ok(effort) => arm.do_send(CommandEffort { effort, message }),
+        Err(why) => message.refuse(Topic::EffortCommands, &why),
+    };
+    nodes.listen(Topic::EffortCommands, take);
 }
 
 /// An effort to be applied from the next step on. From clients, by `/effort_controller/commands`.
@@ -50,12 +54,4 @@ impl<const N: usize> ArmSim<N> {
             self.arm.change(ArmInput::Command([0.0; N]));
         }
     }
-}
-
-/// Passes commands to the arm. An invalid message gets an error status.
-fn commands<const N: usize>(arm: Recipient<CommandEffort<N>>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_effort(&message.heard) {
-        Ok(effort) => arm.do_send(CommandEffort { effort, message }),
-        Err(why) => message.refuse(Topic::EffortCommands, &why),
-    })
 }

@@ -20,7 +20,6 @@ use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
-use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::gauges::Gauges;
 use crate::live::{BREATHER, GoalJudged, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
@@ -154,13 +153,7 @@ impl<const N: usize> ArmSim<N> {
         self.advance_to_now(ctx);
     }
 
-    /// Call this at every service call, because a client is likely to call again at once.
-    pub(super) fn attend_call(&mut self, ctx: &mut Context<Self>) {
-        self.attend(ctx);
-        stay_awake();
-    }
-
-    /// Takes due steps within one wake-up's budget. The rest is taken soon after.
+    /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         self.end_orphaned_command();
         let is_behind = self.arm.advance_to_now();

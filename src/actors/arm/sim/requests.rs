@@ -44,7 +44,7 @@ impl<const N: usize, A: ArmRequest<N>> Handler<Call<A>> for ArmSim<N> {
     type Result = ();
 
     fn handle(&mut self, Call { ask, reply }: Call<A>, ctx: &mut Context<Self>) {
-        self.attend_call(ctx);
+        self.attend(ctx);
         let answer = ask.perform(&mut self.arm);
         let conclude = move || reply.conclude(answer);
         if A::waits_for_news(&self.arm) {

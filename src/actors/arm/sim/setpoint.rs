@@ -6,15 +6,22 @@ use actix::prelude::*;
 
 use super::node::ArmSim;
 use crate::actors::node::Done;
-use crate::actors::wire::{Nodes, Route, TopicMessage};
+use crate::actors::wire::{Nodes, TopicMessage};
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
 use crate::services::arm::read_setpoint;
 
 /// Adds this file's topic to the registry's table.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
-    let setpoints = setpoints(arm.clone().recipient());
-    nodes.listeners.insert(Topic::JointTrajectory, setpoints);
+    let arm: Recipient<SetSetpoint<N>> = arm.clone().recipient();
+    let take = move |message: TopicMessage| match read_setpoint(&message.msg) {
+        Ok(setpoint) => arm.do_send(SetSetpoint {
+            setpoint,
+            done: Some(message.done),
+        }),
+        Err(why) => message.refuse(Topic::JointTrajectory, &why),
+    };
+    nodes.listen(Topic::JointTrajectory, take);
 }
 
 /// A setpoint for the controller, from the next step on. From clients, by `/joint_trajectory`.
@@ -34,15 +41,4 @@ impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
         self.attend(ctx);
         self.arm.hold(message.setpoint);
     }
-}
-
-/// Passes setpoints to the arm. An invalid message gets an error status.
-fn setpoints<const N: usize>(arm: Recipient<SetSetpoint<N>>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_setpoint(&message.heard) {
-        Ok(setpoint) => arm.do_send(SetSetpoint {
-            setpoint,
-            done: Some(message.done),
-        }),
-        Err(why) => message.refuse(Topic::JointTrajectory, &why),
-    })
 }

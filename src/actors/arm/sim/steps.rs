@@ -29,7 +29,7 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 
     /// The steps do not depend on wall time, and the arm continues from their end when it is resumed.
     fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
-        self.attend_call(ctx);
+        self.attend(ctx);
         let asked = match self.arm.begin_steps(ask) {
             Ok(asked) => asked,
             Err(rejected) => return reply.conclude(Err(rejected)),

@@ -1,6 +1,6 @@
 //! `/arm_sim/integration_step`: integrates `x'' = f(t)` on the worker pool, independent of the live arm.
 //!
-//! A worker parses, computes and writes the request in slices. A connection submits one computation at a time.
+//! The request is parsed, computed and written by a worker. A connection hands over one computation at a time.
 //!
 //! **Invariant:** nothing here uses the arm. No request blocks the arm or other clients.
 
@@ -42,7 +42,7 @@ impl Integration {
 
     /// Adds this node's service to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve_long::<IntegrationStep>(Service::IntegrationStep, address.clone());
+        nodes.serve::<IntegrationStep>(Service::IntegrationStep, address.clone());
     }
 }
 

@@ -1,17 +1,18 @@
-//! The request to `integration`, its reader, and the writer of its answer, in slices.
+//! The question to `integration`, how it is read, and how its answer is written.
 //!
 //! **Invariant:** a worker parses the formula's text, and writes the response. No actor's thread does.
 
 use bytes::Bytes;
+use serde::Serialize;
 
 use crate::actors::node::Ask;
-use crate::actors::wire::{Address, Callable, ResponseWriter, Streamed};
+use crate::actors::wire::{Address, Answered, Callable};
 use crate::math::integrator::Method;
 use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::protocol::wire::streamed::StreamedResponse;
+
 /// Integrates a particle of one degree of freedom. One bad field rejects the whole request.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IntegrationStep {
@@ -46,9 +47,6 @@ pub enum NotIntegrated {
     Particle(#[from] ParticleError),
 }
 
-/// Numbers encoded between two checks of the clock: some tens of microseconds.
-const NUMBERS_PER_LOOK: usize = 1024;
-
 impl Callable for IntegrationStep {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
@@ -64,94 +62,25 @@ impl Callable for IntegrationStep {
     }
 }
 
-impl Streamed for IntegrationStep {
-    fn begin(
-        answer: Result<Box<Particle>, NotIntegrated>,
-        to: &Address,
-    ) -> Box<dyn ResponseWriter> {
-        match answer {
-            Ok(particle) => Box::new(SamplesWriter::new(particle, to)),
-            Err(why) => Box::new(Some(to.failure(&why.to_string()))),
+impl Answered for IntegrationStep {
+    fn write(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Bytes {
+        /// The samples, in the order of the documentation.
+        #[derive(Serialize)]
+        struct Samples<'a> {
+            times: Vec<f64>,
+            positions: &'a [f64],
+            velocities: &'a [f64],
         }
-    }
-}
-
-/// The answer, written in slices. It may have 60 MB.
-struct SamplesWriter {
-    particle: Box<Particle>,
-    writer: StreamedResponse,
-    array: Array,
-    entry: usize,
-}
-
-/// The index of the array that is being written, of three.
-#[derive(Clone, Copy)]
-enum Array {
-    Times,
-    Positions,
-    Velocities,
-}
-
-impl SamplesWriter {
-    fn new(particle: Box<Particle>, to: &Address) -> Self {
-        let mut writer = StreamedResponse::new(to.name(), to.id());
-        writer.raw("{\"times\":[");
-        Self {
-            particle,
-            writer,
-            array: Array::Times,
-            entry: 0,
-        }
-    }
-
-    fn value(&self, entry: usize) -> f64 {
-        match self.array {
-            Array::Times => self.particle.time(entry),
-            Array::Positions => self
-                .particle
-                .positions()
-                .get(entry)
-                .copied()
-                .unwrap_or(f64::NAN),
-            Array::Velocities => self
-                .particle
-                .velocities()
-                .get(entry)
-                .copied()
-                .unwrap_or(f64::NAN),
-        }
-    }
-}
-
-impl ResponseWriter for SamplesWriter {
-    fn advance(&mut self) -> Option<Bytes> {
-        let samples = self.particle.positions().len();
-        let end = samples.min(self.entry + NUMBERS_PER_LOOK);
-        for entry in self.entry..end {
-            if entry > 0 {
-                self.writer.raw(",");
-            }
-            self.writer.number(self.value(entry));
-        }
-        self.entry = end;
-        if end < samples {
-            return None;
-        }
-        self.entry = 0;
-        self.array = match self.array {
-            Array::Times => {
-                self.writer.raw("],\"positions\":[");
-                Array::Positions
-            }
-            Array::Positions => {
-                self.writer.raw("],\"velocities\":[");
-                Array::Velocities
-            }
-            Array::Velocities => {
-                self.writer.raw("]}");
-                return Some(std::mem::take(&mut self.writer).finish(true, ""));
-            }
+        let particle = match answer {
+            Ok(particle) => particle,
+            Err(why) => return to.failure(&why.to_string()),
         };
-        None
+        let positions = particle.positions();
+        let samples = Samples {
+            times: (0..positions.len()).map(|at| particle.time(at)).collect(),
+            positions,
+            velocities: particle.velocities(),
+        };
+        to.response(&samples, "")
     }
 }

@@ -9,42 +9,33 @@ use bytes::BytesMut;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
-use super::admission::authentication::AuthError;
-use super::admission::slots::HeldSlot;
+use super::admission::HeldSlot;
 use super::session::{ClientSession, HeldPlace, Opened};
 use super::transport::Transport;
 use super::websocket::WebSocket;
-use crate::actors::gateway::limits::OPENING_TIME;
 use crate::actors::gateway::messages::{Outlets, Refused, Request};
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
+/// A client without a place: the way to it, its slot, and why it has none. `None` stands for the missing token.
+pub(super) type Newcomer<'a> = (Outlets, HeldSlot<'a>, Option<Refused>);
+
 /// Decides about the requests of one client.
 struct HttpGate<'a> {
     session: &'a ClientSession,
-    /// The way to a client that has no place yet.
-    outlets: Cell<Option<Outlets>>,
+    /// Set until the first request is admitted, if the client came without a place.
+    newcomer: Cell<Option<Newcomer<'a>>>,
     place: Cell<Option<HeldPlace>>,
-    /// The slot of a client that has no place yet, and why it is turned away without: `None` for the missing token.
-    slot: Option<(HeldSlot<'a>, Option<Refused>)>,
 }
 
 impl Gate for HttpGate<'_> {
     async fn admit(&self) -> Result<(), String> {
-        let Some(outlets) = self.outlets.take() else {
+        let Some((outlets, slot, _)) = self.newcomer.take() else {
             return Ok(());
         };
-        if let Some((slot, _)) = &self.slot {
-            slot.give_back();
-        }
-        let slot = self.session.admission.waiting.take();
-        let due = Instant::now() + OPENING_TIME;
-        let place = self.session.wait_for_place(&outlets, &slot, due).await;
-        let place = place.map_err(|why| {
-            self.session.count_refusal(why);
-            why.to_string()
-        })?;
+        let place = self.session.wait_for_place(&outlets, &slot).await;
+        let place = place.map_err(|why| self.session.turn_away(Some(why)))?;
         self.place.set(Some(place));
         Ok(())
     }
@@ -54,52 +45,46 @@ impl Gate for HttpGate<'_> {
     }
 }
 
-impl HttpGate<'_> {
-    /// Ends when the connection has to: with a sentence, if its slot is another client's.
-    async fn cut_off(&self) -> Option<String> {
-        let evicted = async {
-            let Some((slot, refused)) = &self.slot else {
-                return pending().await;
-            };
-            slot.evicted().await;
-            let Some(why) = *refused else {
-                return AuthError::Crowded.to_string();
-            };
-            self.session.count_refusal(why);
-            why.to_string()
-        };
-        tokio::select! {
-            () = self.session.finish.notified() => None,
-            why = evicted => Some(why),
-        }
-    }
-}
-
 impl ClientSession {
-    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A client with a slot gets a place
-    /// once its first request is admitted.
+    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A newcomer gets a place once its
+    /// first request is admitted.
     pub(super) async fn serve_http<S>(
         &self,
         stream: S,
         first: BytesMut,
         due: Instant,
-        client: Result<HeldPlace, (Outlets, HeldSlot<'_>, Option<Refused>)>,
+        client: Result<HeldPlace, Newcomer<'_>>,
     ) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let (place, outlets, slot) = match client {
-            Ok(place) => (Some(place), None, None),
-            Err((outlets, slot, refused)) => (None, Some(outlets), Some((slot, refused))),
+        let (place, newcomer) = match client {
+            Ok(place) => (Some(place), None),
+            Err(newcomer) => (None, Some(newcomer)),
         };
+        let evicted = newcomer.as_ref().map(|(_, slot, _)| slot.evicted());
         let gate = HttpGate {
             session: self,
-            outlets: Cell::new(outlets),
+            newcomer: Cell::new(newcomer),
             place: Cell::new(place),
-            slot,
+        };
+        // The sentence for a client whose slot is another's. Once its request is admitted, the answer tells it.
+        let crowded = async {
+            if let Some(evicted) = evicted {
+                evicted.await;
+                if let Some((.., why)) = gate.newcomer.take() {
+                    return self.turn_away(why);
+                }
+            }
+            pending().await
+        };
+        let cut_off = async {
+            tokio::select! {
+                () = self.finish.notified() => None,
+                why = crowded => Some(why),
+            }
         };
         let site = (&self.admission.site, self.ends.local);
-        let cut_off = gate.cut_off();
         let (stream, behind) = serve::serve(stream, first, due, site, &gate, cut_off).await?;
         let place = gate.place.take()?;
         let quiet = Request {

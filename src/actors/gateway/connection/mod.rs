@@ -10,18 +10,15 @@
 
 pub mod admission;
 mod computations;
+mod flow;
 #[cfg(feature = "web")]
 mod http;
 mod outgoing;
-mod perform;
 mod plain;
 mod reader;
 mod session;
 mod timer;
 mod transport;
-mod unread;
-#[cfg(feature = "web")]
-mod watched;
 #[cfg(feature = "web")]
 mod websocket;
 mod writer;
@@ -37,10 +34,10 @@ use tokio::time::Instant;
 
 use self::admission::Admission;
 use self::computations::Computations;
+pub use self::flow::UnreadSource;
 use self::outgoing::Outgoing;
 use self::session::{ClientSession, HeldPlace};
 use self::transport::Transport;
-pub use self::unread::UnreadSource;
 pub use super::ends::Ends;
 use super::limits::MAX_RESPONSES_WAITING;
 use super::messages::{Outlets, Request, ToClient};
@@ -94,7 +91,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
         let ends = ends.into();
-        let unread = unread::between(ends);
+        let unread = flow::between(ends);
         Self::start_reading(unread, admission, ends, stream, registry, gauges)
     }
 

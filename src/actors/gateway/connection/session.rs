@@ -14,9 +14,9 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::Notify;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::authentication::{AuthError, authenticate, first_op, is_command};
-use super::admission::slots::HeldSlot;
-use super::admission::{Admission, WRONG_TOKEN_TIME};
+use super::admission::{
+    Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
+};
 use super::plain::CHUNK;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
@@ -27,7 +27,6 @@ use crate::actors::gateway::registry::Registry;
 #[cfg(feature = "web")]
 use crate::actors::resources::memory::Memory;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::token::Token;
 #[cfg(feature = "web")]
 use crate::protocol::wire::frame::Foreign;
 use crate::protocol::wire::frame::{Opening, opening};
@@ -55,17 +54,6 @@ pub(super) struct Opened<S> {
     pub(super) first: BytesMut,
 }
 
-impl<S> Opened<S> {
-    const fn new(stream: S, first: BytesMut, place: Result<HeldPlace, String>) -> Self {
-        let transport = Transport::Plain(stream);
-        Self {
-            place,
-            transport,
-            first,
-        }
-    }
-}
-
 /// The place of a client that the registry knows. Dropping it gives it back.
 pub(super) struct HeldPlace {
     id: ConnectionId,
@@ -90,8 +78,6 @@ enum HowServed {
     Json,
     /// The same with a command of this program.
     Command,
-    /// Its opening decides, once it has a place.
-    Undecided,
     /// Its requests are answered. The head of the first has to be complete by this time.
     #[cfg(feature = "web")]
     Http(Instant),
@@ -101,26 +87,6 @@ enum HowServed {
     Gone,
 }
 
-/// Decides when the opening of a client is examined.
-#[derive(Clone, Copy)]
-enum Examination<'a> {
-    /// It has a place.
-    Served,
-    /// It has to show the token in time.
-    Token(&'a Token, Instant),
-    /// It has to show in time that it may use a kept place.
-    Kept(Instant),
-}
-
-impl Examination<'_> {
-    const fn due(self) -> Option<Instant> {
-        match self {
-            Self::Served => None,
-            Self::Token(_, due) | Self::Kept(due) => Some(due),
-        }
-    }
-}
-
 impl ClientSession {
     /// Judges a client. Returns it if frames are exchanged with it, or if it is to be told why not.
     pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets) -> Option<Opened<S>>
@@ -128,98 +94,97 @@ impl ClientSession {
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         let mut first = BytesMut::with_capacity(CHUNK);
-        let mut how = HowServed::Undecided;
-        // Nothing is asked of the registry for a client that has not shown the token.
-        if let Some(token) = &self.admission.token {
-            let slot = self.admission.unauthenticated.take();
-            how = self.admit(token, &slot, &mut stream, &mut first).await;
-            match how {
-                #[cfg(feature = "web")]
-                HowServed::Http(due) => {
-                    let newcomer = Err((outlets, slot, None));
-                    return self.serve_http(stream, first, due, newcomer).await;
-                }
-                HowServed::Refused(why) => return Some(Opened::new(stream, first, Err(why))),
-                HowServed::Gone => return None,
-                _ => {}
-            }
-        }
-        let is_command = matches!(how, HowServed::Command);
-        let mut place = self.connect(&outlets, is_command).await;
-        if matches!(place, Err(Refused::Full { .. })) {
-            let slot = self.admission.waiting.take();
-            let due = Instant::now() + OPENING_TIME;
-            if matches!(how, HowServed::Undecided) {
-                let kept = Examination::Kept(due);
-                how = tokio::select! {
+        let asks_token = self.admission.token.is_some();
+        let mut place = if asks_token {
+            // The registry is asked nothing for a client that has not shown the token.
+            Err(None)
+        } else {
+            self.connect(&outlets, false).await.map_err(Some)
+        };
+        let how = match place {
+            Ok(_) => self.detect(&mut stream, &mut first, None).await,
+            Err(Some(Refused::Closed)) => HowServed::Json,
+            Err(why) => {
+                let slot = self.admission.newcomers.take();
+                let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
+                // A client that has shown the token gets in, also where its slot is lost in the same moment.
+                let how = tokio::select! {
                     biased;
-                    how = self.examine(&mut stream, &mut first, kept) => how,
-                    () = slot.evicted() => HowServed::Undecided,
+                    how = self.qualify(&mut stream, &mut first, Instant::now() + time) => how,
+                    () = slot.evicted() => {
+                        self.refuse_evicted(&mut stream, &first, why).await;
+                        return None;
+                    }
                 };
+                place = match how {
+                    #[cfg(feature = "web")]
+                    HowServed::Http(due) => {
+                        let newcomer = Err((outlets, slot, why));
+                        return self.serve_http(stream, first, due, newcomer).await;
+                    }
+                    HowServed::Command => self.wait_for_place(&outlets, &slot).await.map_err(Some),
+                    HowServed::Json => self.connect(&outlets, false).await.map_err(Some),
+                    HowServed::Refused(_) | HowServed::Gone => place,
+                };
+                how
             }
-            place = match how {
-                #[cfg(feature = "web")]
-                HowServed::Http(due) => {
-                    let newcomer = Err((outlets, slot, place.err()));
-                    return self.serve_http(stream, first, due, newcomer).await;
-                }
-                HowServed::Command => self.wait_for_place(&outlets, &slot, due).await,
-                _ => self.connect(&outlets, false).await,
-            };
-        }
+        };
         drop(outlets);
-        match place {
-            Ok(_) if matches!(how, HowServed::Undecided) => {
-                let served = Examination::Served;
-                how = self.examine(&mut stream, &mut first, served).await;
-            }
-            Ok(_) => {}
-            Err(why) => self.count_refusal(why),
-        }
         let place = match (how, place) {
-            (HowServed::Gone, _) => return None,
+            (HowServed::Gone, _) => {
+                let _ = timeout(LINGER, stream.shutdown()).await;
+                return None;
+            }
             (HowServed::Refused(why), _) => Err(why),
-            (_, Err(why)) => Err(why.to_string()),
             #[cfg(feature = "web")]
             (HowServed::Http(due), Ok(place)) => {
                 return self.serve_http(stream, first, due, Ok(place)).await;
             }
-            (_, Ok(place)) => Ok(place),
+            (_, place) => place.map_err(|why| self.turn_away(why)),
         };
-        Some(Opened::new(stream, first, place))
+        Some(Opened {
+            place,
+            transport: Transport::Plain(stream),
+            first,
+        })
     }
 
-    /// Has the client show the token. Closes a client that misses the deadline, and the oldest one when too many are
-    /// unauthenticated.
-    async fn admit<S>(
-        &self,
-        token: &Token,
-        slot: &HeldSlot<'_>,
-        stream: &mut S,
-        first: &mut BytesMut,
-    ) -> HowServed
+    /// Waits until `due` for the opening of a client without a place. It has to show the token, if one is asked for.
+    async fn qualify<S>(&self, stream: &mut S, first: &mut BytesMut, due: Instant) -> HowServed
     where
-        S: AsyncRead + AsyncWrite + Unpin,
+        S: AsyncRead + Unpin,
     {
-        let shown = Examination::Token(token, Instant::now() + HEAD_TIME);
-        // A client that has sent the token gets in, also where its slot is lost in the same moment.
-        tokio::select! {
-            biased;
-            how = self.examine(stream, first, shown) => how,
-            () = slot.evicted() => {
-                refuse_evicted(stream, first).await;
-                HowServed::Gone
-            }
+        let how = self.detect(stream, first, Some(due)).await;
+        if !matches!(how, HowServed::Json) {
+            return how;
+        }
+        let op = first_op(stream, first, due).await;
+        let op = match &self.admission.token {
+            None => op,
+            Some(token) => match op.and_then(|op| authenticate(token, op)) {
+                Err(why) => {
+                    if why == AuthError::Wrong {
+                        self.delay_wrong_token().await;
+                    }
+                    return HowServed::Refused(why.to_string());
+                }
+                op => op,
+            },
+        };
+        if op.is_ok_and(|op| is_command(&op)) {
+            HowServed::Command
+        } else {
+            HowServed::Json
         }
     }
 
-    /// Takes a place, a kept one too. Where those are taken, it has until `due` for one to become free.
+    /// Takes a place, a kept one too. Where those are taken, it waits for a moment for one to become free.
     pub(super) async fn wait_for_place(
         &self,
         outlets: &Outlets,
         slot: &HeldSlot<'_>,
-        due: Instant,
     ) -> Result<HeldPlace, Refused> {
+        let due = Instant::now() + OPENING_TIME;
         loop {
             let place = self.connect(outlets, true).await;
             if !matches!(place, Err(Refused::Full { .. })) || Instant::now() >= due {
@@ -232,11 +197,15 @@ impl ClientSession {
         }
     }
 
-    /// Counts a client that is turned away, if no place was free.
-    pub(super) fn count_refusal(&self, why: Refused) {
+    /// Counts a client that gets no place. Returns the reason; `None` stands for the missing token.
+    pub(super) fn turn_away(&self, why: Option<Refused>) -> String {
+        let Some(why) = why else {
+            return AuthError::Crowded.to_string();
+        };
         if matches!(why, Refused::Full { .. }) {
             self.registry.do_send(CountRefusal);
         }
+        why.to_string()
     }
 
     /// Waits before a wrong token is answered. The right one is admitted at once.
@@ -259,53 +228,17 @@ impl ClientSession {
         Ok(HeldPlace { id, registry })
     }
 
-    /// Reads until the opening of the client is decided.
-    async fn examine<S>(
-        &self,
-        stream: &mut S,
-        first: &mut BytesMut,
-        examination: Examination<'_>,
-    ) -> HowServed
-    where
-        S: AsyncRead + AsyncWrite + Unpin,
-    {
-        match (self.detect(stream, first, examination).await, examination) {
-            (HowServed::Json, Examination::Kept(due)) => match first_op(stream, first, due).await {
-                Ok(op) if is_command(&op) => HowServed::Command,
-                _ => HowServed::Undecided,
-            },
-            (HowServed::Json, Examination::Token(token, due)) => {
-                let op = first_op(stream, first, due).await;
-                match op.and_then(|op| authenticate(token, op)) {
-                    Ok(op) if is_command(&op) => HowServed::Command,
-                    Ok(_) => HowServed::Json,
-                    Err(why) => {
-                        if why == AuthError::Wrong {
-                            self.delay_wrong_token().await;
-                        }
-                        HowServed::Refused(why.to_string())
-                    }
-                }
-            }
-            (HowServed::Gone, _) => {
-                let _ = timeout(LINGER, stream.shutdown()).await;
-                HowServed::Gone
-            }
-            (how, _) => how,
-        }
-    }
-
     /// Reads until the first bytes tell the client's protocol. A client that ends before that counts as one that
-    /// speaks JSON. A silent client may stay silent, unless it has something to show until `due`; a client that has
-    /// begun what may become a request has to go on.
+    /// speaks JSON. A client with a place may stay silent; without one, it has until `due`. A client that has begun
+    /// what may become a request has to go on.
     async fn detect<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
         first: &mut BytesMut,
-        examination: Examination<'_>,
+        due: Option<Instant>,
     ) -> HowServed {
         let foreign = |why: &str| HowServed::Refused(why.to_owned());
-        let mut deadline = examination.due();
+        let mut deadline = due;
         loop {
             match opening(first) {
                 Opening::Undecided => {
@@ -324,7 +257,6 @@ impl ClientSession {
                 Opening::Foreign(Foreign::Http)
                     if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
                 {
-                    let due = examination.due();
                     return HowServed::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME));
                 }
                 Opening::Foreign(protocol) => return foreign(protocol.explanation()),
@@ -335,13 +267,13 @@ impl ClientSession {
                 // A few bytes decide, and there is room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
-                    return match examination {
-                        Examination::Token(..) => foreign(&AuthError::TooLate.to_string()),
-                        Examination::Served => {
-                            foreign("what this connection began with did not go on")
+                    return match due {
+                        None => foreign("what this connection began with did not go on"),
+                        Some(_) if self.admission.token.is_some() => {
+                            foreign(&AuthError::TooLate.to_string())
                         }
                         // It is refused like any other client without a place.
-                        Examination::Kept(_) => HowServed::Json,
+                        Some(_) => HowServed::Json,
                     };
                 }
             };
@@ -350,19 +282,25 @@ impl ClientSession {
             }
         }
     }
-}
 
-/// Closes a client that has waited longest of too many to show its token, and tells it why if it takes that at once.
-async fn refuse_evicted<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
-    let why = AuthError::Crowded.to_string();
-    let message = match opening(first) {
-        #[cfg(feature = "web")]
-        Opening::Foreign(Foreign::Http) => refusal(StatusCode::SERVICE_UNAVAILABLE, &why).into(),
-        _ => messages::status(Level::Error, &why, None),
-    };
-    let tell = async {
-        stream.write_all(&message).await?;
-        stream.shutdown().await
-    };
-    let _ = timeout(Duration::ZERO, tell).await;
+    /// Closes the client that has been without a place for longest of too many, and tells it why if it takes that at
+    /// once.
+    async fn refuse_evicted<S>(&self, stream: &mut S, first: &[u8], why: Option<Refused>)
+    where
+        S: AsyncWrite + Unpin,
+    {
+        let why = self.turn_away(why);
+        let message = match opening(first) {
+            #[cfg(feature = "web")]
+            Opening::Foreign(Foreign::Http) => {
+                refusal(StatusCode::SERVICE_UNAVAILABLE, &why).into()
+            }
+            _ => messages::status(Level::Error, &why, None),
+        };
+        let tell = async {
+            stream.write_all(&message).await?;
+            stream.shutdown().await
+        };
+        let _ = timeout(Duration::ZERO, tell).await;
+    }
 }

@@ -44,16 +44,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Begins another turn of reading: a bounded number of bytes are read in each.
-    pub(super) fn begin_turn(&mut self) {
-        match self {
-            Self::Plain(_) => {}
-            #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.begin_turn(),
-        }
-    }
-
-    /// Appends the available bytes of a stream, at most so many, or gives the next message.
+    /// Appends the available bytes of a stream, or gives the next message.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
@@ -122,15 +113,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Sends a due ping, where the transport has pings. Called when there is nothing else to send.
-    pub(super) fn send_due_ping(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+    /// Sends what the transport itself has to say: the answers to pings. Called when there is nothing else to send.
+    pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self {
             Self::Plain(_) => {
                 let _ = cx;
                 Poll::Ready(Ok(()))
             }
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.send_due_ping(cx),
+            Self::WebSocket(socket) => socket.poll_flush(cx),
         }
     }
 

@@ -1,17 +1,16 @@
-//! WebSocket clients: a message is a frame. The rest of the protocol is done here: a peer that shows no sign of life is
-//! given up.
+//! WebSocket clients: a message is a frame. Pings and closes of the peer are answered. A peer whose machine is gone is
+//! found by TCP, as every other client's is.
 //!
-//! **Invariant:** one poll receives a bounded number of bytes, since one read may bring a thousand pings, each of which
-//! is answered.
+//! **Invariant:** one poll receives a bounded number of bytes, and of frames. Of a message that has no room no more is
+//! read than what needs none.
 
 use std::io;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 
 use bytes::{Buf, Bytes, BytesMut};
 use futures_util::{SinkExt, StreamExt};
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
@@ -20,17 +19,17 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, CHUNK, ClientLost};
-use super::timer::Timer;
-use super::watched::{MonitoredStream, READ_BUFFER};
+use super::plain::{self, ClientLost};
+use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
-use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::limits::{MAX_FRAME, MEDIUM};
 
-/// Ping interval: below the idle timeouts of NATs and proxies.
-const PING_INTERVAL: Duration = Duration::from_secs(15);
-/// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong, which can
-/// be far behind in a full pipe.
-const PONG_TIME: Duration = Duration::from_secs(30);
+/// Input buffer of a WebSocket. It lives as long as the connection, so it is small.
+const READ_BUFFER: usize = 8 * 1024;
+/// Bytes that are read before others have a turn. They may be ten thousand empty frames without a message.
+const TURN: usize = 32 * 1024;
+/// Bytes of the head of a control frame: two, and four of the mask.
+const CONTROL_HEAD: usize = 6;
 /// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
 /// seen to take it.
 const FRAGMENT: usize = 32 * 1024;
@@ -41,14 +40,6 @@ const WRITE_BUFFER: usize = 2 * FRAGMENT;
 /// A stream on which the handshake has been made.
 pub(super) struct WebSocket<S> {
     socket: WebSocketStream<MonitoredStream<S>>,
-    timer: Timer,
-    next_ping: Instant,
-    /// Whether the peer is to be asked for a sign of life.
-    ping_is_due: bool,
-    /// The time since which a sign of life has been waited for.
-    asked: Option<Instant>,
-    /// When the last read ended; none while one is under way.
-    unread_since: Option<Instant>,
     /// A long message, kept until the library reads on: it would keep the memory of one that is gone for the next.
     spent: Option<Bytes>,
     /// The kind of the message that the next write continues, if it does not begin one.
@@ -64,7 +55,6 @@ pub(super) struct WebSocket<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
     pub(super) async fn open(stream: S, behind: Bytes, memory: Memory) -> Self {
-        let now = Instant::now();
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
             .write_buffer_size(FRAGMENT)
@@ -76,11 +66,6 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         let socket = WebSocketStream::from_partially_read(watched, part, role, Some(config));
         Self {
             socket: socket.await,
-            timer: Timer::default(),
-            next_ping: now + PING_INTERVAL,
-            ping_is_due: false,
-            asked: None,
-            unread_since: Some(now),
             spent: None,
             unfinished: None,
             underway: 0,
@@ -95,31 +80,18 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
 
     // ---- receiving --------------------------------------------------------------------------------------------------
 
-    pub(super) fn begin_turn(&mut self) {
-        self.stream().begin_turn();
-    }
-
     /// Waits for a message. With a long one comes the room that it takes.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
     ) -> Poll<Result<(Bytes, Option<Permit>), ClientLost>> {
-        // While nothing was read, no sign of life could be seen.
-        let unread = self.unread_since.take();
-        let unread = unread.map_or(Duration::ZERO, |since| since.elapsed());
-        self.asked = self.asked.map(|asked| asked + unread);
         let message = ready!(self.poll_message(cx))?;
-        self.unread_since = Some(Instant::now());
         Poll::Ready(Ok((message, self.stream().end_message())))
     }
 
     fn poll_message(&mut self, cx: &mut Context<'_>) -> Poll<Result<Bytes, ClientLost>> {
-        loop {
-            if self.stream().is_turn_over() {
-                // Other connections have a turn.
-                plain::yield_turn(cx);
-                return Poll::Pending;
-            }
+        self.stream().left = TURN;
+        for _ in 0..FRAMES_IN_A_ROW {
             let message = self.socket.poll_next_unpin(cx);
             self.spent = None;
             let message = match message {
@@ -137,36 +109,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
                     self.close_reason = close_reason(&error);
                     return Poll::Ready(Err(ClientLost::Refused));
                 }
-                Poll::Pending if self.stream().is_turn_over() => continue,
-                Poll::Pending => {
-                    let pong_due = self.asked.map(|asked| asked + PONG_TIME);
-                    let due = pong_due.into_iter().fold(self.next_ping, Instant::min);
-                    ready!(self.timer.poll(Some(due), cx));
-                    self.look_for_life()?;
-                    continue;
-                }
+                Poll::Pending => return Poll::Pending,
             };
             self.spent = (message.len() > SHORT).then(|| message.clone());
             return Poll::Ready(Ok(message));
         }
-    }
-
-    fn look_for_life(&mut self) -> Result<(), ClientLost> {
-        let now = Instant::now();
-        if let Some(asked) = self.asked {
-            if self.stream().life > asked {
-                self.asked = None;
-            } else if now >= asked + PONG_TIME {
-                self.close_reason = (CloseCode::Away, "no sign of life");
-                return Err(ClientLost::Gone);
-            }
-        }
-        if now >= self.next_ping {
-            self.next_ping = now + PING_INTERVAL;
-            self.asked.get_or_insert(now);
-            self.ping_is_due = true;
-        }
-        Ok(())
+        // Other connections have a turn.
+        plain::yield_turn(cx);
+        Poll::Pending
     }
 
     /// Whether a message has begun and not ended.
@@ -185,8 +135,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
-        self.begin_turn();
-        plain::poll_read(self.stream(), cx, chunk, CHUNK)
+        self.stream().left = TURN;
+        plain::poll_read(self.stream(), cx, chunk)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
@@ -243,19 +193,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         self.socket.start_send_unpin(message).map_err(gone)
     }
 
-    fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+    /// Sends what was put, and the answers to pings and closes.
+    pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         self.socket
             .poll_flush_unpin(cx)
             .map(|flushed| flushed.map_err(gone))
-    }
-
-    pub(super) fn send_due_ping(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        if self.ping_is_due {
-            ready!(self.poll_flush(cx))?;
-            self.put(Message::Ping(Bytes::new()))?;
-            self.ping_is_due = false;
-        }
-        self.poll_flush(cx)
     }
 
     pub(super) fn last_taken(&self) -> Option<Instant> {
@@ -319,5 +261,115 @@ fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
     match offered.iter().position(|&byte| byte == b'\n') {
         Some(end) => (offered.slice(..=end), true),
         None => (offered, false),
+    }
+}
+
+// ---- the stream, watched: for bytes that the peer takes, for a message that has begun or is long --------------------
+
+/// The room for a long message, while it is waited for.
+type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
+
+/// A stream that notes when its other side last took a byte, and how much it has sent of an unfinished message.
+struct MonitoredStream<S> {
+    stream: S,
+    /// When the other side last took a byte.
+    taken: Instant,
+    /// Bytes that were read since the last message was complete, without control frames: the message that comes.
+    coming: usize,
+    /// Bytes that may still be read before others have a turn.
+    left: usize,
+    memory: Memory,
+    /// The room for the message that comes, if it is long.
+    permit: Option<Permit>,
+    waiting: Option<ComingPermit>,
+}
+
+impl<S> MonitoredStream<S> {
+    /// A stream of which no byte counts yet.
+    fn new(stream: S, memory: Memory) -> Self {
+        Self {
+            stream,
+            taken: Instant::now(),
+            coming: 0,
+            left: TURN,
+            memory,
+            permit: None,
+            waiting: None,
+        }
+    }
+
+    /// A message is complete. Returns the room that it has taken, if it is long.
+    fn end_message(&mut self) -> Option<Permit> {
+        self.coming = 0;
+        self.permit.take()
+    }
+
+    /// A control frame with that many bytes has come. It may lie between the parts of a message.
+    fn end_control(&mut self, payload: usize) {
+        self.coming = self.coming.saturating_sub(CONTROL_HEAD + payload);
+    }
+
+    /// Whether a message has begun and not ended.
+    const fn is_unfinished(&self) -> bool {
+        self.coming > 0
+    }
+
+    /// Waits until there is room for the message that comes, if it is long.
+    fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+        if self.coming <= MEDIUM || self.permit.is_some() {
+            return Poll::Ready(());
+        }
+        let waiting = self.waiting.get_or_insert_with(|| {
+            let memory = self.memory.clone();
+            Box::pin(async move { memory.long_frame().await })
+        });
+        let Poll::Ready(permit) = waiting.as_mut().poll(cx) else {
+            return Poll::Pending;
+        };
+        self.waiting = None;
+        self.permit = Some(permit);
+        Poll::Ready(())
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if self.left == 0 {
+            plain::yield_turn(cx);
+            return Poll::Pending;
+        }
+        ready!(self.poll_room(cx));
+        let before = buffer.filled().len();
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        let received = buffer.filled().len() - before;
+        self.left = self.left.saturating_sub(received);
+        self.coming += received;
+        polled
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for MonitoredStream<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        let polled = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        if matches!(&polled, Poll::Ready(Ok(taken)) if *taken > 0) {
+            self.taken = Instant::now();
+        }
+        polled
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
     }
 }

@@ -115,7 +115,7 @@ impl ClientWriter {
             } else if is_done {
                 return self.poll_end(connection, cx);
             } else {
-                let is_gone = matches!(transport.send_due_ping(cx), Poll::Ready(Err(_)));
+                let is_gone = matches!(transport.poll_flush(cx), Poll::Ready(Err(_)));
                 if is_gone || connection.outgoing.is_stuck() {
                     return Poll::Ready(false);
                 }

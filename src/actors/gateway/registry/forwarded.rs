@@ -11,7 +11,7 @@ use super::directory::Served;
 use super::kept::KeptEntry;
 use crate::actors::ConnectionId;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 /// Longest spelling of such an id in JSON: the prefix, twenty digits, quotes, every character escaped as `\u0070`.
 const LONGEST_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;

@@ -47,7 +47,7 @@ use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::names;
 use crate::protocol::op::{ActionServerOp, Op, Verbosity};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 /// Calls and goals that are ended in a row, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
@@ -286,7 +286,7 @@ impl Handler<Retire> for Registry {
         if let Some(client) = self.clients.get_mut(&id) {
             client.answered = Some(answered);
         }
-        Handled::by_node(all_answered)
+        Handled::with(all_answered)
     }
 }
 
@@ -343,8 +343,8 @@ impl Handler<Respond> for Registry {
 impl Handler<TakeCensus> for Registry {
     type Result = MessageResult<TakeCensus>;
 
-    fn handle(&mut self, take: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.directory.census(self.topics.listed(), take.at_most))
+    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.directory.census(self.topics.listed()))
     }
 }
 
@@ -408,9 +408,7 @@ impl Registry {
         let Request { from, id, op, .. } = request;
         let origin = FrameOrigin { from, id };
         let refusal = match op {
-            Op::Publish { topic, msg, heard } => {
-                return self.publish(origin, &topic, &msg, heard, ctx);
-            }
+            Op::Publish { topic, msg } => return self.publish(origin, &topic, msg, ctx),
             Op::PublishLines(lines) => return self.publish_lines(from, &lines, ctx),
             Op::CallService(call) => return self.call(origin, call, ctx),
             Op::SendActionGoal(goal) => return self.send_action_goal(origin, goal, ctx),

@@ -21,10 +21,9 @@ use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
-use crate::protocol::messages::trajectory::NodeMessage;
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
 
 impl Registry {
@@ -33,8 +32,7 @@ impl Registry {
         &mut self,
         origin: FrameOrigin,
         topic: &str,
-        msg: &Payload,
-        heard: Option<NodeMessage>,
+        msg: Payload,
         ctx: &mut Context<Self>,
     ) -> Handled {
         if let Err(why) = refuse_runtime_topic(topic) {
@@ -52,16 +50,16 @@ impl Registry {
             return Handled::at_once();
         }
         let (done, ended) = guard();
-        let encode = |spelling: &str| messages::publish_raw(spelling, msg);
+        let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
         self.fan_out(topic, Some(&done), encode, ctx);
         let Some((topic, listener)) = listener else {
-            return Handled::by_subscribers(ended);
+            return Handled::with(ended);
         };
         if let Some(tap) = &mut self.tap {
-            tap(Tapped::NodeMessage(topic, msg));
+            tap(Tapped::NodeMessage(topic, &msg));
         }
         listener(TopicMessage {
-            heard: heard.unwrap_or_else(|| msg.clone().into()),
+            msg,
             respond: ctx.address().recipient(),
             connection: origin.from,
             present: Arc::downgrade(&client.present),
@@ -69,7 +67,7 @@ impl Registry {
             id: origin.id,
             done,
         });
-        Handled::by_node(ended)
+        Handled::with(ended)
     }
 
     /// Delivers messages of a client as they are, if it advertises the topic.
@@ -86,7 +84,7 @@ impl Registry {
             let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
             self.fan_out(topic, Some(&done), encode, ctx);
         }
-        Handled::by_subscribers(ended)
+        Handled::with(ended)
     }
 
     /// Delivers a message, or a series of them, to every subscriber of `topic`, an absolute name, whatever its

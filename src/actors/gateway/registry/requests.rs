@@ -22,7 +22,7 @@ use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem};
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 use crate::services::NoService;
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
@@ -66,7 +66,7 @@ impl Registry {
                             .within(self.gauges.memory().clone(), self.permit.clone())
                             .with_errors(client.outlets.error_form()),
                     });
-                    return Handled::by_node(ended);
+                    return Handled::with(ended);
                 }
                 None => Err(NoService::NotServed(call.service.clone()).into()),
             }
@@ -142,7 +142,7 @@ impl Registry {
                     client: action_client,
                     done,
                 });
-                Handled::by_node(ended)
+                Handled::with(ended)
             }
             Err(why) => {
                 action_client.refuse(&why.to_string());
@@ -187,7 +187,7 @@ impl Registry {
             },
             done,
         });
-        Handled::by_node(ended)
+        Handled::with(ended)
     }
 }
 

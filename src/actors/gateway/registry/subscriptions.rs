@@ -14,7 +14,7 @@ use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding, Subscribe};
 use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::stamps::is_ros1_name;
-use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::json::Payload;
 
 impl Registry {
     pub(super) fn advertise(

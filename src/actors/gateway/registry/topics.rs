@@ -185,7 +185,7 @@ impl Topics {
     }
 
     /// The topics as rosapi lists them.
-    pub(crate) fn listed(&self) -> impl ExactSizeIterator<Item = ListedTopic> {
+    pub(crate) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
         self.by_name.iter().map(|(name, users)| ListedTopic {
             name: Arc::clone(name),
             type_name: users.type_name.clone(),
@@ -216,7 +216,7 @@ mod tests {
             assert_eq!(listed, [one]);
             topics.remove_publisher("/t");
         }
-        assert_eq!(topics.listed().len(), 0);
+        assert_eq!(topics.listed().count(), 0);
         assert!(!topics.note_type("/t", "a/b"));
     }
 }

@@ -1,6 +1,8 @@
-//! The arm's parameters in the form of a ROS 2 node: `/arm_sim/get_parameters` and the four other services.
+//! The arm's parameters: `get_param` of rosapi and its like, and `/arm_sim/get_parameters` and its like, which every
+//! node of ROS 2 has.
 //!
-//! They are read and set by the arm's own requests, as in rosapi, with the same checks and the same messages.
+//! All these services are one question, which names parameters to be described, read or changed. They are read and
+//! changed by the arm's own questions: the same checks, the same words.
 //!
 //! **Invariant:** the answer has one entry for each entry of the request, in the same order.
 
@@ -8,80 +10,142 @@ mod wire;
 
 use actix::prelude::*;
 
-use super::rosapi::{
-    ArmParameters, NotSet, ParamChange, ParameterValue, change_parameter, give, value,
-};
-use crate::actors::node::{Ask, Call, Unserved};
-use crate::protocol::ros::parameters::Parameter;
+use crate::actors::arm::sim::{ArmSim, SetGains, SetIntegrator, SetParams, SetPeriod, joint_names};
+use crate::actors::node::{Ask, Call, Unserved, ask};
+use crate::protocol::catalog::Node;
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::ros::parameters::{NO_SUCH, Parameter};
+use crate::protocol::ros::urdf;
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Lists the parameters. The answer has the selected ones.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ListParameters {
-    /// Names, or their prefixes up to a full stop; empty for all.
-    pub prefixes: Vec<String>,
-}
-
-impl Ask for ListParameters {
-    type Answer = Vec<Parameter>;
-}
-
-/// The values of parameters.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GetParameters<const N: usize> {
-    /// The parameters; `None` for an unknown name.
-    pub parameters: Vec<Option<Parameter>>,
-}
-
-impl<const N: usize> Ask for GetParameters<N> {
-    type Answer = Vec<Option<ParameterValue<N>>>;
-}
-
-/// The types of parameters. The answer is the request, because it needs no value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GetParameterTypes {
-    /// The parameters; `None` for an unknown name.
-    pub parameters: Vec<Option<Parameter>>,
-}
-
-impl Ask for GetParameterTypes {
-    type Answer = Vec<Option<Parameter>>;
-}
-
-/// Descriptions of parameters, answered like their types.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DescribeParameters {
-    /// The parameters, each with its name in the request.
-    pub parameters: Vec<(String, Option<Parameter>)>,
-}
-
-impl Ask for DescribeParameters {
-    type Answer = Vec<(String, Option<Parameter>)>;
-}
-
-/// Sets parameters, one after the other.
+/// Asks about parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SetParameters<const N: usize> {
-    /// The changes, or why one is not possible.
-    pub changes: Vec<Result<ParamChange<N>, NotSet>>,
+pub struct AskParameters<const N: usize> {
+    /// The parameters that are named, and what each is named for.
+    pub entries: Vec<(NamedParameter, ParameterRequest<N>)>,
 }
 
-impl<const N: usize> Ask for SetParameters<N> {
-    type Answer = Vec<Result<(), NotSet>>;
+impl<const N: usize> Ask for AskParameters<N> {
+    type Answer = Vec<(NamedParameter, ParameterAnswer<N>)>;
+}
+
+/// A parameter by its name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedParameter {
+    /// The name, as it was given.
+    pub name: String,
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+    /// The value, as JSON text, that is wanted where there is none.
+    pub default: String,
+}
+
+/// What a parameter is named for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterRequest<const N: usize> {
+    /// What there is to know about it without its value.
+    Describe,
+    /// Its value.
+    Read,
+    /// A change, or why there can be none.
+    Change(Result<ParameterChange<N>, NotSet>),
+}
+
+/// A change of one parameter, as a question to the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterChange<const N: usize> {
+    /// Gravity, masses or lengths.
+    Params(SetParams<N>),
+    /// Gains.
+    Gains(SetGains<N>),
+    /// Method or timestep.
+    Integrator(SetIntegrator),
+    /// The control period.
+    Period(SetPeriod),
+}
+
+/// The answer about a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterAnswer<const N: usize> {
+    /// Its name says all that was asked.
+    Described,
+    /// Its value; none if there is no such parameter.
+    Value(Option<ParameterValue<N>>),
+    /// Whether it was changed.
+    Changed(Result<(), NotSet>),
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue<const N: usize> {
+    /// A number.
+    Number(f64),
+    /// One per joint.
+    Numbers([f64; N]),
+    /// A name or a description.
+    Text(String),
+}
+
+/// Why a parameter was not set.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotSet {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// It has no value of its own.
+    #[error("name: robot_description is made from lengths and masses")]
+    Derived,
+    /// Its value is of another type.
+    #[error("{name} must be a {expected} (type {number}), got type {found}")]
+    WrongType {
+        /// The parameter's name.
+        name: &'static str,
+        /// The name of its type.
+        expected: &'static str,
+        /// The number of its type.
+        number: u8,
+        /// The number of the type that came.
+        found: u8,
+    },
+    /// The value can't be read.
+    #[error("value must be JSON text")]
+    NotJson,
+    /// The arm does not take it.
+    #[error("{0}")]
+    Rejected(Rejections),
 }
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
-/// Serves the parameter services of the arm.
+/// Serves the parameters in the name of the arm.
 pub struct Parameters<const N: usize> {
     arm: ArmParameters<N>,
+}
+
+/// The arm, as far as its parameters are concerned.
+#[derive(Clone)]
+struct ArmParameters<const N: usize> {
+    /// Gravity, masses and lengths.
+    params: Recipient<Call<SetParams<N>>>,
+    /// Gains.
+    gains: Recipient<Call<SetGains<N>>>,
+    /// Method and timestep.
+    integrator: Recipient<Call<SetIntegrator>>,
+    /// The control period.
+    period: Recipient<Call<SetPeriod>>,
 }
 
 impl<const N: usize> Parameters<N> {
     /// A node for this arm.
     #[must_use]
-    pub const fn new(arm: ArmParameters<N>) -> Self {
+    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
+        let arm = ArmParameters {
+            params: arm.clone().recipient(),
+            gains: arm.clone().recipient(),
+            integrator: arm.clone().recipient(),
+            period: arm.clone().recipient(),
+        };
         Self { arm }
     }
 }
@@ -94,82 +158,99 @@ impl<const N: usize> Actor for Parameters<N> {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Call<ListParameters>> for Parameters<N> {
+impl<const N: usize> Handler<Call<AskParameters<N>>> for Parameters<N> {
     type Result = ();
 
-    fn handle(&mut self, mut call: Call<ListParameters>, _: &mut Context<Self>) {
-        let prefixes = call.ask.prefixes;
-        let is_meant = |one: &Parameter| {
-            // No parameter's name has a full stop, so a prefix can only be the whole name.
-            prefixes.is_empty() || prefixes.iter().any(|prefix| prefix == one.name())
-        };
-        let meant = Parameter::ALL.into_iter().filter(is_meant);
-        call.reply.answer(meant.collect());
-    }
-}
-
-impl<const N: usize> Handler<Call<GetParameters<N>>> for Parameters<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<GetParameters<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        let values = values(ask.parameters, self.arm.clone()).into_actor(self);
-        ctx.spawn(values.map(|values, _, _| give(reply, values)));
-    }
-}
-
-impl<const N: usize> Handler<Call<GetParameterTypes>> for Parameters<N> {
-    type Result = ();
-
-    fn handle(&mut self, mut call: Call<GetParameterTypes>, _: &mut Context<Self>) {
-        call.reply.answer(call.ask.parameters);
-    }
-}
-
-impl<const N: usize> Handler<Call<DescribeParameters>> for Parameters<N> {
-    type Result = ();
-
-    fn handle(&mut self, mut call: Call<DescribeParameters>, _: &mut Context<Self>) {
-        call.reply.answer(call.ask.parameters);
-    }
-}
-
-impl<const N: usize> Handler<Call<SetParameters<N>>> for Parameters<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<SetParameters<N>>, ctx: &mut Context<Self>) {
-        let Call { ask, reply } = call;
-        let results = set(ask.changes, self.arm.clone()).into_actor(self);
-        ctx.spawn(results.map(|results, _, _| give(reply, results)));
+    fn handle(&mut self, call: Call<AskParameters<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        let answers = self.arm.clone().answer_all(ask).into_actor(self);
+        ctx.spawn(answers.map(move |answers, _, _| match answers {
+            Ok(answers) => reply.answer(answers),
+            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
+        }));
     }
 }
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-async fn values<const N: usize>(
-    parameters: Vec<Option<Parameter>>,
-    arm: ArmParameters<N>,
-) -> Result<Vec<Option<ParameterValue<N>>>, Unserved> {
-    let mut values = Vec::with_capacity(parameters.len());
-    for parameter in parameters {
-        values.push(match parameter {
-            Some(parameter) => Some(value(parameter, arm.clone()).await?),
-            None => None,
-        });
+impl<const N: usize> ArmParameters<N> {
+    /// Answers for one parameter after the other.
+    async fn answer_all(
+        self,
+        ask: AskParameters<N>,
+    ) -> Result<<AskParameters<N> as Ask>::Answer, Unserved> {
+        let mut answers = Vec::with_capacity(ask.entries.len());
+        for (named, request) in ask.entries {
+            let answer = match (request, named.parameter) {
+                (ParameterRequest::Describe, _) => ParameterAnswer::Described,
+                (ParameterRequest::Read, None) => ParameterAnswer::Value(None),
+                (ParameterRequest::Read, Some(parameter)) => {
+                    ParameterAnswer::Value(Some(self.value(parameter).await?))
+                }
+                (ParameterRequest::Change(Ok(change)), _) => {
+                    ParameterAnswer::Changed(match self.change(change).await? {
+                        rejected if rejected.is_empty() => Ok(()),
+                        rejected => Err(NotSet::Rejected(rejected)),
+                    })
+                }
+                (ParameterRequest::Change(Err(why)), _) => ParameterAnswer::Changed(Err(why)),
+            };
+            answers.push((named, answer));
+        }
+        Ok(answers)
     }
-    Ok(values)
-}
 
-async fn set<const N: usize>(
-    changes: Vec<Result<ParamChange<N>, NotSet>>,
-    arm: ArmParameters<N>,
-) -> Result<Vec<Result<(), NotSet>>, Unserved> {
-    let mut results = Vec::with_capacity(changes.len());
-    for change in changes {
-        results.push(match change {
-            Ok(change) => NotSet::unless_empty(change_parameter(change, arm.clone()).await?),
-            Err(why) => Err(why),
-        });
+    /// The present value of a parameter.
+    async fn value(&self, parameter: Parameter) -> Result<ParameterValue<N>, Unserved> {
+        use ParameterValue::{Number, Numbers, Text};
+        Ok(match parameter {
+            Parameter::Gravity
+            | Parameter::Masses
+            | Parameter::Lengths
+            | Parameter::RobotDescription => {
+                let arm = ask(&self.params, SetParams::default()).await?.values;
+                match parameter {
+                    Parameter::Gravity => Number(arm.gravity()),
+                    Parameter::Masses => Numbers(*arm.masses()),
+                    Parameter::Lengths => Numbers(*arm.lengths()),
+                    _ => Text(urdf::describe(
+                        &joint_names::<N>(),
+                        arm.lengths(),
+                        arm.masses(),
+                    )),
+                }
+            }
+            Parameter::Kp | Parameter::Ki | Parameter::Kd => {
+                let gains = ask(&self.gains, SetGains::default()).await?.values;
+                match parameter {
+                    Parameter::Kp => Numbers(gains.kp),
+                    Parameter::Ki => Numbers(gains.ki),
+                    _ => Numbers(gains.kd),
+                }
+            }
+            Parameter::Integrator | Parameter::Timestep => {
+                let integrator = ask(&self.integrator, SetIntegrator::default())
+                    .await?
+                    .values;
+                match parameter {
+                    Parameter::Integrator => Text(integrator.method.name().to_owned()),
+                    _ => Number(integrator.timestep),
+                }
+            }
+            Parameter::ControlPeriod => {
+                let sampling = ask(&self.period, SetPeriod::default()).await?.values;
+                Number(sampling.period.period)
+            }
+        })
     }
-    Ok(results)
+
+    /// Has the arm change a parameter. Returns what was not taken.
+    async fn change(&self, change: ParameterChange<N>) -> Result<Rejections, Unserved> {
+        Ok(match change {
+            ParameterChange::Params(params) => ask(&self.params, params).await?.rejected,
+            ParameterChange::Gains(gains) => ask(&self.gains, gains).await?.rejected,
+            ParameterChange::Integrator(change) => ask(&self.integrator, change).await?.rejected,
+            ParameterChange::Period(period) => ask(&self.period, period).await?.rejected,
+        })
+    }
 }

@@ -11,14 +11,15 @@ use serde_json::json;
 use serde_json::value::RawValue;
 
 use super::{ForgetFrames, FrameReceiver, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames};
-use crate::actors::wire::action_client::ActionRequest;
-use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
+use crate::actors::node::Done;
+use crate::actors::wire::action_client::ActionClient;
+use crate::actors::wire::{Address, Answered, Callable, Nodes, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::republished::is_frame;
 use crate::protocol::messages::scene::WORLD;
+use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
-use crate::protocol::op::{Arguments, MAX_ARGS};
 use crate::protocol::wire::{json, text};
 
 /// Default rate in messages per second.
@@ -30,16 +31,23 @@ impl<const N: usize> TfRepublisher<N> {
     /// Adds this node's service, action and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
-        let node = || address.clone().recipient();
-        nodes.actions.insert(
-            Action::TfSubscription,
-            requests::<N>(node(), address.clone().recipient()),
-        );
-        nodes.listeners.insert(Topic::TfWebGoal, goals::<N>(node()));
-        nodes.listeners.insert(
-            Topic::TfWebCancel,
-            cancellations(address.clone().recipient()),
-        );
+        let node = address.clone();
+        let cancel = move |from, _| node.do_send(ForgetFrames::Of(from));
+        nodes.carry_out(Action::TfSubscription, goals(address.clone()), cancel);
+        let node = address.clone();
+        nodes.listen(Topic::TfWebGoal, move |message| {
+            match read_goal(&message, N) {
+                Ok(goal) => node.do_send(goal),
+                Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
+            }
+        });
+        let node = address.clone();
+        nodes.listen(Topic::TfWebCancel, move |message| {
+            match read_cancel(message.msg.raw()) {
+                Ok(id) => node.do_send(ForgetFrames::Published(id)),
+                Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
+            }
+        });
         for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
@@ -74,24 +82,18 @@ impl Answered for RepublishTfs {
 
 // ---- the action -----------------------------------------------------------------------------------------------------
 
-fn requests<const N: usize>(
-    wish: Recipient<WishFrames>,
-    forget: Recipient<ForgetFrames>,
-) -> Route<ActionRequest> {
-    Box::new(move |request| match request {
-        ActionRequest::Goal {
-            arguments, client, ..
-        } => match read_wish(&arguments, N) {
-            Ok((sources, target, period)) => wish.do_send(WishFrames {
-                sources,
-                target,
-                period,
-                by: FrameReceiver::Client(Box::new(client)),
-            }),
-            Err(rejections) => client.refuse(&rejections.status()),
-        },
-        ActionRequest::Cancel { from, .. } => forget.do_send(ForgetFrames::Of(from)),
-    })
+fn goals<const N: usize>(
+    node: Addr<TfRepublisher<N>>,
+) -> impl Fn(Arguments, ActionClient, Done) + Clone {
+    move |arguments, client, _| match read_wish(&arguments, N) {
+        Ok((sources, target, period)) => node.do_send(WishFrames {
+            sources,
+            target,
+            period,
+            by: FrameReceiver::Client(Box::new(client)),
+        }),
+        Err(rejections) => client.refuse(&rejections.status()),
+    }
 }
 
 /// The source frames, the target frame and the period of a request.
@@ -101,6 +103,11 @@ fn read_wish(
 ) -> Result<(Vec<String>, String, Duration), Rejections> {
     let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
     let sources = fields.texts("source_frames", MAX_FRAMES);
+    let is_long = |name: &String| name.len() > MAX_NAME;
+    if sources.iter().flatten().any(is_long) {
+        let why = format!("must have names of at most {MAX_NAME} bytes");
+        fields.refuse("source_frames", &why);
+    }
     let target = fields
         .text("target_frame")
         .map(std::borrow::Cow::into_owned);
@@ -121,17 +128,9 @@ fn read_wish(
 
 // ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
 
-/// Passes published goals to the node. An invalid message gets an error status.
-fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_goal(&message, N) {
-        Ok(goal) => wish.do_send(goal),
-        Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
-    })
-}
-
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
 fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejections> {
-    let [id, goal] = members(message.heard.msg.raw(), &["goal_id", "goal"])?;
+    let [id, goal] = members(message.msg.raw(), &["goal_id", "goal"])?;
     let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
     let id = id.and_then(|[id]| json::text(id?));
     let id = id.ok_or_else(|| refused("goal_id.id", &"must be a string"))?;
@@ -155,15 +154,7 @@ fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejecti
     })
 }
 
-/// Passes cancellations of such goals to the node. An invalid message gets an error status.
-fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_cancel(message.heard.msg.raw()) {
-        Ok(id) => forget.do_send(ForgetFrames::Published(id)),
-        Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
-    })
-}
-
-/// `actionlib_msgs/GoalID`: an id, or empty for all goals.
+/// `actionlib_msgs/GoalID`: an id, or none for all goals.
 fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
     let [id] = members(msg, &["id"])?;
     let Some(id) = id else {
@@ -176,15 +167,11 @@ fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
     Ok(Some(text.into_owned()).filter(|id| !id.is_empty()))
 }
 
-/// The members with these names in a message, which may be as long as arguments.
+/// The members of these names in a message.
 fn members<'a, const M: usize>(
     msg: &'a RawValue,
     names: &[&str; M],
 ) -> Result<[Option<&'a RawValue>; M], Rejections> {
-    if msg.get().len() > MAX_ARGS {
-        let why = format!("must be at most {MAX_ARGS} bytes long");
-        return Err(refused("msg", &why));
-    }
     json::members(msg.get(), names).map_err(|_| refused("msg", &"must be an object"))
 }
 

@@ -1,0 +1,177 @@
+//! Admission: the conditions under which a client is served, whichever protocol it speaks.
+//!
+//! **Invariant:** with a token set, nothing behind a first frame that does not show it is looked at. Clients that have
+//! not shown it, however many and however silent, keep nobody out who has.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use bytes::BytesMut;
+use tokio::io::AsyncRead;
+use tokio::sync::Semaphore;
+use tokio::time::{Instant, timeout_at};
+
+use super::plain::read_some;
+use crate::actors::gateway::limits::HEAD_TIME;
+use crate::protocol::op::token::Token;
+use crate::protocol::op::{self, Op};
+use crate::protocol::wire::frame::FrameReader;
+#[cfg(feature = "web")]
+use crate::web::Site;
+
+/// Bytes that a client may send before it has shown its token.
+pub const MAX_AUTH_BYTES: usize = 16 * 1024;
+/// Newcomers at once: connections that have not shown the token yet, or for which no place is free. They are counted
+/// apart from the clients, and the oldest is closed for the next. A newcomer that shows its token at once is never the
+/// oldest.
+pub const MAX_NEWCOMERS: usize = 128;
+
+/// How long the answer to a wrong token takes. No more of them are answered in that time than there may be newcomers.
+/// The [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
+pub const WRONG_TOKEN_TIME: Duration = Duration::from_millis(500);
+
+/// The conditions under which a listener admits clients.
+#[derive(Debug, Default)]
+pub struct Admission {
+    /// Every client has to show this, if it is set.
+    pub token: Option<Token>,
+    /// Says which clients are served over HTTP, and with which files.
+    #[cfg(feature = "web")]
+    pub site: Site,
+    /// Slots of newcomers.
+    pub newcomers: Slots,
+}
+
+// ---- the slots of newcomers -----------------------------------------------------------------------------------------
+
+/// A fixed number of slots, oldest holder first. When all are in use, a newcomer evicts the oldest holder. If clients
+/// finish quickly, only slow ones become the oldest. To refuse the newcomer instead would shut out honest clients.
+#[derive(Debug)]
+pub struct Slots {
+    most: usize,
+    /// A semaphore without permits for each holder. It is closed when the holder is evicted.
+    taken: Mutex<VecDeque<Arc<Semaphore>>>,
+}
+
+/// [`MAX_NEWCOMERS`] slots.
+impl Default for Slots {
+    fn default() -> Self {
+        Self::new(MAX_NEWCOMERS)
+    }
+}
+
+impl Slots {
+    /// Makes `most` slots, all of them free.
+    #[must_use]
+    pub fn new(most: usize) -> Self {
+        Self {
+            most,
+            taken: Mutex::default(),
+        }
+    }
+
+    /// Takes a slot: the oldest one, if none is free.
+    pub(super) fn take(&self) -> HeldSlot<'_> {
+        let notice = Arc::new(Semaphore::new(0));
+        let mut taken = self.taken();
+        if taken.len() >= self.most
+            && let Some(oldest) = taken.pop_front()
+        {
+            oldest.close();
+        }
+        taken.push_back(Arc::clone(&notice));
+        HeldSlot {
+            slots: self,
+            notice,
+        }
+    }
+
+    fn taken(&self) -> MutexGuard<'_, VecDeque<Arc<Semaphore>>> {
+        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A slot that is held; it is free again when this is dropped.
+#[derive(Debug)]
+pub(super) struct HeldSlot<'a> {
+    slots: &'a Slots,
+    notice: Arc<Semaphore>,
+}
+
+impl HeldSlot<'_> {
+    /// Ends when somebody else has the slot.
+    pub(super) fn evicted(&self) -> impl Future<Output = ()> + use<> {
+        let notice = Arc::clone(&self.notice);
+        async move {
+            // It never has a permit.
+            let _ = notice.acquire().await;
+        }
+    }
+}
+
+impl Drop for HeldSlot<'_> {
+    fn drop(&mut self) {
+        let mut taken = self.slots.taken();
+        taken.retain(|one| !Arc::ptr_eq(one, &self.notice));
+    }
+}
+
+// ---- the token over raw TCP: in the first frame ---------------------------------------------------------------------
+
+/// Why a client that has to show a token is not admitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum AuthError {
+    #[error("this runtime asks for its token first: {{\"op\":\"auth\",\"token\":...}}")]
+    NotShown,
+    #[error("token: not this runtime's")]
+    Wrong,
+    #[error("this runtime asks for its token first, and waited for {} s", HEAD_TIME.as_secs())]
+    TooLate,
+    #[error("this runtime asks for its token first, in at most {MAX_AUTH_BYTES} bytes")]
+    TooMuch,
+    #[error("this runtime asks for its token first, and too many others have yet to show it")]
+    Crowded,
+}
+
+/// The op of a client's first frame, if it shows the token.
+pub(super) fn authenticate(token: &Token, op: Op) -> Result<Op, AuthError> {
+    match &op {
+        Op::Auth {
+            token: Some(shown), ..
+        } if token.matches(shown) => Ok(op),
+        Op::Auth { token: Some(_), .. } => Err(AuthError::Wrong),
+        _ => Err(AuthError::NotShown),
+    }
+}
+
+/// Whether a first frame is that of a command of this program.
+pub(super) const fn is_command(op: &Op) -> bool {
+    matches!(op, Op::Auth { is_command, .. } if *is_command)
+}
+
+/// Reads until `due` up to a first frame. All that was read stays in `first`.
+pub(super) async fn first_op<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    first: &mut BytesMut,
+    due: Instant,
+) -> Result<Op, AuthError> {
+    let mut frames = FrameReader::new();
+    let mut seen = 0;
+    loop {
+        frames.push(first.get(seen..).unwrap_or_default());
+        seen = first.len();
+        if let Some(frame) = frames.next() {
+            let frame = frame.map_err(|_| AuthError::NotShown)?;
+            return op::read(&frame.text).op.map_err(|_| AuthError::NotShown);
+        }
+        if seen > MAX_AUTH_BYTES {
+            return Err(AuthError::TooMuch);
+        }
+        match timeout_at(due, read_some(stream, first)).await {
+            Err(_) => return Err(AuthError::TooLate),
+            Ok(Ok(0) | Err(_)) => return Err(AuthError::NotShown),
+            Ok(Ok(_)) => {}
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! Flow control by the bytes that a client has read.
+//!
+//! Bytes in a client's socket get old, and can't be dropped any more. The size of a socket's buffers says nothing about
+//! time: the buffers of Linux hold 15 s of `/joint_states`. So a client that is slower than its topics is only written
+//! as much as it reads in `AHEAD`, and the rest is dropped before it is written. Where a client's unread bytes
+//! are unknown, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
+//! kept waiting.
+//!
+//! How many bytes a client has not read Linux tells for one on the same machine: `NETLINK_SOCK_DIAG` describes one
+//! socket in some microseconds, the client's too (`man 7 sock_diag`).
+//!
+//! **Invariant:** where the system does not tell, nothing is asked for that client again, and nothing is held back.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::Ends;
+use crate::protocol::outbox::MAX_AGE;
+
+/// Gives the bytes that a client has not read, if that is known.
+pub type UnreadSource = Box<dyn FnMut() -> Option<usize>>;
+
+/// The source for a client with these ends.
+pub(super) fn between(ends: Ends) -> UnreadSource {
+    let mut is_known = ends.peer.port() != 0;
+    Box::new(move || {
+        let unread = is_known.then(|| sockets::unread(ends)).flatten();
+        is_known = unread.is_some();
+        unread
+    })
+}
+
+/// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time: half a second of
+/// messages to a client that takes half of them.
+const HOLD: Duration = Duration::from_millis(100);
+/// A slow client is written as much as it reads in that time.
+const AHEAD: Duration = Duration::from_millis(200);
+/// How old a topic message may be that a client which is far behind gets only because a response is behind it.
+pub(super) const FRESH: Duration = Duration::from_millis(200);
+/// Time between two looks at the client's unread bytes: after a look that found none, after one that found some, and
+/// while the client is slow. A look takes two calls of the system.
+const ASK_CALM: Duration = Duration::from_millis(300);
+const ASK: Duration = Duration::from_millis(100);
+const ASK_SLOW: Duration = Duration::from_millis(50);
+/// A client that reads all within that time keeps up: it is sent twice as much.
+const KEEPS_UP: Duration = Duration::from_millis(25);
+/// How long the pace of reading is kept in mind, and how long a client counts as slow.
+const MEMORY: Duration = Duration::from_secs(1);
+/// Bytes that are written within this time count as written at once.
+const GRAIN: Duration = Duration::from_millis(20);
+/// Most entries of the history of writing: 5 s of it.
+const MAX_HISTORY: usize = 256;
+
+/// Counts bytes that were written to a client, and those that it has read.
+pub(super) struct FlowControl {
+    source: UnreadSource,
+    /// Bytes written so far.
+    written: u64,
+    /// For each stretch of bytes that may be unread: its end, and when its first byte was written.
+    history: VecDeque<(u64, Instant)>,
+    /// How many bytes had been read when it was looked at, over the last second.
+    read: VecDeque<(Instant, u64)>,
+    /// When the next look is due.
+    next: Instant,
+    /// Until when the client counts as slow.
+    slow_until: Option<Instant>,
+    /// Bytes that a slow client may have unread.
+    window: u64,
+    /// Bytes that may be written before the next look.
+    room: u64,
+    /// How long ago the oldest byte was written that had not been read at the last look.
+    age: Duration,
+}
+
+impl FlowControl {
+    pub(super) fn new(source: UnreadSource, now: Instant) -> Self {
+        Self {
+            source,
+            written: 0,
+            history: VecDeque::new(),
+            read: VecDeque::new(),
+            next: now,
+            slow_until: None,
+            window: 0,
+            room: u64::MAX,
+            age: Duration::ZERO,
+        }
+    }
+
+    /// Notes that `bytes` have been written.
+    pub(super) fn note_written(&mut self, bytes: usize, now: Instant) {
+        let bytes = bytes as u64;
+        self.written += bytes;
+        if self.room < u64::MAX {
+            self.room = self.room.saturating_sub(bytes);
+        }
+        let is_full = self.history.len() >= MAX_HISTORY;
+        match self.history.back_mut() {
+            Some((end, first)) if is_full || now < *first + GRAIN => *end = self.written,
+            _ => self.history.push_back((self.written, now)),
+        }
+    }
+
+    /// How many bytes of topic messages may be written now. If there is a limit it is looked at again at
+    /// [`next_look`](Self::next_look).
+    pub(super) fn room(&mut self, now: Instant) -> usize {
+        if now >= self.next {
+            self.look(now);
+        }
+        usize::try_from(self.room).unwrap_or(usize::MAX)
+    }
+
+    /// Whether the client reads what was written more than a second ago.
+    pub(super) fn is_far_behind(&self) -> bool {
+        self.age > MAX_AGE
+    }
+
+    /// How long ago the oldest byte was written that had not been read at the last look.
+    pub(super) const fn age(&self) -> Duration {
+        self.age
+    }
+
+    /// When there may be room again, if there is none.
+    pub(super) fn next_look(&self) -> Option<Instant> {
+        (self.room == 0).then_some(self.next)
+    }
+
+    fn look(&mut self, now: Instant) {
+        self.next = now + ASK;
+        let Some(unread) = (self.source)() else {
+            self.room = u64::MAX;
+            return;
+        };
+        let unread = (unread as u64).min(self.written);
+        let read = self.written - unread;
+        let is_read = |stretch: &&(u64, Instant)| stretch.0 <= read;
+        let count = self.history.iter().take_while(is_read).count();
+        self.history.drain(..count);
+        let oldest = self.history.front().filter(|_| unread > 0);
+        let age = oldest.map_or(Duration::ZERO, |(_, first)| now.duration_since(*first));
+        self.age = age;
+        let is_old = |(time, _): &(Instant, u64)| now.duration_since(*time) > MEMORY;
+        while self.read.front().is_some_and(is_old) {
+            self.read.pop_front();
+        }
+        self.read.push_back((now, read));
+        if age > HOLD {
+            self.slow_until = Some(now + MEMORY);
+            self.window = 0;
+            self.room = 0;
+        } else if self.slow_until.is_some_and(|until| now < until) {
+            let doubled = if age < KEEPS_UP { 2 * self.window } else { 0 };
+            self.window = doubled.max(self.pace(now)).max(1);
+            self.room = self.window.saturating_sub(unread);
+        } else {
+            self.slow_until = None;
+            self.room = u64::MAX;
+            if unread == 0 {
+                self.next = now + ASK_CALM;
+            }
+            return;
+        }
+        self.next = now + ASK_SLOW;
+    }
+
+    /// Bytes that the client reads in [`AHEAD`], by the last second.
+    fn pace(&self, now: Instant) -> u64 {
+        let (Some((since, first)), Some((_, last))) = (self.read.front(), self.read.back()) else {
+            return 0;
+        };
+        let time = now.duration_since(*since).max(AHEAD).as_millis();
+        let bytes = u128::from(last - first) * AHEAD.as_millis() / time;
+        u64::try_from(bytes).unwrap_or(u64::MAX)
+    }
+}
+
+// ---- what the system tells ------------------------------------------------------------------------------------------
+
+#[cfg(target_os = "linux")]
+mod sockets {
+    use std::net::{IpAddr, SocketAddr};
+    use std::os::fd::OwnedFd;
+
+    use rustix::net::{
+        AddressFamily, RecvFlags, SendFlags, SocketFlags, SocketType, netlink, recv, send,
+        socket_with,
+    };
+
+    use crate::actors::gateway::ends::Ends;
+
+    /// Bytes of the head of a netlink message.
+    const HEAD: usize = 16;
+    /// The kind of message that asks for a socket (`SOCK_DIAG_BY_FAMILY`), and the flag of a request (`NLM_F_REQUEST`).
+    const BY_FAMILY: u16 = 20;
+    const REQUEST: u16 = 1;
+    /// The places of `idiag_rqueue` and `idiag_wqueue` in `inet_diag_msg`.
+    const RECEIVED: usize = HEAD + 56;
+    const SENT: usize = HEAD + 60;
+
+    thread_local! {
+        static DIAGNOSTICS: Option<OwnedFd> = {
+            let (kind, flags) = (SocketType::DGRAM, SocketFlags::CLOEXEC | SocketFlags::NONBLOCK);
+            socket_with(AddressFamily::NETLINK, kind, flags, Some(netlink::SOCK_DIAG)).ok()
+        };
+    }
+
+    /// Bytes in the client's receive queue, and where there are some, in our send queue too.
+    pub(super) fn unread(ends: Ends) -> Option<usize> {
+        let received = queue(ends.peer, ends.local, RECEIVED)?;
+        if received == 0 {
+            return Some(0);
+        }
+        Some(received + queue(ends.local, ends.peer, SENT)?)
+    }
+
+    /// Bytes in a queue of the socket at `of`, which is connected to `to`.
+    fn queue(of: SocketAddr, to: SocketAddr, place: usize) -> Option<usize> {
+        DIAGNOSTICS.with(|socket| {
+            let socket = socket.as_ref()?;
+            send(socket, &request(of, to), SendFlags::empty()).ok()?;
+            let mut answer = [0_u8; 512];
+            let (_, length) = recv(socket, &mut answer, RecvFlags::empty()).ok()?;
+            let kind = answer.get(4..6)?;
+            let bytes = answer
+                .get(place..place + 4)
+                .filter(|_| length >= place + 4)?;
+            // Any other kind is an error: there is no such socket on this machine.
+            (kind == BY_FAMILY.to_ne_bytes())
+                .then(|| u32::from_ne_bytes(bytes.try_into().unwrap_or_default()) as usize)
+        })
+    }
+
+    /// `nlmsghdr` and `inet_diag_req_v2`, for one socket in any state.
+    fn request(of: SocketAddr, to: SocketAddr) -> Vec<u8> {
+        let (of_ip, to_ip) = (of.ip().to_canonical(), to.ip().to_canonical());
+        // `AF_INET` and `AF_INET6`; 6 is TCP.
+        let family = if of_ip.is_ipv4() { 2 } else { 10 };
+        let mut bytes = Vec::with_capacity(HEAD + 56);
+        bytes.extend(72_u32.to_ne_bytes());
+        bytes.extend([BY_FAMILY, REQUEST].map(u16::to_ne_bytes).as_flattened());
+        bytes.extend([0; 8]);
+        bytes.extend([family, 6, 0, 0]);
+        bytes.extend(u32::MAX.to_ne_bytes());
+        bytes.extend([of.port(), to.port()].map(u16::to_be_bytes).as_flattened());
+        bytes.extend(padded(of_ip));
+        bytes.extend(padded(to_ip));
+        bytes.extend([0, u32::MAX, u32::MAX].map(u32::to_ne_bytes).as_flattened());
+        bytes
+    }
+
+    fn padded(address: IpAddr) -> [u8; 16] {
+        match address {
+            IpAddr::V4(address) => {
+                let [a, b, c, d] = address.octets();
+                [a, b, c, d, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+            }
+            IpAddr::V6(address) => address.octets(),
+        }
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use std::io::{Read, Write};
+        use std::net::{TcpListener, TcpStream};
+
+        use super::*;
+
+        #[test]
+        fn it_tells_how_much_a_client_of_this_machine_has_not_read() {
+            for address in ["127.0.0.1:0", "[::1]:0", "[::]:0"] {
+                let Ok(listener) = TcpListener::bind(address) else {
+                    continue;
+                };
+                let mut connect = listener.local_addr().unwrap();
+                if connect.ip().is_unspecified() {
+                    // Our end is `::ffff:127.0.0.1` then, the client's is not.
+                    connect.set_ip("127.0.0.1".parse().unwrap());
+                }
+                let mut client = TcpStream::connect(connect).unwrap();
+                let (mut ours, peer) = listener.accept().unwrap();
+                let local = ours.local_addr().unwrap();
+                let ends = Ends { local, peer };
+                assert_eq!(unread(ends), Some(0), "{address}");
+                ours.write_all(&[0; 1234]).unwrap();
+                assert_eq!(unread(ends), Some(1234));
+                client.read_exact(&mut [0; 1000]).unwrap();
+                assert_eq!(unread(ends), Some(234));
+                // More than the client's buffer holds waits on our side.
+                ours.set_nonblocking(true).unwrap();
+                let mut sent = 234;
+                while let Ok(written) = ours.write(&[0; 65536]) {
+                    sent += written;
+                }
+                // Bytes that are not acknowledged yet count on both sides.
+                let both = unread(ends).unwrap();
+                assert!(
+                    (sent..sent + 128 * 1024).contains(&both),
+                    "{both} of {sent}"
+                );
+                drop((client, ours));
+                assert_eq!(unread(ends), None);
+            }
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod sockets {
+    use crate::actors::gateway::ends::Ends;
+
+    pub(super) fn unread(_: Ends) -> Option<usize> {
+        None
+    }
+}
