@@ -1,4 +1,4 @@
-//! Signs of life: pings, pongs and whatever else a peer sends.
+//! Keepalive: pings, pongs and any other bytes of a peer.
 
 use super::*;
 use crate::virtual_time::Held;
