@@ -1,4 +1,4 @@
-//! The way in where a token is asked for: from connecting to the token, whatever a client says or keeps to itself.
+//! Admission with a token: from the connection to the token, whatever a client sends or does not send.
 //!
 //! **Invariant:** virtual time and in-memory pipes only. The holder of the token gets in at once, whatever the others
 //! do.
@@ -160,7 +160,7 @@ fn silent_connections_without_end_keep_out_nobody_who_has_the_token() {
             holders.push(guarded.holder().await);
         }
         assert_eq!(guarded.connections(), 10);
-        // All but the newest have been told at once.
+        // All but the newest got a message at once.
         let began = Instant::now();
         let newest = silent.split_off(silent.len() - MAX_NEWCOMERS + 1);
         for mut client in silent {
@@ -202,7 +202,7 @@ fn clients_with_the_token_are_counted_apart_from_those_without() {
     });
 }
 
-/// One that has sent its token is let in though its place is lost before it was read.
+/// A client that has sent its token is admitted even if its place is lost before the token is read.
 #[test]
 fn who_has_sent_the_token_loses_nothing_to_those_who_come_behind() {
     in_virtual_time(async {
@@ -241,7 +241,7 @@ fn a_wrong_token_is_answered_after_half_a_second_and_the_right_one_at_once() {
 fn a_wrong_token_over_http_is_answered_no_sooner() {
     in_virtual_time(async {
         let guarded = Guarded::new().await;
-        // One that shows nothing is no guess.
+        // A connection without a token does not count as a guess.
         for (query, cookie, status, time) in [
             ("token=open-barley", "", 403, WRONG_TOKEN_TIME),
             ("", "open-barley", 403, WRONG_TOKEN_TIME),

@@ -65,7 +65,7 @@ async fn steps(stage: &Stage<2>) -> u64 {
 #[test]
 fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
     in_virtual_time(async {
-        // Looks at the clock cost the same however busy the machine is, and no wake-up's budget runs out.
+        // Reading the clock has a fixed cost, so no wake-up exceeds its budget on a busy machine.
         work_clock::count(Duration::from_micros(1));
         // Each timestep as a fraction of a second, so that the expected count is exact.
         for (numerator, denominator) in [
@@ -124,7 +124,7 @@ fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
     });
 }
 
-/// Nobody looks in between: the request itself takes the arm to its step, not the tick before it.
+/// No other request comes in between: the request itself advances the arm to its step, not the tick before it.
 #[test]
 fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
     in_virtual_time(async {

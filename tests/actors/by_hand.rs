@@ -8,7 +8,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::{ControlPeriod, Simulation};
 use serde_json::json;
 
-/// Both take steps, with an effort of the client in the controller's place or without one.
+/// Both take steps, with or without an effort of the client in place of the controller's.
 async fn step(
     client: &mut Client,
     offline: &mut Simulation<2>,

@@ -1,6 +1,6 @@
-//! Calls and goals that end by thousands at one instant: everybody else has a turn meanwhile. Registrations that end.
+//! Thousands of calls and goals that end at one instant: other tasks still have turns. Registrations that end.
 //!
-//! **Invariant:** how much others have had meanwhile is counted in their turns.
+//! **Invariant:** the share of other tasks is counted in their turns.
 
 use std::cell::Cell;
 use std::rc::Rc;

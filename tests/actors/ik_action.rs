@@ -24,7 +24,7 @@ pub fn elsewhere() -> SendGoal<2> {
     }
 }
 
-/// Notes what reaches it.
+/// Records the messages that it receives.
 struct Noting(UnboundedSender<&'static str>);
 
 impl Actor for Noting {
@@ -166,7 +166,7 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
         stage.arm.send(command(1)).await.unwrap();
         let setpoint = *stage.simulation().await.pid().setpoint();
         assert_eq!(setpoint.position, [0.0, 0.0]);
-        // The next goal is none the worse for it.
+        // The next goal is not affected.
         announce(2).await.unwrap();
         stage.arm.send(command(2)).await.unwrap();
         let setpoint = *stage.simulation().await.pid().setpoint();

@@ -1,5 +1,5 @@
-//! A trial between an arm and an `ik_action` that do what a test needs, so that messages cross; and silence where nobody listens.
-//! `exchanges/trials.txt` has what clients see.
+//! A trial between an arm and an `ik_action` that do what a test needs, so that messages cross; and no work without
+//! subscribers. `exchanges/trials.txt` has what clients see.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -56,7 +56,7 @@ struct Script {
     /// Goals to be refused before one is accepted.
     refusals: usize,
     sent: Vec<Target>,
-    /// Told to the latest goal's owner when the trial asks for news, and not before.
+    /// Sent to the latest goal's owner only when the trial asks for news.
     news: Vec<GoalNews<2>>,
     owner: Option<Recipient<GoalNews<2>>>,
 }
@@ -174,8 +174,8 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
     (trial, client, born)
 }
 
-/// The arm says that the goal was reached at 0.101 s, then that it is 0.11 s. The word about the goal goes by way of
-/// `ik_action` and may be slower; it counts all the same.
+/// The arm says that the goal was reached at 0.101 s, then that it is 0.11 s. The message about the goal goes
+/// through `ik_action` and may be slower; it still counts.
 #[test]
 fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
     in_virtual_time(async {
@@ -193,7 +193,7 @@ fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
     });
 }
 
-/// A goal is refused because the lengths are others by now: the next target is one for these.
+/// A goal is refused because the lengths have changed: the next target fits the new ones.
 #[test]
 fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
     in_virtual_time(async {

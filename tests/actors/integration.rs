@@ -15,7 +15,7 @@ fn integration() -> PoolBench<Integration> {
 }
 
 async fn assert_nothing_more(bench: &mut PoolBench<Integration>) {
-    // The worker would say anything else before it is done with the next call.
+    // The worker would send any other message before the end of the next call.
     let call = bench.ask_as(99, request("t", 1));
     assert_eq!(bench.next().await, 99);
     let _ = call.ended.await;

@@ -1,7 +1,6 @@
-//! The kernel of the page without a server beside the runtime: the same frames at the same times have the same answers.
+//! The kernel of the page without a server gives the same answers as the runtime to the same frames at the same times.
 //!
-//! Both begin at one instant of virtual time. Only one of them can know how long work took, so that is left
-//! out.
+//! Both begin at one instant of virtual time. Only one of them can measure run times, so these are left out.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -25,12 +24,12 @@ fn clock() -> Duration {
     BEGAN.get().map_or(Duration::ZERO, |began| began.elapsed())
 }
 
-/// A runtime and a kernel, each with a client that asks the same.
+/// A runtime and a kernel, each with a client that sends the same requests.
 struct Both<const N: usize> {
     stage: Stage<N>,
     client: Client,
     kernel: Kernel<N>,
-    /// All that the kernel said.
+    /// All frames of the kernel.
     said: Vec<Value>,
 }
 
@@ -117,7 +116,7 @@ where
 
     async fn agree(&mut self, service: &str, args: Value) -> Value {
         if service.starts_with("/study/") {
-            // The study takes the arm as it was last advanced: here, to now.
+            // The study uses the last state of the arm: here, the present one.
             self.call("/arm_sim/pause", json!({})).await;
         }
         let (theirs, ours) = self.call(service, args.clone()).await;
@@ -148,7 +147,7 @@ fn without_times(mut frame: Value) -> Value {
     frame
 }
 
-/// Arguments that are good or bad for some service or other.
+/// Arguments that are valid or invalid for at least one service.
 fn arguments(links: usize) -> Vec<Value> {
     let per_joint = |value: f64| vec![value; links];
     vec![

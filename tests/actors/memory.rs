@@ -1,7 +1,7 @@
-//! Memory that clients may make the program hold: long frames and long answers take room that all share, and wait for
-//! it.
+//! Memory for clients: long frames and long answers share a limit, and wait until there is room.
 //!
-//! **Invariant:** whoever leaves gives back what it had, and nobody keeps room for longer than a stalled client lives.
+//! **Invariant:** a client that disconnects frees its memory, and none keeps memory longer than a stalled client may
+//! live.
 
 use std::time::Duration;
 
@@ -254,7 +254,7 @@ async fn ask_steps(client: &mut Peer, steps: usize) {
 fn computations_that_fit_only_after_one_another_wait_for_one_another() {
     in_real_time(async {
         let workers = WorkerPool::start(2).unwrap();
-        // Room for one answer of 10,000 steps at a time, and a short one beside any.
+        // Room for one answer of 10,000 steps at a time, and for a short one in addition.
         let gateway = computing(MIB, &workers).await;
         let mut clients: Vec<Peer> = (0..12).map(|_| gateway.connect(WIDE)).collect();
         for client in &mut clients {

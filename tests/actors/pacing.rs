@@ -1,4 +1,4 @@
-//! How fast a publisher may go: its next frame is looked at when what it published has been offered to every subscriber.
+//! Backpressure on a publisher: its next frame is handled once its last message has been offered to every subscriber.
 //!
 //! On real sockets, since only those are written to in turns; in one thread, so that nothing depends on time.
 //!
@@ -51,7 +51,7 @@ async fn subscriber(gateway: &Gateway, listener: &TcpListener, topic: &str) -> T
 #[test]
 fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
     let msg = json!({"data": "x".repeat(40_000)});
-    // Passed on as it is, and read.
+    // Forwarded unchanged, and read.
     let spelled = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
     let otherwise = format!("{{ \"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
     for publish in [spelled, otherwise] {

@@ -7,7 +7,7 @@ use crate::virtual_time::{Gateway, Peer, WIDE};
 use pendularm::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
 use serde_json::{Value, json};
 
-/// Registrations that fit, each with names of so many bytes.
+/// Registrations that fit, each with names of this many bytes.
 const fn most(bytes: usize) -> usize {
     MAX_KEPT / (ENTRY_BYTES + 3 * bytes)
 }

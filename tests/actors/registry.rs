@@ -1,6 +1,6 @@
 //! The registry in virtual time: timeouts, interest, the limit of connections, what is withdrawn.
 //!
-//! **Invariant:** nodes are closures that note what they are told; nothing else stands in for the runtime.
+//! **Invariant:** nodes are closures that record their messages; the rest is the real runtime.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -197,7 +197,7 @@ fn a_command_has_a_kept_place_and_waits_for_it() {
     });
 }
 
-/// Of more silent clients than may wait for a place the oldest is told at once.
+/// When too many silent clients wait for a place, the oldest gets a message at once.
 #[test]
 fn so_many_clients_wait_for_a_place_and_no_more() {
     in_virtual_time(async {
@@ -245,7 +245,7 @@ fn one_client_too_many_is_told_so_and_closed_and_there_is_room_again() {
             "{msg}"
         );
         assert!(msg.contains("--clients"), "{msg}");
-        // One that says what it wants is told at once.
+        // A client that sends a request gets the message at once.
         let began = Instant::now();
         let mut asking = gateway.connect(1024);
         asking.call("/none", 1).await;

@@ -63,7 +63,7 @@ fn a_path_is_followed_again_bit_for_bit() {
         assert_eq!((verdict.links, verdict.difference), (3, None));
         assert!(verdict.steps >= 2000 && verdict.states > 100);
 
-        // Another setpoint on the way leads elsewhere: the comparison sees the path.
+        // A different setpoint on the way changes the path, and the comparison finds it.
         let mut other = entries.clone();
         let at = other.iter().position(|entry| is_setpoint(&entry)).unwrap();
         other.remove(at + moves / 2);

@@ -68,7 +68,7 @@ fn the_list_is_made_once_there_is_a_place_to_write_it() {
     });
 }
 
-/// Lets everything happen that waits for nothing but its turn. The clock stands still while another thread is at work.
+/// Runs every task that only waits for its turn. The clock stands still while another thread works.
 async fn turns() {
     for _ in 0..100 {
         tokio::task::yield_now().await;

@@ -1,4 +1,5 @@
-//! Slow clients: the time of a client that is not read, and the places of many. `exchanges/frames.txt` has the times of frames.
+//! Slow clients: timeouts of a client whose frames are not read, and the places of many clients. `exchanges/frames.txt`
+//! has the times of frames.
 //!
 //! **Invariant:** virtual time, so a minute here is exactly that.
 

@@ -8,7 +8,7 @@ import unittest
 from alone import FILE
 from stage import IS_FILE, PageTest
 
-# The texts of the page, told to the page around it.
+# Sends the texts of the page to the page around it.
 REPORT = """<script>setInterval(() => parent.postMessage([document.querySelector("#connection").className,
   Number(document.querySelector("#sim-time").textContent)], "*"), 100);</script>"""
 SHOWN = "document.querySelector('#connection')?.className === 'pill open' && Number(document.querySelector('#sim-time').textContent) > 0.2"

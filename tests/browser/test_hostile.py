@@ -14,7 +14,7 @@ from stage import FOREIGN, PageTest, needs_server
 
 FRAME = '{"op":"call_service","service":"/arm_sim/set_params","args":{"gravity":0}}'
 
-# All that a page can try with another address; none of it throws, all of it is told.
+# All ways in which a page can contact another address. None may throw, and each result is reported.
 TRIES = """
 (async (host) => {
   const frame = "\\n" + FRAME + "\\n";

@@ -10,7 +10,7 @@ PANELS = ("plots", "stability", "error", "compare", "tasks")
 # Captions in sight that are not whole.
 CLIPPED = """[...document.querySelectorAll('figcaption')].filter((one) => one.checkVisibility()
     && (one.scrollWidth > one.clientWidth || one.scrollHeight > one.clientHeight)).map((one) => one.textContent)"""
-# Pairs of readouts whose words cover each other.
+# Pairs of readouts whose texts overlap.
 OVERLAPS = """(() => {
   const boxes = [...document.querySelectorAll('.readouts > div')].map((one) => {
     const range = document.createRange();

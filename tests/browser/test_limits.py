@@ -41,7 +41,7 @@ class BlowUp(PageTest):
         self.tab("stability")
         self.page.until("document.querySelector('#why-text').textContent !== ''")
         top = "document.querySelector('#map').getBoundingClientRect().top"
-        # The reason is a paragraph more or less with each setting: a click aimed at the map must not land beside it.
+        # The reason has a different height for each setting: a click on the map must not miss it.
         with_reason = self.page.run(top)
         self.assertEqual(self.page.run(f"(document.querySelector('#why-text').textContent = '', {top})"), with_reason)
 

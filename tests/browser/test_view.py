@@ -60,7 +60,7 @@ class Sums:
 
     def test_energy_and_gravity_load_are_those_of_the_runtime(self):
         self.settle(self.pose())
-        # The last state that was drawn and what the runtime tells of it may be of different steps for a moment.
+        # The drawn state and the reported state may belong to different steps for a moment.
         self.page.until("""Promise.all([own('history.js'), own('store.js')]).then(([r, { state }]) => state.paused
             && state.diagnostics?.state === 'paused'
             && Math.abs(r.record.data[r.record.last() + r.TIME] - state.diagnostics.sim_time) < 1e-6)""")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Clients that nobody here wrote, unmodified, against the built program: run.sh PROGRAM. Needs a network the first time,
+# Clients of other projects, unmodified, against the built program: run.sh PROGRAM. Needs a network the first time,
 # python3, node (20 or newer) with npm, cargo, and Chromium, which is installed if it is missing and this may be done.
 # It installs into folders in here, which git ignores.
 set -euo pipefail

@@ -1,6 +1,7 @@
-//! A panic ends what it happened in, or everything: each case, with a panic that nobody but a test can cause.
+//! A panic ends its task or the whole program: each case, with a panic that only a test can cause.
 //!
-//! **Invariant:** the hook is the process's own, so these tests share one that notes what it is told and ends nothing.
+//! **Invariant:** the panic hook belongs to the process, so these tests share one that records panics and ends
+//! nothing.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -38,7 +39,7 @@ fn has_ended_by(words: &str) -> bool {
     ends().iter().any(|what| what.contains(words))
 }
 
-/// A stream that panics as soon as it is told something.
+/// A stream that panics at its first read or write.
 struct Trap {
     stream: DuplexStream,
     in_reading: bool,
@@ -81,7 +82,7 @@ impl AsyncWrite for Trap {
     }
 }
 
-/// The client is gone, what it registered is withdrawn, and the others are served.
+/// The client is disconnected, its registrations are withdrawn, and the others are served.
 #[test]
 fn a_panic_in_what_reads_or_writes_for_a_client_ends_that_client_alone() {
     ends();
@@ -236,7 +237,7 @@ fn a_panic_in_the_registry_ends_the_process() {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         client.subscribe("/joint_states").await;
-        // The last copy of a message is dropped by the registry where nobody subscribes to it.
+        // The registry drops the last copy of a message without subscribers.
         let frame = Bytes::from_owner(Explosive(vec![b'x'; 10], "in the registry"));
         gateway.registry.do_send(Publish {
             topic: Topic::Clock,

@@ -1,4 +1,4 @@
-//! The papers, the tree and the manifest, held against the code.
+//! Checks of the documents, the source tree and the manifests against the code.
 
 #![allow(
     clippy::cast_possible_truncation,

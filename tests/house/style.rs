@@ -1,6 +1,6 @@
 //! How the source is cut: short files, short lines, short paths.
 //!
-//! **Invariant:** no rule has an exception but those that stand here with their reason.
+//! **Invariant:** every exception to a rule is listed here with its reason.
 
 use std::fs;
 use std::path::{Path, PathBuf};

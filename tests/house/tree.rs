@@ -1,6 +1,6 @@
 //! Rules for every file of the tree.
 //!
-//! **Invariant:** these checks look at every file that is written by hand, also at those that are added later.
+//! **Invariant:** these checks read every file that is written by hand, also files that are added later.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -148,7 +148,7 @@ fn every_package_forbids_unsafe_code() {
     assert!(seen >= 2, "{seen} packages");
 }
 
-/// A path of the machine that something was written on means nothing to anybody else.
+/// A path on the author's machine is useless to other people.
 #[test]
 fn no_file_names_a_folder_of_a_build_machine() {
     // Put together here, so that this file does not hold them itself.
@@ -197,11 +197,11 @@ fn no_line_ends_in_white_space_and_every_text_ends_in_a_newline() {
     }
 }
 
-/// Time decides by the monotonic clock alone: a wall clock may jump.
+/// Decisions use only the monotonic clock: a wall clock may jump.
 #[test]
 fn nothing_asks_the_wall_clock() {
     for path in rust_files("src") {
-        // The time of day stands in a record and on a line of the log, and decides nothing.
+        // The time of day is only written to records and log lines.
         if path.ends_with("actors/recorder/clock.rs") || path.ends_with("logging/mod.rs") {
             continue;
         }

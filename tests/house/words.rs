@@ -8,11 +8,11 @@ use crate::tree::{files, root};
 
 /// Longest sentence, in words. A piece of code counts as one.
 const MAX_WORDS: usize = 30;
-/// Clauses that no sentence begins with, and no part of it behind a colon or a semicolon: a subject has a name.
+/// Forbidden beginnings of a sentence, and of its parts after a colon or a semicolon: a subject has a name.
 const SUBJECTS: [&str; 9] = [
     "what", "whatever", "who", "whoever", "whose", "those", "of those", "so many", "so much",
 ];
-/// Sentences that may miss a rule, of so many.
+/// One in this many sentences may break a rule.
 const ONE_IN: usize = 100;
 
 /// A paragraph, and the line that it begins on.
@@ -115,7 +115,7 @@ fn sentences(paragraph: &str) -> Vec<String> {
     found
 }
 
-/// Why a sentence misses a rule, if it does.
+/// Why a sentence breaks a rule, if it does.
 fn fault(sentence: &str) -> Option<String> {
     let is_word = |one: &&str| one.contains(|letter: char| letter.is_ascii_alphanumeric());
     let words = sentence.split_whitespace().filter(is_word).count();

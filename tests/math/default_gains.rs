@@ -1,4 +1,4 @@
-//! The default gains do on the default arms what they were chosen for, whatever the setpoint.
+//! The default gains meet their requirements on the default arms, for every setpoint.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;

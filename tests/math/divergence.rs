@@ -43,7 +43,7 @@ fn check_divergence<const N: usize>(gains: Gains<N>, method: Method) {
         }
     );
 
-    // Nothing but a reset or another state sets it going again.
+    // Only a reset or a new state lets it move again.
     let held = simulation.clone();
     assert!(!simulation.step());
     assert_eq!(simulation.advance(1000), 0);
@@ -102,7 +102,7 @@ fn an_observer_is_not_shown_a_step_that_is_not_taken() {
     assert!(simulation.divergence().is_some());
 }
 
-/// A weightless arm at rest, whose state stays finite whatever the timestep is.
+/// An arm at rest without gravity, whose state stays finite at every timestep.
 fn resting(timestep: f64) -> Simulation<2> {
     let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
     let mut simulation = Simulation::new(arm, Gains::default());

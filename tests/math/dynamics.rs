@@ -335,7 +335,7 @@ fn the_line_of_the_book_and_the_recursion_agree() {
     for_one_to_six_links!(check);
 }
 
-/// The first angle says how the arm lies in the field of gravity, and nothing else.
+/// The first angle only sets the direction of gravity relative to the arm.
 #[test]
 fn without_gravity_the_first_angle_changes_no_bit() {
     fn check<const N: usize>() {

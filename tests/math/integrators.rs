@@ -138,7 +138,7 @@ fn check_errors(label: &str, values: &[f64], errors: &[f64]) {
 }
 
 fn check_order(label: &str, method: Method, values: &[f64], orders: &[Option<f64>]) {
-    // Where the method is exact there is no order; where it converges faster than it promises the oracle says so.
+    // An exact method has no order of convergence; the oracle marks cases with a higher order than the method's.
     let Some(&Some(expected)) = orders.last() else {
         return;
     };

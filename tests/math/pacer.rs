@@ -14,7 +14,7 @@ fn ns(nanoseconds: u64) -> Duration {
     Duration::from_nanos(nanoseconds)
 }
 
-/// The timestep that a client writes as so many nanoseconds in decimal.
+/// The timestep that a client writes as this many nanoseconds in decimal.
 fn seconds(nanoseconds: u64) -> f64 {
     format!("{nanoseconds}e-9").parse().unwrap()
 }
@@ -123,7 +123,7 @@ fn absurd_timesteps_do_no_harm() {
     for timestep in [1e-320, f64::from_bits(1), f64::MIN_POSITIVE, 1e-30, 0.0] {
         let mut pacer = Pacer::new(Duration::ZERO, timestep);
         assert_eq!(pacer.due(Duration::ZERO), 0);
-        // The arm takes as many as it has time for, which is all that the caller bounds.
+        // The arm takes as many steps as its time allows, since the caller limits only the time.
         for k in 1..100_000 {
             assert!(pacer.due(ns(k * WAKE)) > 1_000_000, "{timestep}");
             pacer.took(1_000_000);

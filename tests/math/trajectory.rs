@@ -1,5 +1,5 @@
-//! Paths through points with times: they pass through their points, velocities are what positions do, and whether
-//! somebody follows is told rightly.
+//! Paths through points with times: they pass through their points, velocities are the derivatives of positions,
+//! and tolerances are checked correctly.
 
 use pendularm::math::arm::State;
 use pendularm::math::goal::{Dwell, SUCCESS_HOLD};

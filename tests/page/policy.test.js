@@ -38,7 +38,7 @@ const ADVISED = 0.8 * VALUES.minimum_over_poses_held;
 const at = (timestep, changed = {}) => ({ integrator: { method: "rk4", timestep }, ...changed });
 const served = (changed) => ({ stability: { ...VALUES, ...changed } });
 
-/** What the verdict has to be: in which case, with what changed, and which of its parts. */
+/** A row: the case, its changed values, and the expected parts of the verdict. */
 const VERDICTS = [
   ["within the limit of every pose", {}, { kind: "stable" }],
   ["within the limit of this pose alone", at(0.006), { kind: "here", sentence: /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/, advised: ADVISED }],

@@ -1,4 +1,4 @@
-// Numbers in words, scales, settings in links, and the way back.
+// Numbers as text, scales, settings in links, and the inverse of each.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -37,7 +37,7 @@ test("an axis is linear while values are sane, logarithmic once they explode", (
   assert.ok(!axis.log && axis.low <= -1 && axis.high >= 3);
   axis.fit(-1, 1e148);
   assert.ok(axis.log);
-  // Equal factors are equal distances, and one radian is still told from none.
+  // Equal factors are equal distances, and one radian still differs from zero.
   const distance = axis.place(1e11) - axis.place(1e9);
   assert.ok(Math.abs(axis.place(1e7) - axis.place(1e5) - distance) < 1e-6);
   assert.ok(axis.place(1) > axis.place(0));

@@ -1,4 +1,4 @@
-//! The list of topics and services agrees with itself, and says of each what is so of few.
+//! The list of topics and services is consistent, and marks the exceptions.
 //!
 //! **Invariant:** that its rows are those of docs/protocol.md is for `tests/house/readme/protocol.rs` to see, which reads
 //! them there.
@@ -50,7 +50,7 @@ fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
     );
 }
 
-/// A topic that changes seldom has to reach those that come late.
+/// A topic that changes rarely must reach late subscribers.
 #[test]
 fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
     let latched: Vec<_> = Topic::ALL
@@ -150,7 +150,7 @@ fn a_type_is_found_with_and_without_its_middle_part_and_with_no_other() {
     }
 }
 
-/// Messages are encoded by walking through their types: that has to come to an end.
+/// Messages are encoded by a walk through their types, which must end.
 #[test]
 fn no_type_has_itself_inside() {
     fn walk(one: types::Type, above: &mut Vec<&'static str>) {

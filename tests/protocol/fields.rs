@@ -1,7 +1,7 @@
 //! Fields are read one by one, and rejected by name: absent, null, within an object, by position, repeated, refused by another
 //! layer. Bad literals are the rows of `tests/actors/refusals/`.
 //!
-//! **Invariant:** a message is compared whole: it is what the sender of a request has to go by.
+//! **Invariant:** messages are compared in full, because the sender of a request sees nothing else.
 
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;

@@ -1,6 +1,6 @@
 //! The runtime's frames, byte for byte.
 //!
-//! **Invariant:** every encoder's output is looked at whole.
+//! **Invariant:** the whole output of every encoder is compared.
 
 use bytes::Bytes;
 use pendularm::protocol::messages::{

@@ -10,7 +10,7 @@ use pendularm::protocol::ros::{cbor, cdr};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-/// A value of ours as one of theirs.
+/// Converts a value of this crate to one of `serde_json`.
 fn value(branch: Branch<'_, '_>) -> Value {
     match branch.kind() {
         BranchKind::Null => Value::Null,
@@ -50,7 +50,7 @@ fn name() -> impl Strategy<Value = String> {
     ]
 }
 
-/// JSON texts, with spaces and with whatever numbers a client may send.
+/// JSON texts, with spaces and with any numbers that a client may send.
 fn text() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
         Just("null".to_owned()),

@@ -1,4 +1,4 @@
-//! The one seeded generator, the log of all that it drew and of all that was heard, and the first thing that went wrong.
+//! The one seeded generator, the log of its draws and of all received frames, and the first failure.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -6,21 +6,21 @@ use std::fmt;
 
 use tokio::time::Instant;
 
-/// Prefix of a count that is the largest of many, and no sum.
+/// Prefix of a count that is a maximum and not a sum.
 pub const MOST: &str = "most ";
 
-/// Reasons that end a seed before its time. The number is the process's exit status.
+/// Reasons to end a seed early. The number is the exit status of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// Something that came, or did not come, is wrong.
+    /// A frame is wrong or missing.
     Wrong = 1,
-    /// Something panicked that nobody had told to.
+    /// A panic that the test did not cause.
     Crash = 2,
-    /// Something that has to end does not.
+    /// An operation does not end.
     NoProgress = 3,
 }
 
-/// How a seed failed: of which kind, and in words.
+/// The failure of a seed: its kind and a description.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     pub verdict: Verdict,
@@ -47,11 +47,11 @@ pub struct Court {
     /// The log itself, if it is kept.
     log: Option<RefCell<Vec<String>>>,
     failure: RefCell<Option<Failure>>,
-    /// How often everybody has had a turn.
+    /// Number of rounds in which every task had a turn.
     pub turns: Cell<u64>,
-    /// How often the clock has jumped.
+    /// Number of jumps of the clock.
     pub jumps: Cell<u64>,
-    /// Counts of what was done, for those who want to know what a run was made of.
+    /// Counts of the actions of a run.
     pub tally: RefCell<BTreeMap<&'static str, u64>>,
 }
 
@@ -70,7 +70,7 @@ impl Court {
         }
     }
 
-    /// Notes an event with the virtual time at which it happened.
+    /// Logs an event with its virtual time.
     pub fn note(&self, what: &str, detail: &[u8]) {
         let time = self.began.elapsed().as_nanos() as u64;
         let mut hash = self.hash.get();
@@ -90,7 +90,7 @@ impl Court {
         }
     }
 
-    /// The hash of the log, and the log as far as it was kept.
+    /// The hash of the log, and the kept part of the log.
     pub fn record(&self) -> (u64, Vec<String>) {
         let log = self.log.as_ref().map(RefCell::take);
         (self.hash.get(), log.unwrap_or_default())
@@ -101,12 +101,12 @@ impl Court {
         *self.tally.borrow_mut().entry(what).or_default() += 1;
     }
 
-    /// How often that was so far.
+    /// The count so far.
     pub fn counted(&self, what: &'static str) -> u64 {
         self.tally.borrow().get(what).copied().unwrap_or_default()
     }
 
-    /// Notes the largest of something.
+    /// Records a maximum.
     pub fn at_most(&self, what: &'static str, value: u64) {
         let mut tally = self.tally.borrow_mut();
         let most = tally.entry(what).or_default();
@@ -140,7 +140,7 @@ impl Court {
         all[self.below(all.len())].clone()
     }
 
-    /// One of several, the heavier the likelier.
+    /// One of several, with probabilities proportional to the weights.
     pub fn weighed<T: Copy>(&self, all: &[(T, f64)]) -> Option<T> {
         let sum: f64 = all.iter().map(|(_, weight)| weight).sum();
         let mut left = self.fraction() * sum;
@@ -153,7 +153,7 @@ impl Court {
         all.last().map(|(one, _)| *one)
     }
 
-    /// The first failure is the one that counts.
+    /// Only the first failure is kept.
     pub fn fail(&self, verdict: Verdict, words: String) {
         self.note("FAILED", words.as_bytes());
         let mut failure = self.failure.borrow_mut();

@@ -1,4 +1,4 @@
-//! A client that keeps the rules, and all that it may expect to hear.
+//! A client that follows the protocol, and every frame that it may receive.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -22,11 +22,11 @@ pub enum Expect {
     Member(&'static str),
     /// A computation, with the number of entries in each column. A short one takes a few turns.
     Computed { entries: usize, is_short: bool },
-    /// The answer of another client, or a failure that has its reason: the number of the call.
+    /// The answer of another client, or a justified failure: the number of the call.
     Forwarded(u64),
     /// The result of a goal, and whether feedback may come before it.
     Goal { has_feedback: bool },
-    /// One answer, whatever it says.
+    /// One answer with any content.
     Anything,
 }
 
@@ -41,7 +41,7 @@ pub struct Call {
     pub is_light: bool,
     /// The client's frames before it.
     pub order: u64,
-    /// It is a goal whose end this client has asked for.
+    /// It is a goal that this client has cancelled.
     pub is_cancelled: bool,
 }
 
@@ -60,7 +60,7 @@ impl Call {
 pub enum Phase {
     Asked,
     On,
-    /// Given up, by the frame of that number.
+    /// Ended by the frame with that number.
     Leaving(u64),
 }
 
@@ -73,19 +73,19 @@ pub struct Subscription {
     pub throttle: Option<Duration>,
     pub is_binary: bool,
     pub is_in_pieces: bool,
-    /// By publisher: messages that may come, in order, and whether each has to.
+    /// By publisher: the messages that may arrive, in order, and whether each must arrive.
     pub pending: BTreeMap<u64, VecDeque<(u64, bool)>>,
     /// The last message that came, and when.
     pub last: Option<(u64, Instant)>,
     /// The publisher of the last message that came.
     pub last_from: Option<u64>,
-    /// The last message of each publisher that was sent while it was on.
+    /// The last message of each publisher that was sent during the subscription.
     pub newest: BTreeMap<u64, u64>,
 }
 
 /// A client and its book.
 pub struct Honest {
-    /// Tells it apart from all before and after it.
+    /// A number that no other client of the seed has.
     pub who: u64,
     pub client: Client,
     pub door: Door,
@@ -105,17 +105,17 @@ pub struct Honest {
     pub handled: u64,
     /// Answers that it owes as a provider: when, and the frame.
     pub due_answers: Vec<(Instant, u64, String)>,
-    /// The turn at which its last computation was answered: from then on the next one has its turns.
+    /// The turn at which its last computation was answered. The next one starts then.
     pub computed: u64,
     /// Pieces of messages that have come, by id.
     pub pieces: BTreeMap<String, Vec<String>>,
-    /// Statuses that tell it of what it has registered, and how often each is to come.
+    /// Statuses about its registrations, and how often each is expected.
     pub news: BTreeMap<String, u64>,
-    /// Error statuses that it has earned.
+    /// Error statuses that are expected.
     pub mistakes: u64,
-    /// Nothing is owed to it any more: its connection has been broken.
+    /// Its connection is broken, so no answer is required.
     pub is_excused: bool,
-    /// It has not been reading for a while, so what comes may come late, and some of it not at all.
+    /// It has not read for some time, so messages may arrive late or be dropped.
     pub is_hampered: bool,
     /// When it reads again.
     pub stalled_until: Option<Instant>,
@@ -156,7 +156,7 @@ impl Honest {
     /// Sends a frame; `style` says how it is cut and ended.
     pub fn send(&mut self, frame: &str, style: u8) {
         self.frames += 1;
-        // A frame without a line end would have every later one wait for the next.
+        // Without a line end, every later frame would wait for the next one.
         let style = if self.door == Door::Plain && style % 4 == 2 {
             0
         } else {
@@ -196,12 +196,12 @@ impl Honest {
         }
     }
 
-    /// Something has been sent of which a status will tell.
+    /// Expects a status about a frame that was sent.
     pub fn await_news(&mut self, of: String) {
         *self.news.entry(of).or_default() += 1;
     }
 
-    /// A status has come; false if none was to.
+    /// Takes an expected status; false if none was expected.
     pub fn has_news(&mut self, of: &str) -> bool {
         let Some(left) = self.news.get_mut(of) else {
             return false;
@@ -213,7 +213,7 @@ impl Honest {
         true
     }
 
-    /// Whether it can still do anything.
+    /// Whether it can still send.
     pub fn is_active(&self) -> bool {
         !self.is_excused && !self.has_finished && !self.client.has_ended()
     }
@@ -239,7 +239,7 @@ impl Honest {
         self.calls.insert(id.to_owned(), call);
     }
 
-    /// Nothing is owed to it any more, and whatever it sent last may not have arrived.
+    /// No answer is required any more, and its last frames may not have arrived.
     pub fn excuse(&mut self) {
         self.is_excused = true;
         self.calls.clear();
@@ -249,7 +249,7 @@ impl Honest {
     /// An answer has come: all frames before its call have been handled.
     pub fn handled_before(&mut self, order: u64) {
         self.handled = self.handled.max(order);
-        // Messages that wait to be encoded for somebody who does not read come behind later answers.
+        // Messages that wait to be encoded for a client that does not read arrive after later answers.
         let (handled, is_late) = (self.handled, self.is_hampered);
         self.subscriptions.retain(
             |_, one| !matches!(one.phase, Phase::Leaving(left) if left < handled && !is_late),

@@ -1,6 +1,6 @@
-//! Hostile clients: all that has ever made a server like this one stand still, swell or lie, in sizes that virtual time bears.
+//! Hostile clients: the known attacks on servers like this one, in sizes that suit virtual time.
 //!
-//! Nothing is owed to them. Honest clients must not hear anything of it.
+//! They need no answers. Honest clients must not be affected.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -12,7 +12,7 @@ use crate::pipe::Fate;
 use crate::plan::Hostility;
 use pendularm_client::websocket::{append, opcode};
 
-/// A decimal that takes an exact reader long: 20 digits astride a halfway point.
+/// A decimal that is slow to read exactly: 20 digits near the middle between two doubles.
 const SLOW: &str = "10000000000000001268e281";
 /// Bytes of long things that are sent at a time; some are longer than what every client may send unasked.
 const LONG: [usize; 5] = [100, 1000, 1000, 8000, 70_000];
@@ -268,7 +268,7 @@ impl Hostile {
     }
 }
 
-/// An array of numbers of about so many bytes, each slow to read.
+/// An array of about this many bytes, of numbers that are slow to read.
 fn slow_numbers(bytes: usize) -> String {
     let numbers = vec![SLOW; 1 + bytes / (SLOW.len() + 1)];
     format!("[{}]", numbers.join(","))

@@ -63,18 +63,19 @@ use pendularm::actors::panics;
 use crate::court::{Failure, Verdict};
 use crate::play::{Outcome, play, processor_time_of};
 
-/// Seeds that have failed once: they are played first, whatever else is.
+/// Seeds that failed once: they are always played first.
 const KEPT: &str = include_str!("kept_seeds.txt");
 /// Seeds of a plain `cargo test`, and how many of them are played twice and compared.
 const FEW: u64 = 60;
 const TWICE: u64 = 6;
-/// A long run says so often how far it is.
+/// Interval at which a long run reports its progress.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
-/// Longer than any seed takes: of a processor, which is the same on a busy machine, or by the wall's clock, for whoever waits for ever.
+/// Longer than any seed takes: in processor time, which does not depend on load, or by the wall clock, for a seed that
+/// waits for ever.
 const PATIENCE: Duration = Duration::from_secs(120);
 const LONG_PATIENCE: Duration = Duration::from_secs(1800);
 
-/// The last panic that nobody had put in.
+/// The last panic that the test did not cause.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 /// The seed that is being played, and when it began, in milliseconds since the start.
 static SEED: AtomicU64 = AtomicU64::new(0);
@@ -101,7 +102,7 @@ fn number<T: std::str::FromStr>(name: &str) -> Option<T> {
     )
 }
 
-/// Every panic is noted, whoever contains it.
+/// Every panic is recorded, also one that is caught.
 fn hear_panics() {
     panics::end_with(|_| ());
     let inner = std::panic::take_hook();
@@ -131,7 +132,7 @@ fn watch(began: Instant) {
         loop {
             std::thread::sleep(Duration::from_secs(1));
             let since = BEGAN.load(Ordering::Relaxed);
-            // The first thread plays the seeds.
+            // The main thread plays the seeds.
             let works = processor_time_of("self");
             if seen.replace(since) != Some(since) {
                 worked = works;
@@ -173,7 +174,7 @@ fn kept() -> impl Iterator<Item = (u64, bool)> {
     older.chain(seeds(newer).map(|seed| (seed, false)))
 }
 
-/// Plays a seed; a panic of whomever is its failure.
+/// Plays a seed; any panic is its failure.
 fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
     SEED.store(seed, Ordering::Relaxed);
     BEGAN.store(began.elapsed().as_millis() as u64, Ordering::Relaxed);
@@ -189,7 +190,7 @@ fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
         tally: BTreeMap::new(),
     });
     if let Some(words) = panic {
-        // A second reader's assertions on the bytes that came are about the bytes, not about the reader.
+        // Assertions of a second reader concern the received bytes, not the reader.
         let is_ours = words.starts_with("src/");
         let verdict = if is_ours {
             Verdict::Crash
@@ -201,7 +202,7 @@ fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
     outcome
 }
 
-/// Plays one seed twice, and tells all about it.
+/// Plays one seed twice and prints its log.
 fn play_one(seed: u64, began: Instant) -> i32 {
     let first = attempt(seed, true, began);
     println!("seed {seed}: {}", first.plan);

@@ -1,4 +1,4 @@
-//! The runtime's end of a connection: an in-memory pipe that may break, or panic, after so many bytes.
+//! The runtime's end of a connection: an in-memory pipe that may break, or panic, after a given number of bytes.
 
 use std::cell::Cell;
 use std::io::{Error, ErrorKind, Result};
@@ -8,13 +8,13 @@ use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
 
-/// In the words of every panic that was meant to happen.
+/// Part of the message of every intended panic.
 pub const MEANT: &str = "a panic that was put in";
 
 /// The fates of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// It is as good as any.
+    /// It works.
     Sound,
     /// The next read or write that moves a byte fails.
     Breaks,
@@ -22,7 +22,7 @@ pub enum Fate {
     Panics,
 }
 
-/// A pipe and its fate, which may be decided later.
+/// A pipe and its fate, which may be set later.
 pub struct Pipe {
     pub stream: DuplexStream,
     pub fate: Rc<Cell<Fate>>,

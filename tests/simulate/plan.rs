@@ -1,6 +1,7 @@
 //! The plan of a seed: which features, faults and hostile behaviours are on in it, and how often each comes.
 //!
-//! A seed has some of them and not others (swarm testing): what hides behind something else shows where that is off.
+//! A seed has some of them and not others (swarm testing): a fault that one feature hides shows in seeds without
+//! that feature.
 
 use std::fmt;
 
@@ -18,7 +19,7 @@ macro_rules! named {
 }
 
 named! {
-    /// Deeds of honest clients.
+    /// Actions of honest clients.
     Feature {
         Ask, DriveArm, Setpoint, Publish, Subscribe, Unsubscribe, Throttle, Pieces, Cbor, Provide, Withdraw, CallOut, Compute,
         Action, Goal, Trial, Watch, Rosapi, Mistake, FragmentIn, Wait,
@@ -26,12 +27,12 @@ named! {
 }
 
 named! {
-    /// Mishaps of honest clients and of the runtime that are nobody's fault.
+    /// Faults of honest clients' connections and of the runtime.
     Fault { Stall, Vanish, ResetMidFrame, PanicInPipe, HalfClose, Jump, PanicInComputation, ProviderLost }
 }
 
 named! {
-    /// Deeds of hostile clients.
+    /// Actions of hostile clients.
     Hostility {
         SlowNumbers, LongIds, GoalWithLongId, PingFlood, Deaf, FragmentBomb, Encodings, StepByHand, Registrations, DayLongCalls,
         Unfinished, Dribble, Garbage, TinyTimestep, Computations, Impersonate, Vanish, Silent, Foreign, ManyCalls, Throttles,
@@ -39,7 +40,7 @@ named! {
 }
 
 named! {
-    /// Deeds of honest clients together, or at length.
+    /// Actions of several honest clients together, or repeated ones.
     Burst { Stream, Flood, LongComputation, CancelAnothers }
 }
 
@@ -111,7 +112,7 @@ impl Plan {
         }
     }
 
-    /// Draws what the first of the kept seeds did not know; without it they stay what they were.
+    /// Draws the options that the oldest kept seeds lack, so that those seeds stay the same.
     pub fn with_bursts(mut self, court: &Court) -> Self {
         self.bursts = swarm(court, Burst::ALL, 0.6);
         self.burst = 0.02 + 0.06 * court.fraction();
@@ -120,7 +121,7 @@ impl Plan {
     }
 }
 
-/// Some of all, each with a weight.
+/// A random subset, each entry with a weight.
 fn swarm<T: Copy + fmt::Debug>(court: &Court, all: &[T], share: f64) -> Vec<(T, f64)> {
     let chosen: Vec<T> = all
         .iter()
@@ -130,7 +131,7 @@ fn swarm<T: Copy + fmt::Debug>(court: &Court, all: &[T], share: f64) -> Vec<(T, 
     let weighed = chosen
         .into_iter()
         .map(|one| (one, 0.2 + court.fraction() * 3.0));
-    // Left out after the draw: all else in the seed's plan stays as it is.
+    // Removed after the draw, so that the rest of the plan does not change.
     let without = std::env::var("WITHOUT").unwrap_or_default();
     let is_left_out = |one: &T| {
         let one = format!("{one:?}");

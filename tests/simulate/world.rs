@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_micros(400);
 const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 /// Most virtual time that passes without a look at what came.
 const GLANCE: Duration = Duration::from_millis(20);
-/// A slice of a computation takes so long.
+/// Virtual time of one slice of a computation.
 const SLICE: Duration = Duration::from_millis(1);
 
 /// Runs a world to its end, in a runtime of its own.
@@ -45,7 +45,7 @@ pub fn in_virtual_time<T>(course: impl Future<Output = T>) -> T {
     system.block_on(course)
 }
 
-/// Room for one long frame at a time, and for long answers of so many bytes, where room is scarce.
+/// Limits for scarce memory: one long frame at a time, and this many bytes of long answers.
 const SCARCE: (usize, usize) = (1, 1 << 20);
 
 pub struct World {
@@ -95,7 +95,7 @@ impl World {
         (ours, fate)
     }
 
-    /// Everybody has so many turns; no time passes.
+    /// Gives every task this many turns; no time passes.
     pub async fn turns(&self, turns: usize) {
         for _ in 0..turns {
             let _ = self.pool.turn();
@@ -116,7 +116,7 @@ impl World {
         }
     }
 
-    /// Lets some time pass, and not more than until the next look; gives how much.
+    /// Lets time pass, at most until the next check; returns how much.
     pub async fn glance(&self, time: Duration) -> Duration {
         let step = if self.pool.is_idle() { GLANCE } else { SLICE };
         let step = step.min(time);
@@ -126,23 +126,23 @@ impl World {
         step
     }
 
-    /// The clock jumps.
+    /// Makes the clock jump.
     pub async fn jump(&self, time: Duration) {
         tokio::time::advance(time).await;
         self.court.jumps.set(self.court.jumps.get() + 1);
     }
 
-    /// A computation of nobody's that panics.
+    /// A computation without an owner that panics.
     pub fn submit_panic(&self) {
         self.pool.submit(RUNTIME, Box::new(Trap));
     }
 
-    /// Bytes that all clients together hold.
+    /// Bytes held for all clients together.
     pub fn taken(&self) -> usize {
         self.gauges.memory().taken()
     }
 
-    /// Whether nobody is connected, nothing is held for anybody, and nothing is computed.
+    /// Whether no client is connected, no memory is held for clients, and no computation runs.
     pub fn is_empty(&self) -> bool {
         self.gauges.connections() == 0 && self.taken() == 0 && self.pool.is_idle()
     }

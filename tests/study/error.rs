@@ -1,4 +1,4 @@
-//! Error against cost: the study's scenes behave as theory says, and are what the live arm does.
+//! Error against cost: the study's scenes agree with theory, and with the live arm.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
@@ -44,8 +44,8 @@ fn evaluations_are_counted_and_not_estimated() {
     }
 }
 
-/// The steps that are timed (the live arm's stepper) and those that are judged (the counted steps) are the same: the sum of the last
-/// angles says so for every scene, to the last bit.
+/// The timed steps (of the live arm's stepper) and the counted steps are the same: the sums of their last angles are
+/// equal in every scene, to the last bit.
 #[test]
 fn the_steps_that_are_timed_are_the_steps_that_are_judged() {
     for scene in scenes() {
@@ -122,7 +122,7 @@ fn the_symplectic_baseline_is_of_order_two_and_its_energy_error_does_not_grow() 
     assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
     let growth = end(1e-3, 100.0) / end(1e-3, 10.0);
     assert!(growth < 1.2, "{growth}");
-    // Midpoint with the same order is not symplectic: its error goes on growing.
+    // Midpoint with the same order is not symplectic: its error keeps growing.
     let midpoint = |duration| {
         energy_drift(&arm, &regular, Method::Midpoint, 1e-3, duration)
             .last()

@@ -16,7 +16,7 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::Linear;
 use pendularm::study::stability::{Sampling, step_matrix};
 
-/// Orders where nothing is stiff, and an error that hardly knows how stiff it is.
+/// Orders without stiffness, and an error that hardly depends on stiffness.
 #[test]
 fn implicit_baselines_have_their_orders_and_do_not_see_stiffness() {
     let soft = StiffScene::new(By::Gains, 1.0);

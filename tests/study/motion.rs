@@ -1,5 +1,5 @@
-//! The timestep that a motion bears, against what becomes of the arm: within it hardly any is lost, far beyond it most
-//! are.
+//! The predicted timestep limit of a motion, against runs: hardly any arm diverges below it, and most do far beyond
+//! it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

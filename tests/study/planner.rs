@@ -1,4 +1,4 @@
-//! Plans, against references of twice the digits: the error that was allowed is kept.
+//! Plans, against references of twice the digits: their error is within the allowed one.
 
 use std::f64::consts::PI;
 
@@ -82,7 +82,8 @@ fn a_planned_swing_keeps_within_its_error() {
     }
 }
 
-/// Under control it is holding the effort that costs, so that the method of fewest evaluations wins.
+/// Under control the held effort causes the error, so that the method with the fewest evaluations
+/// wins.
 #[test]
 fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant() {
     let (gains, setpoint) = (Gains::default(), Setpoint::at([0.8, -0.6]));
@@ -106,8 +107,8 @@ fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant(
     );
 }
 
-/// A stiff loop is farthest off in its first milliseconds, a fast link somewhere on every turn: the planned run is
-/// looked at after each of its steps.
+/// A stiff loop has its largest error in its first milliseconds, a fast link at some angle of every turn: the
+/// planned run is compared after each step.
 #[test]
 fn no_peak_is_overlooked() {
     let stiff = |kp, kd, error| {
@@ -189,7 +190,7 @@ fn a_plan_has_the_fewest_evaluations_of_all_whole_numbers_of_steps() {
     }
 }
 
-/// Nothing is run where nothing is advised, and the error says so.
+/// Without an advised timestep nothing is run, and the error gives the reason.
 #[test]
 fn a_plan_that_ran_nothing_says_why() {
     let gains = Gains {

@@ -12,7 +12,7 @@ fn at_rest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>, method: Method) -> Li
     limits(&ControlLoop::new(*arm, *gains, Setpoint::default()).with_method(method))
 }
 
-/// Uneven and underdamped: nine poses of the second joint missed the one that limits, by 1.8 times.
+/// Uneven and underdamped: with nine poses of the second joint the limit was 1.8 times too large.
 #[test]
 fn the_smallest_limit_of_an_uneven_arm_is_found_between_the_poses_of_the_grid() {
     let arm = Arm::new([2.6, 0.73], [0.8, 5.6], 0.0).unwrap();
@@ -68,8 +68,8 @@ fn the_default_arms_are_proven_for_every_method() {
     }
 }
 
-/// Beside the fastest rate of 1e12/s everything slow seems to grow, as far as rounding knows; these loops are limited
-/// by the one joint, `kd h < 2 / max (Kd½ M⁻¹ Kd½)`, and nothing else.
+/// With a fastest rate of 1e12/s, rounding makes slow modes seem to grow. Only one joint limits these loops: `kd h <
+/// 2 / max (Kd½ M⁻¹ Kd½)`.
 #[test]
 fn limits_of_a_billionth_of_a_second_are_told() {
     for kd in [1e9, 1e11, 1e13] {

@@ -16,7 +16,7 @@ use crate::planner::{falling, plan};
 const README: &str = include_str!("../../README.md");
 const STUDY: &str = include_str!("../../docs/study.md");
 
-/// The number after `before` in a paper is `seen` rounded to `digits` digits.
+/// The number after `before` in a document is `seen` rounded to `digits` digits.
 fn agrees(paper: &str, before: &str, seen: f64, digits: i32) {
     let said = printed(paper, before);
     let last = 10_f64.powi(seen.abs().log10().floor() as i32 + 1 - digits);
@@ -102,7 +102,7 @@ fn the_printed_limits_are_those_of_the_loop() {
     );
 }
 
-/// The number that follows `before` in a paper, in the unit that follows it.
+/// The number that follows `before` in a document, in the unit that follows it.
 fn printed(text: &str, before: &str) -> f64 {
     let after = text
         .split_once(before)

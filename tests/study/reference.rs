@@ -145,7 +145,7 @@ fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
     }
 }
 
-/// The whole point of a reference: its own error is far below what a double can show.
+/// The error of a reference must be far below the resolution of a double.
 #[test]
 fn a_reference_knows_far_more_digits_than_a_double() {
     let arm = Arm::<3>::default();

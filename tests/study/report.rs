@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use pendularm::report::{ReportOptions, run};
 
-/// A directory that is gone after the test.
+/// A directory that is removed after the test.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -52,7 +52,7 @@ fn a_section_leaves_page_figures_and_numbers() {
     assert_eq!(csv.lines().count(), 3 * 3 * 19 + 1);
 }
 
-/// Side by side, and yet each where it belongs.
+/// Sections are made in parallel, and appear in their order.
 #[test]
 fn several_sections_are_made_and_shown_in_their_order() {
     let scratch = Scratch::new("several");
@@ -83,7 +83,7 @@ fn a_section_made_anew_keeps_the_others() {
     assert_eq!(first, kept);
 }
 
-/// Made by another version, or cut: left out without a word it would be missed late.
+/// Made by another version, or cut: the command must refuse it and not leave it out silently.
 #[test]
 fn a_kept_section_that_cannot_be_read_is_told_by_its_file() {
     let scratch = Scratch::new("unreadable");
@@ -94,6 +94,6 @@ fn a_kept_section_that_cannot_be_read_is_told_by_its_file() {
     let said = error.to_string();
     assert!(said.contains(kept.to_str().unwrap()), "{said}");
     assert!(said.contains("missing field"), "{said}");
-    // Before anything is made, which takes minutes.
+    // The refusal comes before any section is made, which takes minutes.
     assert!(!scratch.0.join("sections/conditioning.json").exists());
 }

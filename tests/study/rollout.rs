@@ -117,9 +117,9 @@ fn the_references_agree_to_rounding() {
     }
 }
 
-/// At ten microseconds Runge-Kutta 4 is off by rounding, as the references are; thirty seconds of a chaotic
-/// swing leave nothing to compare with. Neither error is told. One that is, is known: from three runs of other bits, to
-/// the uncertainty.
+/// At ten microseconds Runge-Kutta 4 is off by rounding, as the references are; thirty seconds of a chaotic swing leave
+/// nothing to compare with. Neither error is reported. A reported error is known within its uncertainty, from three
+/// runs with different bits.
 #[test]
 fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
     let from_rest = State {
@@ -178,7 +178,7 @@ fn a_run_is_the_simulation_bit_for_bit() {
     assert_eq!(made.evaluations, 400);
 }
 
-/// The run in pieces, and how many they are.
+/// The run in pieces, and their number.
 fn in_pieces(request: RolloutRequest<2>) -> (Rollout<2>, u64) {
     let mut paused = Paused::new(rollout(request));
     let mut pieces = 1;
@@ -190,7 +190,8 @@ fn in_pieces(request: RolloutRequest<2>) -> (Rollout<2>, u64) {
     }
 }
 
-/// Motions so wild that a reference needs thousands of evaluations for one step: a piece ends within it.
+/// Motions so fast that a reference needs thousands of evaluations for one step: a piece ends within the
+/// step.
 #[test]
 fn a_run_in_short_pieces_gives_the_same_bits_as_one_made_at_once_however_wild_the_motion() {
     // A piece has 2000 evaluations, and those of the last step: 22 coefficients of a reference at most.

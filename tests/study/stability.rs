@@ -1,5 +1,4 @@
-//! The largest stable timestep, predicted by linearisation: against 50-digit values, against closed forms, and against what
-//! the arm itself does.
+//! The largest stable timestep, predicted by linearisation: against 50-digit values, closed forms, and runs of the arm.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -227,8 +226,8 @@ fn measure_all<const N: usize>(pose: [f64; N]) -> f64 {
     worst
 }
 
-/// The measurement divides what decays from what does not to 2e-5; what is nonlinear in a deviation of 1e-6 to 1e-3 rad is
-/// smaller than a thousandth.
+/// The measurement separates decay from growth to 2e-5; the nonlinear part of a deviation of 1e-6 to 1e-3 rad is below
+/// a thousandth.
 #[test]
 fn the_arm_itself_has_the_limits_that_are_predicted() {
     let bent = measure_all([0.5, 0.8]).max(measure_all([0.5, 0.8, -0.6]));
@@ -315,7 +314,7 @@ fn an_arm_left_to_itself_has_the_limits_of_its_swing() {
             (Some(0.0), Some(0.0))
         );
     }
-    // 2 and 2 sqrt 2 per fastest mode: one ratio, whatever the mode. Growth counts from 1e-11 on.
+    // 2 and 2 sqrt 2 per fastest mode: the same ratio for every mode. Growth counts from 1e-11 on.
     let (verlet, rk4) = (swing(Method::Verlet), swing(Method::Rk4));
     let ratio = rk4.held.unwrap() / verlet.held.unwrap();
     assert!((ratio - 2.0_f64.sqrt()).abs() < 1e-6, "{ratio}");
@@ -330,7 +329,7 @@ fn an_arm_left_to_itself_has_the_limits_of_its_swing() {
     }
 }
 
-/// Nothing that a client can set brings a limit out of its kind: none, or a number that is not negative.
+/// For all settings of a client a limit is either absent or a number that is not negative.
 #[test]
 fn no_parameters_make_a_limit_that_is_no_number() {
     let sizes = [1e-160, 1e-6, 1.0, 1e9, 1e160];
@@ -419,7 +418,7 @@ fn check_braked(
     assert_eq!(limit_held(&control) == Some(0.0), runs_away, "{told}");
 }
 
-/// Far from the limit the integral decides, past it the damping that answers too late; both are seen.
+/// Far below the limit the integral decides, beyond it the delayed damping; both are measured.
 #[test]
 fn a_deviation_grows_per_control_period_as_the_spectral_radius_says() {
     for method in Method::ALL {

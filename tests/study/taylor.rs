@@ -55,7 +55,7 @@ fn the_stored_motions_are_followed_to_rounding() {
     }
 }
 
-/// A random arm, a state of it, an effort, and a time in which it moves a good way.
+/// A random arm, its state, an effort, and a time in which it moves far.
 fn any<const N: usize>(rng: &mut fastrand::Rng) -> (Arm<N>, State<N>, [f64; N], f64) {
     let mut size = || 10_f64.powf(rng.f64() - 0.5);
     let (lengths, masses): ([f64; N], [f64; N]) = (
@@ -143,7 +143,7 @@ fn an_asked_tolerance_is_kept() {
     }
 }
 
-/// Against twice the digits: how far off, and how far a start in the next double leads.
+/// Against twice the digits: the error, and the effect of a start at the next double.
 fn beside_twice_the_digits<const N: usize>(arm: &Arm<N>, start: &State<N>, time: f64) -> [f64; 2] {
     let truth = ReferenceMotion::new(arm, start, &Law::FREE, time);
     let truth = truth.state(time).position;
@@ -207,7 +207,7 @@ fn an_arm_let_go_along_the_horizontal_is_followed_although_its_series_has_gaps()
     }
 }
 
-/// A joint that is wound up by a million turns is followed as well as its angle can be told: a double of 7e6 rad has
+/// A joint that is wound up by a million turns is followed to the resolution of its angle: a double of 7e6 rad has
 /// digits to 1e-9.
 #[test]
 fn a_wound_up_joint_moves_as_any_other() {
@@ -223,7 +223,7 @@ fn a_wound_up_joint_moves_as_any_other() {
     assert!(off < 1e-8, "{off:e}");
 }
 
-/// Refused within bounds, and not answered: a spin of a billion turns in the span, and numbers that have ended.
+/// Refused after bounded work: a spin of a billion turns in the span, and numbers that are not finite.
 #[test]
 fn a_motion_that_is_too_wild_is_refused_within_bounds() {
     let arm = Arm::<3>::default();

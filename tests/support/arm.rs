@@ -11,7 +11,7 @@ pub fn stamp(message: &Value) -> f64 {
     time(&message["header"]["stamp"])
 }
 
-/// Waits until the arm has made so many ticks. The client subscribes to `/joint_states`.
+/// Waits until the arm has made this many ticks. The client subscribes to `/joint_states`.
 pub fn ticks(client: &mut Client, count: usize) {
     for _ in 0..count {
         client.message("/joint_states");
@@ -27,8 +27,8 @@ pub fn time(stamp: &Value) -> f64 {
     sec + nanosec as f64 / 1e9
 }
 
-/// The state as it is now: the first `/joint_states` after the response to a call, which none from before it follows.
-/// The client must have subscribed.
+/// The present state: the first `/joint_states` after the response to a call, since older messages arrive before the
+/// response. The client must have subscribed.
 pub fn state(client: &mut Client) -> Value {
     client.settle();
     client.kept.clear();
@@ -68,7 +68,7 @@ pub fn let_simulate(client: &mut Client, time: f64) {
     });
 }
 
-/// A check that a right runtime passes on a quiet machine and a wrong one never does may fail now and then on a busy one.
+/// Retries a check that a correct runtime may fail on a busy machine, and that a wrong one never passes.
 pub fn in_one_of_three_tries(what: &str, attempt: impl Fn() -> Result<(), String>) {
     let mut failures = Vec::new();
     for _ in 0..3 {

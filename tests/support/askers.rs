@@ -107,7 +107,7 @@ impl JsonCaller {
     }
 }
 
-/// Stands in for a client that has asked: says that it has its answer, and hands it on.
+/// A substitute for a client: reports that its answer has come, and passes it on.
 struct Asking<T> {
     connection: u64,
     gone: Arc<AtomicBool>,
@@ -138,7 +138,7 @@ pub struct Asked<T> {
     pub gone: Arc<AtomicBool>,
 }
 
-/// Asks as the client of that connection, which says so once it has its answer.
+/// Asks as the client of that connection, and reports when the answer has come.
 pub fn ask_as<A: Ask>(
     node: &Recipient<Call<A>>,
     connection: u64,
@@ -172,7 +172,7 @@ pub struct PoolBench<T: Actor> {
 }
 
 impl<T: Actor<Context = Context<T>>> PoolBench<T> {
-    /// With one worker, so that turns can be told from luck.
+    /// With one worker, so that the order of turns is fixed.
     pub fn new(node: impl FnOnce(WorkerPool) -> T) -> Self {
         let (answered, order) = unbounded_channel();
         let pool = WorkerPool::start(1).unwrap();

@@ -1,6 +1,6 @@
 //! Numbers out of JSON.
 //!
-//! **Invariant:** whatever is no number ends the test that expects one, and shows what it is.
+//! **Invariant:** any other value fails the test that expects a number, and is shown.
 
 use serde_json::Value;
 

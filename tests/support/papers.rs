@@ -1,6 +1,6 @@
-//! Parts that the tests of the papers share: a file's text, and a table in it.
+//! Parts that the tests of the documents share: a file's text, and a table in it.
 //!
-//! **Invariant:** what is looked for and not there fails the test.
+//! **Invariant:** a missing text or table fails the test.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! All nodes on one thread whose clock stands still until nobody has anything to do, and a client that speaks rosbridge
-//! through an in-memory pipe: tests in virtual time share them.
+//! All nodes on one thread whose clock stands still until every task waits, and a rosbridge client on an in-memory
+//! pipe. Tests in virtual time share them.
 //!
 //! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and
 //! always in the same way, so that steps, messages and their order can be counted.
@@ -30,7 +30,7 @@ use tokio::sync::mpsc::UnboundedSender;
 use tokio::sync::oneshot;
 use tokio::time::{sleep, timeout};
 
-/// Virtual time that anything may take before a test gives up.
+/// Longest virtual time of an operation before a test fails.
 pub const PATIENCE: Duration = Duration::from_secs(600);
 
 pub const fn ms(milliseconds: u64) -> Duration {
@@ -41,7 +41,7 @@ pub const fn ms(milliseconds: u64) -> Duration {
 pub struct Stage<const N: usize> {
     pub registry: Addr<Registry>,
     pub arm: Addr<ArmSim<N>>,
-    /// Computations, which nobody does unless a test has its turns.
+    /// Computations, which run only while a test gives them turns.
     pub pool: WorkerPool,
     pub gauges: Arc<Gauges>,
 }
@@ -70,7 +70,7 @@ where
         connect(&self.registry, &self.gauges)
     }
 
-    /// The arm's whole simulation, as it is now.
+    /// The present state of the arm's whole simulation.
     pub async fn simulation(&self) -> Simulation<N> {
         let Snapshot(simulation) = self.arm.send(TakeSnapshot).await.unwrap();
         *simulation
@@ -148,7 +148,7 @@ impl DerefMut for Client {
 }
 
 impl Client {
-    /// Hears all messages until now; its own questions for that are not remembered.
+    /// Receives all messages until now; the requests that this needs are not recorded.
     pub async fn settle(&mut self) {
         self.0.settle().await;
         self.heard.pop();
@@ -279,7 +279,7 @@ impl Handler<EndGoal<2>> for SilentArm {
     }
 }
 
-/// Takes what nodes publish in the registry's place: here nothing is left out for want of subscribers.
+/// Receives what nodes publish in place of the registry: messages without subscribers are kept, too.
 pub struct Published(pub UnboundedSender<Topic>);
 
 impl Actor for Published {

@@ -19,7 +19,7 @@ pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
     counting_wake_ups(|_| test)
 }
 
-/// The same; the test is told how often the thread has gone to sleep, and so how often something woke it.
+/// The same; the test gets the number of times that the thread went to sleep, and so of its wake-ups.
 pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
     let sleeps = Arc::default();
     to_the_end(&with_paused_clock(Arc::clone(&sleeps)), test(sleeps))

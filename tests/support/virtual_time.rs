@@ -87,7 +87,7 @@ impl Peer {
         self.send_bytes(text.as_bytes()).await;
     }
 
-    /// Sends text as far as it is taken at once; false if that is not all, or the client has been disconnected.
+    /// Sends as much text as the pipe accepts at once; false if some is left, or the client has been disconnected.
     pub async fn offer(&mut self, text: &str) -> bool {
         let send = self.stream().write_all(text.as_bytes());
         matches!(timeout(GRAIN, send).await, Ok(Ok(())))
@@ -147,7 +147,7 @@ impl Peer {
     }
 }
 
-/// Lets everything happen that needs no time, and what needs next to none.
+/// Runs all work that needs no time, or almost none.
 pub async fn settle() {
     sleep(Duration::from_millis(10)).await;
 }
@@ -172,7 +172,7 @@ impl Held {
     }
 }
 
-/// A node: hands what it is sent to closures.
+/// A node that passes its messages to closures.
 pub struct Node {
     pub on_call: Box<dyn FnMut(ServiceCall)>,
     pub on_message: Box<dyn FnMut(TopicMessage)>,
@@ -207,7 +207,7 @@ impl Node {
         }
     }
 
-    /// Starts it as the one that serves `services`, takes and publishes `topics`.
+    /// Starts it as the provider of `services`, and as subscriber and publisher of `topics`.
     pub fn attach(self, nodes: &mut Nodes, services: &[Service], topics: &[Topic]) {
         let address = self.start();
         for service in services {

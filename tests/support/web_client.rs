@@ -92,7 +92,7 @@ pub fn get(address: SocketAddr, path: &str) -> Answer {
     Answer::parse(&exchange(address, request.as_bytes()))
 }
 
-/// The header lines of a handshake that is as it has to be.
+/// The header lines of a correct handshake.
 pub fn handshake(address: SocketAddr) -> String {
     format!(
         "Host: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
@@ -119,7 +119,7 @@ pub fn try_handshake(address: SocketAddr, path: &str, headers: &str) -> (u16, St
     (answer.status, answer.text().to_owned())
 }
 
-/// A client over WebSocket, where nothing comes that was not asked for.
+/// A client over WebSocket that receives only what it asked for.
 pub struct Socket(Client);
 
 impl Deref for Socket {
@@ -149,7 +149,7 @@ impl Socket {
         response
     }
 
-    /// Waits until all that was sent has been handled, and asserts that nothing else was said.
+    /// Waits until all sent frames have been handled, and asserts that no other frame came.
     #[track_caller]
     pub fn settle(&mut self) {
         let response = self.call("/arm_sim/set_params", json!({}));

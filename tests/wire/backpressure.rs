@@ -7,7 +7,7 @@ use pendularm::actors::gateway::limits::MAX_BACKLOG;
 use serde_json::json;
 
 const MIB: usize = 1024 * 1024;
-/// Memory that the program needs by itself, and that an allocator and a test build add.
+/// Memory of the program itself, with the additions of an allocator and a test build.
 const BASE: usize = 40 * MIB;
 
 #[test]
@@ -40,8 +40,7 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
     assert!(peak < BASE + MAX_BACKLOG + 16 * MIB, "{peak} bytes");
 }
 
-/// As for calls and goals: nobody fills the memory, and nobody ends another's connection, by asking a goal's end again
-/// and again.
+/// The same as for calls and goals: repeated cancellations neither fill the memory nor end another client's connection.
 #[test]
 fn cancellations_for_a_client_that_never_reads_are_refused_when_too_many_wait() {
     let runtime = Runtime::start();

@@ -72,8 +72,8 @@ fn rates_are_those_of_wall_time() {
     let mut client = runtime.connect();
     client.subscribe("/diagnostics");
     arm_status(&mut client);
-    // An idle machine gives 1 and 1000. One that stands still loses any part of a second, of which the arm makes up
-    // 250 ms: a message may say less of a right arm, never much more, and two soon say enough.
+    // An idle machine gives 1 and 1000. A stalled machine loses any part of a second, of which the arm makes up 250
+    // ms. So a message may report less for a correct arm, but never much more, and two soon report enough.
     let deadline = Instant::now() + PATIENCE;
     let mut enough = 0;
     while enough < 2 {
@@ -94,7 +94,7 @@ fn rates_are_those_of_wall_time() {
     }
 }
 
-/// No machine takes a step in a picosecond: the arm lags, says so, and goes on answering.
+/// No machine takes a step in a picosecond: the arm lags, reports it, and still answers.
 #[test]
 fn an_arm_that_can_not_follow_wall_time_warns() {
     let runtime = Runtime::start();

@@ -1,4 +1,4 @@
-//! Computations on threads of their own, beside the arm.
+//! Computations on their own threads while the arm runs.
 
 use std::time::Duration;
 
@@ -49,7 +49,7 @@ fn the_largest_answers_are_given_while_others_are_served() {
     client.settle();
     let short = other.ask("/study/rollout", json!({"duration": 0.01}));
     assert_eq!(short["times"].as_array().unwrap().len(), 11);
-    // Tens of megabytes to be computed, written and parsed, beside other tests.
+    // Tens of megabytes to compute, write and parse, while other tests run.
     client.set_patience(6 * PATIENCE);
     let response = client.receive_where("the big answer", |frame| frame["id"] == "big");
     for key in ["times", "positions", "velocities", "efforts", "energy"] {

@@ -1,6 +1,6 @@
-//! The end of a program in the middle of everything.
+//! The end of the program during all kinds of work.
 //!
-//! **Invariant:** what a client is owed it gets, or it is told; nobody else notices.
+//! **Invariant:** each client gets its answers or an error; other clients are not affected.
 
 use std::io::Write;
 use std::time::Duration;
@@ -66,11 +66,11 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
         }
         frames
     });
-    // Everything is under way: the arm has made twelve ticks beside it.
+    // All work has begun: the arm has made twelve ticks meanwhile.
     ticks(&mut watchers[0], 12);
     signal(runtime.pid(), "TERM");
     let (status, took) = runtime.end();
-    // README's second, and one more for a machine that is busy with other tests.
+    // The documented second, and one more for a machine that is busy with other tests.
     assert!(
         status.success() && took < Duration::from_secs(2),
         "{status}, {took:?}"

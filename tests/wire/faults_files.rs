@@ -1,6 +1,6 @@
-//! Open files run out: clients too many are told so, those served go on, and nothing spins.
+//! No open files are left: new clients get a message, served clients continue, and no thread spins.
 //!
-//! **Invariant:** the limits are the process's own, set by the shell that starts it; nothing of the machine is changed.
+//! **Invariant:** the shell that starts the process sets its limits; the machine is not changed.
 
 use std::time::Instant;
 
@@ -52,7 +52,7 @@ fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told(
     for client in &mut served {
         client.settle();
     }
-    // More than there are files: those that find none wait in the system's queue until others have been told.
+    // More clients than files: the rest wait in the system's queue until others have got their message.
     let mut late: Vec<Client> = (0..60).map(|_| runtime.connect()).collect();
     for client in &mut late {
         assert!(refusal_of(client).contains("serves 8 clients"));
@@ -62,7 +62,8 @@ fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told(
     }
 }
 
-/// Without a file nothing can be accepted: the program waits, at no cost, and goes on as soon as there is one.
+/// Without a file no client can be accepted: the program waits without using the processor, and continues once
+/// a file is free.
 #[test]
 fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for() {
     let runtime = Runtime::under("ulimit -n 40");
@@ -71,7 +72,7 @@ fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for()
     for client in &mut served {
         client.settle();
     }
-    // The limit falls below what is open already: from now on there is no file for anybody.
+    // The limit falls below the number of open files: no further file can be opened.
     set_soft_limit(&runtime, 8);
     let mut waiting: Vec<Client> = (0..20).map(|_| runtime.connect()).collect();
     let before = processor_seconds(&runtime);

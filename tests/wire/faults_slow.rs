@@ -1,6 +1,6 @@
-//! Faults that take their time: `make test-slow` runs these.
+//! Slow tests of faults: `make test-slow` runs these.
 //!
-//! **Invariant:** what is measured of memory is the program's own peak, in a test build.
+//! **Invariant:** the measured memory is the peak of the program, in a test build.
 
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -70,7 +70,7 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
     assert!(peak < MAX_MEMORY, "{peak} bytes");
 }
 
-/// The wall clock jumps an hour on and a day back: nothing that is decided by time notices. Needs Debian's `libfaketime`.
+/// The wall clock jumps an hour forward and a day back: no timeout is affected. Needs Debian's `libfaketime`.
 #[test]
 #[ignore = "needs libfaketime: make test-slow"]
 fn a_wall_clock_that_jumps_changes_nothing() {
@@ -96,7 +96,7 @@ fn a_wall_clock_that_jumps_changes_nothing() {
         let began = Instant::now();
         let before = stamp(&state(&mut client));
         std::fs::write(&file, format!("{jump}\n")).unwrap();
-        // More than the 250 ms that an arm makes up at once: simulation time goes on, and with it the messages.
+        // More than the 250 ms that an arm makes up at once: simulation time and messages continue.
         let (mut simulated, mut messages) = (0.0, 0);
         while simulated < 0.5 {
             simulated = stamp(&client.message("/joint_states")) - before;
@@ -112,7 +112,7 @@ fn a_wall_clock_that_jumps_changes_nothing() {
                 "{messages} messages in {wall} s after {jump}"
             );
         }
-        // A call that waits is neither forgotten nor out of time.
+        // A waiting call is neither lost nor timed out.
         provider.send(
             &json!({"op": "service_response", "service": "/s", "id": call["id"],
             "values": {}, "result": true}),

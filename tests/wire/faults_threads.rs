@@ -1,4 +1,4 @@
-//! Threads run out: the program goes on with those that it has, and one that can't start says why.
+//! No more threads can start: the program continues with those that it has, and a program that cannot start prints why.
 //!
 //! **Invariant:** the limits are the process's own. The system holds its first user to none, so that where the tests are
 //! run as that user, the program is run as another.
@@ -10,11 +10,11 @@ use crate::common::{Client, Runtime, without_variables};
 use crate::web_client::get;
 use serde_json::json;
 
-/// Goes on as a user that the system holds to its limits.
+/// Continues as a user to whom the system's limits apply.
 const AS_A_USER: &str =
     "[ \"$(id -u)\" = 0 ] && user='setpriv --reuid 54321 --regid 54321 --clear-groups --'";
 
-/// The program may be where that user may not look.
+/// That user may have no access to the program's folder.
 const OPEN_PROGRAM: &str = "exec 9<\"$0\"";
 
 #[track_caller]
@@ -32,8 +32,8 @@ fn refuse_threads(runtime: &Runtime) {
     assert!(set.expect("prlimit runs").success());
 }
 
-/// Megabytes to be read, encoded and written, answers that nobody waits for any more, and the page: all that is done
-/// beside the gateway's own thread.
+/// Megabytes to read, encode and write, answers to cancelled calls, and the page: all the work outside the gateway's
+/// own thread.
 #[test]
 fn with_no_more_threads_everything_is_still_served() {
     let runtime = Runtime::under(&format!(

@@ -15,7 +15,7 @@ use crate::web_client::folder;
 use pendularm::logging::{LINE_BYTES, QUEUE_LINES};
 use serde_json::{Value, json};
 
-/// Texts that do harm wherever they are written as they came, or read as anything but a text.
+/// Texts that do harm if they are written unescaped, or read as anything but text.
 const HOSTILE: [&str; 14] = [
     "a\n2026-01-01T00:00:00Z ERROR forged: b",
     "a\r\n2026-01-01T00:00:00Z ERROR forged: b",
@@ -41,12 +41,12 @@ fn talkative(name: &str, format: &str) -> (Logged, PathBuf) {
     (Logged::at("trace", command, Stdio::null()), folder)
 }
 
-/// Ends the program in order, and gives its log.
+/// Ends the program normally, and returns its log.
 fn end_of(runtime: Logged) -> String {
     runtime.end().join("\n") + "\n"
 }
 
-/// Whether a character does something on a terminal.
+/// Whether a terminal interprets a character.
 fn acts(one: char) -> bool {
     one.is_control()
         || matches!(one, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
@@ -212,7 +212,7 @@ fn a_log_that_nobody_reads_blocks_nobody_and_the_lines_that_are_lost_are_counted
             let stderr = child.stderr.take().unwrap();
             move || std::io::read_to_string(stderr).unwrap()
         });
-        // The thread of the log goes on, and its last lines have their time.
+        // The thread of the log continues, and has time for its last lines.
         thread::sleep(std::time::Duration::from_secs(1));
         signal(child.id(), "TERM");
         assert!(end(&mut child).0.success());

@@ -1,6 +1,6 @@
-//! Mishaps of operators: signals, limits of the shell, standard streams that take nothing, and storms of warnings.
+//! Faults in operation: signals, limits of the shell, standard streams that accept nothing, and floods of warnings.
 //!
-//! **Invariant:** each ends in order or harms nobody; the limits are the process's own.
+//! **Invariant:** each ends normally or has no effect on clients; the limits are the process's own.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -158,7 +158,7 @@ fn clients_are_served_whatever_becomes_of_standard_output() {
     }
 }
 
-/// The events that lines tell of: one each, or as many as the line says.
+/// The number of events in lines: one each, or the number in the line.
 fn events<'a>(lines: impl Iterator<Item = &'a str>) -> u64 {
     lines
         .map(|line| match line.split_once("(first of ") {

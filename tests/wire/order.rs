@@ -11,7 +11,7 @@ fn call(service: &str, id: impl Into<Value>, args: Value) -> String {
     format!("{frame}\n")
 }
 
-/// The first `/joint_states` behind the response to this call.
+/// The first `/joint_states` after the response to this call.
 fn states_after<const N: usize>(client: &mut Client, service: &str, args: Value) -> [Value; N] {
     client.send_bytes(call(service, "call", args).as_bytes());
     client.receive_where("response", |frame| frame["id"] == "call");
@@ -41,7 +41,7 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
     for round in 0..30 {
-        // An arm that goes on makes up 250 ms at most if it is late: half a second is from before the reset.
+        // A late arm makes up at most 250 ms: half a second is from before the reset.
         let (paused, least) = if round % 2 == 0 {
             (true, 0.1)
         } else {

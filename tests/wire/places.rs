@@ -1,4 +1,4 @@
-//! Places: how many clients are served, which places are kept, and what a client is told for which none is free.
+//! Places: how many clients are served, which places are kept, and the message to a client without a free place.
 
 use std::net::SocketAddr;
 use std::process::Output;

@@ -1,4 +1,4 @@
-//! A client that reads half of its messages sees the present.
+//! A client that reads half of its messages gets current ones.
 
 use std::io::{BufRead, BufReader, Read};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

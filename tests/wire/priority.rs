@@ -1,5 +1,4 @@
-//! Where threads are more than cores, those that work for one client give way to the arm and the gateway, which work
-//! for all.
+//! With more threads than cores, threads that work for one client have a lower priority than the arm and the gateway.
 //!
 //! **Invariant:** only Linux is asked, which has a priority for each thread.
 
@@ -31,7 +30,7 @@ fn who_works_for_one_client_gives_way_to_the_arm_and_the_gateway() {
     client.send(&json!({"op": "call_service", "service": "/arm_sim/pause", "args": {"id": id}}));
     assert_eq!(client.receive()["op"], "service_response");
 
-    // A thread names itself and steps back once it runs.
+    // A thread sets its name and lowers its priority once it runs.
     let deadline = Instant::now() + PATIENCE;
     loop {
         let niceness = niceness(&runtime);

@@ -1,4 +1,4 @@
-//! Records that are too short to be replayed, and records whose words are foreign.
+//! Records that are too short for a replay, and records with hostile texts.
 
 use std::fs::{self, File};
 
@@ -36,7 +36,7 @@ fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
     assert!(said.ends_with("it has no states of an arm\n"), "{said}");
 }
 
-/// Texts of a file are foreign: in the middle of a note, as a method, as an input, as a topic, as a file's name.
+/// Hostile texts in a file: within a note, as a method, as an input, as a topic, as a file's name.
 #[test]
 fn words_of_a_record_are_escaped_and_cut() {
     let folder = folder("\u{1b}[31m-\u{202e}crafted");

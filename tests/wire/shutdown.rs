@@ -10,7 +10,7 @@ use pendularm::protocol::op::GoalStatus;
 use pendularm_client::websocket::{self as frames, LAST, opcode};
 use serde_json::{Value, json};
 
-/// README's second, and one more for a machine that is busy with other tests.
+/// The documented second, and one more for a machine that is busy with other tests.
 const LIMIT: Duration = Duration::from_secs(2);
 
 /// Sends the signal; the program must end in time, with status 0.
@@ -95,7 +95,7 @@ fn line(service: &str, args: &Value) -> String {
     format!("{call}\n")
 }
 
-/// Sends the same again and again until the stream ends, whether or not anything comes back.
+/// Repeats the same bytes until the stream ends, with or without answers.
 fn flood(client: &Client, bytes: Vec<u8>) {
     let mut stream = client.stream().try_clone().unwrap();
     std::thread::spawn(move || while stream.write_all(&bytes).is_ok() {});

@@ -34,7 +34,7 @@ const TURNS_PER_TICK: usize = 17;
 /// Turns after which a test gives up.
 const MANY_TURNS: usize = 1_000_000;
 
-/// Everything that the arm says, in order.
+/// All messages of the arm, in order.
 #[derive(Debug, Clone, PartialEq)]
 enum Said {
     Tick,
@@ -156,7 +156,7 @@ impl TurnsBench {
         )
     }
 
-    /// Lets the arm have its turns, a millisecond each, until so many answers have come; gives the number of turns.
+    /// Gives the arm turns of a millisecond each until this many answers have come; returns the number of turns.
     async fn until_answers(&self, count: usize) -> usize {
         for turns in 0..MANY_TURNS {
             if self.answered() >= count {
@@ -187,7 +187,7 @@ impl TurnsBench {
         said.iter().filter(|one| **one == Said::Tick).count()
     }
 
-    /// Asserts that the ticks that belong to so many turns have come: one may be on its way at the end.
+    /// Asserts that the ticks of this many turns have come; one may still be on its way.
     #[track_caller]
     fn assert_ticks(&self, turns: usize, of: &str) {
         let expected = turns / TURNS_PER_TICK;

@@ -28,14 +28,14 @@ impl Handler<GoalJudged<3>> for Owner {
     }
 }
 
-/// A step of a second is told by itself: ten thousand of them are not told at once, and each is.
+/// Each step of a second is reported separately, also if there are ten thousand.
 #[test]
 fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
         let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
         let others = Rc::clone(&turns);
-        // Somebody else who always has something to do.
+        // Another task that always has work.
         actix_rt::spawn(std::future::poll_fn(move |cx| {
             others.set(others.get() + 1);
             cx.waker().wake_by_ref();

@@ -1,4 +1,4 @@
-//! The tick, beside floods of messages and steps without end.
+//! The tick during floods of messages and endless steps.
 
 use super::*;
 use pendularm::actors::arm::sim::{
@@ -114,7 +114,7 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
     }
 }
 
-/// Four clients who never stop asking, as many times as it takes for a second to pass.
+/// Four clients that send requests without a pause until a second has passed.
 #[test]
 fn the_tick_comes_while_clients_step_without_end() {
     in_virtual_time(async {

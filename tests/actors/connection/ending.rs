@@ -1,4 +1,4 @@
-//! How a connection ends, in virtual time: the rest for a client that has stopped sending, and the runtime's end.
+//! The end of a connection in virtual time: remaining messages for a client that has stopped sending, and the shutdown.
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
@@ -33,7 +33,7 @@ fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
     });
 }
 
-/// Whether it has only stopped sending or is gone altogether can't be told until something is sent to it.
+/// Whether it has only stopped sending or has disconnected is unknown until something is sent to it.
 #[test]
 fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
     in_virtual_time(async {
@@ -69,7 +69,7 @@ fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
         settle().await;
         client.half_close().await;
         settle().await;
-        // While its computations end, one after the other, it is owed them.
+        // It gets the results of its computations, one after the other.
         for _ in 0..3 {
             sleep(RESPONSES_TIME - Duration::from_secs(1)).await;
             computations.answer();
@@ -151,7 +151,7 @@ fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_str
             .send(RefuseCalls("shutting down"))
             .await
             .unwrap();
-        // The end overtakes the answer to the one that runs, as it does when a worker is slow.
+        // The end overtakes the answer to the running one, as happens with a slow worker.
         gateway.registry.send(FinishAll).await.unwrap();
         settle().await;
         computations.take().refuse("shutting down");

@@ -1,4 +1,4 @@
-//! A client that reads half of its messages sees the present, where it is known how much it has not read.
+//! A client that reads half of its messages gets current ones if the number of its unread bytes is known.
 
 use std::cell::Cell;
 use std::pin::Pin;

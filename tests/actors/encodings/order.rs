@@ -1,4 +1,4 @@
-//! The order of messages of which some are cut up elsewhere, and that each comes in time.
+//! Messages that are partly cut into fragments on another thread arrive in order and in time.
 
 use super::*;
 use pendularm::actors::resources::aside::{WorkKind, WorkPermit};
@@ -66,7 +66,7 @@ fn only_its_publisher_waits_for_a_message_that_is_cut_up() {
     });
 }
 
-/// They may be held back for hours, and nobody who has gone waits for them.
+/// They may be held back for hours, but not for a client that has disconnected.
 #[test]
 fn what_a_throttle_holds_back_holds_up_no_other_message_and_no_end() {
     in_virtual_time(async {

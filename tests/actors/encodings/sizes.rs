@@ -19,7 +19,7 @@ fn a_size_counts_as_the_power_of_two_below_it() {
     });
 }
 
-/// Another size under the same id takes the place of the one before.
+/// A new size under the same id replaces the old one.
 #[test]
 fn a_subscription_changes_its_size() {
     in_virtual_time(async {

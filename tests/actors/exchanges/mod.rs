@@ -102,7 +102,7 @@ const STRICT: [&str; 8] = [
     "default-src 'none'",
     "frame-ancestors 'none'",
 ];
-/// How headers begin that no answer has.
+/// Beginnings of headers that no answer has.
 #[cfg(feature = "web")]
 const NEVER: [&str; 2] = ["\r\naccess-control-", "\r\nserver:"];
 
@@ -473,7 +473,7 @@ fn number(text: &str) -> Option<usize> {
     limit.map_or_else(|| text.parse().ok(), |(_, limit)| Some(*limit))
 }
 
-/// A text as it is sent.
+/// The text to send.
 fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
     let mut text = text.to_owned();
     for (name, value) in bound {

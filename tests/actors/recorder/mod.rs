@@ -21,7 +21,7 @@ use tokio::time::{Instant, sleep};
 use crate::stage::{Client, Stage, ms};
 use crate::system::in_virtual_time;
 
-/// Entries as they come, in the order in which they are told.
+/// Entries in the order in which they are reported.
 #[derive(Clone, Default)]
 pub struct Notes(Arc<Mutex<Noted>>);
 
@@ -43,7 +43,7 @@ impl Notes {
         self.0.lock().unwrap().entries.clone()
     }
 
-    /// Begins to note all that passes.
+    /// Starts to record all messages.
     pub async fn take<const N: usize>(&self, stage: &Stage<N>)
     where
         Gains<N>: Default,
@@ -97,7 +97,7 @@ where
     stage.registry.send(SetTap(None)).await.unwrap();
 }
 
-/// Something that a client may do, out of everything that changes the arm's steps.
+/// A random action of a client that changes the arm's steps.
 async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::Rng) {
     let mut numbers = |low: f64, high: f64| -> Vec<f64> {
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()
@@ -150,7 +150,7 @@ where
     let stage = Stage::<N>::with_seed(seed).await;
     let mut client = stage.connect();
     let mut rng = fastrand::Rng::with_seed(seed);
-    // A record may begin in the middle of anything.
+    // A record may begin during any operation.
     for _ in 0..rng.u32(..8) {
         do_something::<N>(&mut client, &mut rng).await;
         sleep(ms(rng.u64(..90))).await;

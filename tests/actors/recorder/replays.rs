@@ -105,7 +105,7 @@ fn the_first_state_that_differs_in_its_last_bit_is_named_with_its_step() {
     assert!(says.contains(&names), "{says}");
 }
 
-/// The simulation is told as a whole behind what was lost, and nothing in between.
+/// After lost reports the whole simulation is recorded once, and no report before it.
 #[test]
 fn a_listener_that_has_lost_an_input_hears_the_whole_again() {
     in_virtual_time(async {

@@ -220,7 +220,7 @@ fn a_plan_for_a_given_control_period_has_whole_parts_of_it_as_timesteps() {
     });
 }
 
-/// A servo's plan of which only the allowed error is said.
+/// A plan for the controller, with only the allowed error given.
 fn plan_with(error: f64) -> PlanRun<2> {
     PlanRun {
         error,

@@ -1,4 +1,4 @@
-//! Runs computed beside the live arm.
+//! Offline runs during a live run.
 
 use super::*;
 use crate::system::in_real_time;

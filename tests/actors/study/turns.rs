@@ -1,4 +1,4 @@
-//! Light requests beside heavy ones, on the pool.
+//! Light requests among heavy ones, on the pool.
 
 use super::*;
 use crate::system::in_real_time;

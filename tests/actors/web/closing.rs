@@ -1,5 +1,5 @@
-//! WebSocket connections that are closed: by the peer, for an unfinished message, for what they hold, at the runtime's
-//! end.
+//! WebSocket connections that are closed: by the peer, for an unfinished message, for the memory that they hold, and
+//! at the shutdown.
 
 use super::*;
 use crate::virtual_time::Held;
@@ -20,7 +20,7 @@ fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
     head
 }
 
-/// The close frame that the peer is sent: code and reason, behind whatever else comes.
+/// The close frame to the peer: code and reason, after all other frames.
 async fn close_reason(stream: &mut DuplexStream) -> (u16, String) {
     let mut bytes = Vec::new();
     stream

@@ -91,7 +91,7 @@ fn file_request() -> String {
     HEAD.replace("GET /", "GET /report/a.csv") + "\r\n"
 }
 
-/// Clients that take nothing of a file hold the permits for files until they are closed. The next one gets its file.
+/// Clients that do not read a file hold the permits for files until they are closed. The next one gets its file.
 #[test]
 fn clients_that_take_no_byte_of_a_file_keep_others_from_files_for_a_time_only() {
     in_virtual_time(async {

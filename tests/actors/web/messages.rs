@@ -91,7 +91,7 @@ fn a_long_message_is_read_aside() {
     });
 }
 
-/// Reading goes on by itself, for no call comes of it.
+/// Reading continues by itself, because the message is not a call.
 #[test]
 fn what_is_no_message_is_read_in_turns() {
     in_virtual_time(async {

@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-# Rerun tells its makers nothing of a run in CI; it has to know before it is loaded.
+# In CI, Rerun sends no usage data. The variable must be set before the import.
 os.environ["CI"] = "true"
 from rerun.chunk import McapReader  # noqa: E402
 

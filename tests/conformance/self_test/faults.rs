@@ -10,7 +10,7 @@ use crate::proxy::{Fault, Side};
 pub struct Planted {
     /// The rule.
     pub rule: &'static str,
-    /// The server's fault in words.
+    /// A description of the server's fault.
     pub says: &'static str,
     /// Makes it, for a number of links.
     pub fault: fn(usize) -> Fault,
@@ -152,7 +152,7 @@ fn steps(from: &'static str, to: &'static str) -> Fault {
     request(INTEGRATOR, move |args| replace(args, "method", &json!(from), &json!(to)))
 }
 
-/// Rejects a request as a whole: the fields beside a bad one are not applied.
+/// Rejects a request as a whole: the other fields of a request with a bad one are not applied.
 fn all_or_nothing(service: &'static str, is_bad: impl Fn(&Value) -> bool + Send + 'static) -> Fault {
     request(service, move |args| {
         if let Some(members) = args.as_object_mut()

@@ -33,7 +33,7 @@ const WORKERS: usize = 8;
 
 fn all_hold(links: usize) {
     let program = Program::start(links);
-    // A run beside other tests may take longer than one by itself.
+    // A run during other tests may take longer.
     let selection = Selection { time: Duration::from_secs(300), ..Selection::default() };
     let rows = run(&program.address, &selection, |_| {}).unwrap();
     let failing: Vec<String> = rows.iter().filter(|row| !row.holds()).map(Row::to_string).collect();

@@ -284,7 +284,7 @@ impl Bench {
         self.accepted("/arm_sim/set_params", &json!({"gravity": gravity})).map(drop)
     }
 
-    /// The arm that the server says it has.
+    /// The arm that the server reports.
     pub fn arm(&mut self) -> Result<Arm, String> {
         let values = self.accepted("/arm_sim/set_params", &json!({}))?;
         Ok(Arm {

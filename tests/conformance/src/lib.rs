@@ -87,7 +87,7 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// Whether the rule is for an arm of so many links.
+    /// Whether the rule is for an arm with this many links.
     #[must_use]
     pub fn applies_to(&self, links: usize) -> bool {
         self.links.include(links)
@@ -154,8 +154,8 @@ impl Selection {
     }
 }
 
-/// Tries the selected rules one after another against the server at `address`, and tells each result as it comes.
-/// Afterwards the server has the settings that it had before.
+/// Tries the selected rules one after another against the server at `address`, and reports each result as it
+/// comes. Afterwards the server has the settings that it had before.
 ///
 /// # Errors
 /// If the server cannot be reached or does not say how many links it has.

@@ -1,4 +1,4 @@
-//! The four methods as the specification words them, for any number of coordinates.
+//! The four methods as the specification defines them, for any number of coordinates.
 
 use crate::arm::State;
 

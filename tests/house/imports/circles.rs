@@ -45,7 +45,7 @@ fn no_import_runs_in_a_circle_between_files() {
     }
 }
 
-/// Each folder has its files and the folders in it. The folder's own `mod.rs` is none of them: it is the folder.
+/// Each folder contains its files and folders. Its own `mod.rs` stands for the folder itself.
 #[test]
 fn no_import_runs_in_a_circle_between_the_rooms_of_a_folder() {
     for package in &PACKAGES {

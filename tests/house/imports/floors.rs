@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::arrows::{House, PENDULARM};
 
-/// Floors that a floor may name, besides itself: each row only rows above it.
+/// Layers that a layer may import, besides itself: each row only rows above it.
 const FLOORS: [(&str, &[&str]); 18] = [
     ("math", &[]),
     ("protocol", &[]),

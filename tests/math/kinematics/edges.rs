@@ -131,7 +131,7 @@ fn lengths_and_targets_at_the_ends_of_the_number_range_are_solved_or_refused() {
         let aimed = aimed(scale, 0.5 * scale, 0.2);
         assert!(miss(&three, &solve(&three, &[0.0; 3], &aimed).unwrap(), &aimed) < 1e-15);
     }
-    // A link that vanishes beside the other one still leaves the circle that the other one draws.
+    // With a link of negligible length, the reach is still the circle of the other link.
     for lengths in [
         [1e300, 1e-300],
         [1e-300, 1e300],

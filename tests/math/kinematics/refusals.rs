@@ -1,4 +1,4 @@
-//! Targets that are refused, and in which words.
+//! Refused targets, and their messages.
 
 use super::*;
 
@@ -33,7 +33,7 @@ fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
         refusal([2.0, 0.5, 1.0], aimed(2.0, 0.0, 0.0)),
         "phi = 0 puts the wrist 1 m from the base, closer than the 1.5 m to which links 1 and 2 can fold"
     );
-    // Where no orientation would do, that is said, not which wrist this one would need.
+    // If no orientation is possible, the message says so, and names no wrist position.
     assert_eq!(
         refusal([1.0, 1.0, 1.0], aimed(1e300, 0.0, 0.5)),
         "target (1e300, 0) is 1e300 m from the base, beyond the arm's reach of 3 m"

@@ -109,7 +109,7 @@ fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
     assert_eq!(pushed, fresh);
 }
 
-/// A prediction of a step has to know the effort that it will be taken with.
+/// The prediction of a step must use the effort of that step.
 #[test]
 fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
     for on in [false, true] {

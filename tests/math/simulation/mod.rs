@@ -18,7 +18,7 @@ fn no_gains<const N: usize>() -> Gains<N> {
     }
 }
 
-/// Steps under constant efforts with nothing but the method and the dynamics, summed as the simulation sums.
+/// Steps under constant efforts with only the method and the dynamics, summed like in the simulation.
 struct Offline<const N: usize> {
     arm: Arm<N>,
     method: Method,

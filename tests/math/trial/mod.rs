@@ -39,7 +39,7 @@ fn assert_cleared(status: &Status) {
     assert_eq!(status.action_status, ActionStatus::Idle);
 }
 
-/// The settings that the words `name value name value` change.
+/// Applies settings from a text `name value name value`.
 fn changes(words: &[&str]) -> Changes {
     let mut changes = Changes::default();
     for pair in words.chunks(2) {

@@ -88,6 +88,6 @@ fn lengths_without_a_reachable_target_give_none() {
     assert_eq!(sample(&[f64::MAX, f64::MAX], || rng.f64()), None);
     assert!(sample(&[1e300, 1e300], || rng.f64()).is_some());
     assert!(sample(&[1e-300, 1e-300], || rng.f64()).is_some());
-    // A second link that vanishes beside the first one leaves a circle.
+    // With a second link of negligible length the reach is a circle.
     assert!(sample(&[1.0, 1e-30], || rng.f64()).is_some());
 }

@@ -74,7 +74,7 @@ fn a_line_that_is_no_object_is_quoted_in_part_with_its_control_characters_escape
     assert!(error.to_string().len() < 150, "{error}");
 }
 
-/// 32 bytes are enough to recognise a line by; a sender that never ends it hears of it then.
+/// 32 bytes are enough to recognise a line; a sender that never ends it gets an error then.
 #[test]
 fn the_beginning_of_a_line_that_is_no_object_is_told_as_soon_as_32_bytes_are_there() {
     let mut reader = FrameReader::new();

@@ -6,7 +6,7 @@ use pendularm::protocol::wire::frame::{FrameError, RawFrame};
 
 use super::nested;
 
-/// The text of the frame; `None` if there is nothing but white space.
+/// The text of the frame; `None` if there is only white space.
 fn read(message: &str) -> Option<Result<String, FrameError>> {
     let frame = RawFrame::of_message(message.as_bytes())?;
     let decoded = frame.and_then(RawFrame::decode);

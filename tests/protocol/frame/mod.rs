@@ -1,6 +1,6 @@
 //! Bytes into frames.
 //!
-//! **Invariant:** whatever is checked of a stream is checked of every way to cut it up.
+//! **Invariant:** every check of a stream is repeated for every way to cut it.
 
 mod limits;
 mod lines;

@@ -5,7 +5,7 @@ use pendularm::protocol::op::{Op, read};
 
 use super::{op, problem};
 
-/// The words about a bad member, however the sender hears of them.
+/// The text about a bad member, in any form in which the sender gets it.
 fn refusal(op: &str, members: &str) -> String {
     problem(&format!(r#"{{"op":"{op}"{members}}}"#))
 }

@@ -25,7 +25,7 @@ fn op(frame: &str) -> Op {
         .unwrap_or_else(|error| panic!("{frame}: {error}"))
 }
 
-/// The words about a bad frame, however the sender hears of them.
+/// The text about a bad frame, in any form in which the sender gets it.
 #[track_caller]
 fn problem(frame: &str) -> String {
     match read(frame).op {

@@ -1,6 +1,6 @@
 //! The outbox of one connection: messages that wait, are dropped, or are held back.
 //!
-//! **Invariant:** time is told, never waited for.
+//! **Invariant:** time is a parameter; no test waits.
 
 mod age;
 mod costs;

@@ -224,7 +224,7 @@ fn action() -> impl Strategy<Value = Action> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// Frames are slices of one buffer, each of its own start, so that they can be told apart without being copied.
+    /// Frames are slices of one buffer with different starts, so that they differ without being copied.
     #[test]
     fn the_outbox_agrees_with_the_rules_written_slowly(
         actions in proptest::collection::vec(action(), 0..120),

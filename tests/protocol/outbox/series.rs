@@ -1,6 +1,7 @@
 //! Series of messages in an outbox: how they are taken, dropped, counted and throttled.
 //!
-//! **Invariant:** a series is one frame to whoever takes several, and messages one by one to whoever takes one.
+//! **Invariant:** a series is one frame to a reader of several messages, and separate messages to a reader of
+//! one.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -33,7 +34,7 @@ fn with(frames: &[&'static str]) -> Outbox {
     outbox
 }
 
-/// Adds messages of another topic up to the limit, but for so many bytes and what one more message counts.
+/// Adds messages of another topic up to the limit, less this many bytes and one more message.
 fn fill(outbox: &mut Outbox, left: usize, now: Instant) {
     let mut bytes = MAX_TOPIC_BYTES - MESSAGE_BYTES - left;
     while bytes > 0 {
@@ -67,7 +68,7 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
 }
 
-/// As many go, and are counted, as would have gone message by message.
+/// The same number is dropped and counted as with single messages.
 #[test]
 fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
     let now = Instant::now();

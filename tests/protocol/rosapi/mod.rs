@@ -39,7 +39,7 @@ fn census() -> Census {
     }
 }
 
-/// A row: a question, its arguments, and the answer or the words of its refusal.
+/// A row: a service, its arguments, and the answer or the text of its refusal.
 const ANSWERS: &str = include_str!("answers.txt");
 
 /// The answer about the one name that a request gives.

@@ -1,4 +1,4 @@
-//! Calls and goals: each comes to its provider unchanged, and its caller has the one answer that it must have.
+//! Calls and goals: each arrives at its provider unchanged, and its caller gets exactly one correct answer.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::court::Court;
 use crate::honest::{Expect, Honest};
 use crate::json::Json;
 
-/// The status of a goal that ended because somebody asked for it.
+/// The status of a cancelled goal.
 const CANCELED: &str = "5";
 
 impl Model {
@@ -153,7 +153,7 @@ impl Model {
         }
     }
 
-    /// The provider's answer, word for word; or a failure for which there is a reason.
+    /// The provider's answer unchanged, or a justified failure.
     fn forwarded(
         &mut self,
         hampered: bool,

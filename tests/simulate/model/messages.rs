@@ -1,4 +1,4 @@
-//! Messages that a client hears on a topic: the right ones, unchanged, in order and not too often.
+//! Messages that a client receives on a topic: the right ones, unchanged, in order and not too often.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::body::Body;
 use crate::court::Court;
 use crate::honest::{Honest, Phase};
 
-/// Longest virtual time between two looks at what has come.
+/// Longest virtual time between two checks of the received messages.
 const LOOKS_APART: Duration = Duration::from_millis(25);
 
 impl Model {
@@ -28,7 +28,7 @@ impl Model {
             return;
         };
         if subscription.is_binary != matches!(body, Body::Binary(_)) {
-            // The messages on their way when the encoding was asked for are as before.
+            // Messages already on their way when the encoding changed have the old encoding.
             if subscription.phase == Phase::On {
                 court.wrong(format!(
                     "client {who} got a message on {topic} in the wrong encoding"
@@ -83,7 +83,7 @@ impl Model {
         }
     }
 
-    /// A client lacks messages: right only if it did not read, or if there was little room.
+    /// A client misses messages: allowed only if it did not read, or if memory was scarce.
     pub fn miss(&mut self, court: &Court, honest: &Honest, count: usize, which: &str) {
         self.missed += count as u64;
         if !honest.is_hampered && !self.is_scarce {

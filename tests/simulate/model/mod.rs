@@ -1,4 +1,5 @@
-//! The model of all that must come back: each frame that an honest client hears, held against what was asked and sent.
+//! The model of all expected frames. Each frame that an honest client receives is compared with the requests and
+//! messages that were sent.
 
 mod body;
 mod calls;
@@ -19,7 +20,7 @@ use crate::court::Court;
 use crate::honest::{Honest, Phase};
 use crate::json::Json;
 
-/// A frame, as far as all of them are alike.
+/// The members that all frames share.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeMessage<'a> {
@@ -44,7 +45,7 @@ pub struct NodeMessage<'a> {
     action: Option<String>,
 }
 
-/// A member that is there, though it be `null`.
+/// A member that is present, possibly `null`.
 fn there<'de: 'a, 'a, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<&'a RawValue>, D::Error> {
@@ -68,9 +69,9 @@ pub struct Forward {
     pub timeout: Duration,
     /// The answer of its provider, and when: result and values, as text.
     pub answered: Option<(Instant, bool, String)>,
-    /// The provider that has heard it.
+    /// The provider that has received it.
     pub heard_by: Option<u64>,
-    /// When that one was gone.
+    /// When that provider disconnected.
     pub orphaned: Option<Instant>,
 }
 
@@ -78,14 +79,14 @@ pub struct Forward {
 #[derive(Default, Clone, Copy)]
 pub struct Provided {
     pub provider: Option<u64>,
-    /// It has been told that it is.
+    /// A status has confirmed it.
     pub is_confirmed: bool,
-    /// Two wanted to be it at the same time: which of them came last is not to be told from here.
+    /// Two clients registered at the same time: the order is unknown to the model.
     pub is_contested: bool,
     pub changed: u64,
 }
 
-/// A call that has come for a client as a provider.
+/// A call that a client has received as a provider.
 pub struct Asked {
     pub provider: u64,
     /// The runtime's id, as text.
@@ -94,27 +95,27 @@ pub struct Asked {
     pub number: u64,
 }
 
-/// All that honest clients have said to one another.
+/// All messages and calls between honest clients.
 #[derive(Default)]
 pub struct Model {
     /// Every message, by its number.
     pub messages: BTreeMap<u64, Message>,
     pub forwards: BTreeMap<u64, Forward>,
     pub services: BTreeMap<String, Provided>,
-    /// Calls that providers have heard and not decided about.
+    /// Calls that providers have received and not yet answered.
     pub asked: Vec<Asked>,
-    /// Calls whose caller is gone: their provider is told so.
+    /// Calls whose caller has disconnected: their provider is notified.
     pub orphans: u64,
-    /// Messages that have not come to somebody who did not read.
+    /// Messages that were dropped for a client that did not read.
     pub missed: u64,
-    /// Whether little room excuses refusals and losses.
+    /// Whether scarce memory justifies refusals and losses.
     pub is_scarce: bool,
-    /// Whether somebody has ended goals without saying whose.
+    /// Whether a client has cancelled goals without naming their owner.
     pub ends_any_goal: bool,
 }
 
 impl Model {
-    /// One client hears one frame.
+    /// One client receives one frame.
     pub fn hear(&mut self, court: &Court, honest: &mut Honest, received: Received) {
         match received {
             Received::Json(text) => {

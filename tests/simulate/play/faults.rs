@@ -1,4 +1,4 @@
-//! Faults that come between: clients that stall, vanish or panic, and jumps of the clock.
+//! Faults: clients that stall, disconnect or panic, and jumps of the clock.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::pipe::Fate;
 use crate::plan::Fault;
 
 impl Course {
-    /// A client reads nothing for a while.
+    /// A client reads nothing for some time.
     pub(super) fn stall(&mut self, at: usize) {
         let time = Duration::from_millis(100 + self.court.below(12_000) as u64);
         let one = &mut self.honest[at];
@@ -20,18 +20,17 @@ impl Course {
         one.stalled_until = Some(Instant::now() + time);
     }
 
-    /// Another client in the place of one that is done for. The last messages of that one may not have
-    /// arrived.
+    /// Replaces a disconnected client. The last messages of the old client may not have arrived.
     pub(super) fn replace(&mut self, at: usize) -> Honest {
         self.abandon(at);
         self.enter()
     }
 
-    /// The connection of a client ends in a way that leaves nothing owed to it.
+    /// Ends the connection of a client so that no answers to it are required.
     pub(super) fn abandon(&mut self, at: usize) {
         let one = &mut self.honest[at];
         for call in one.calls.values() {
-            // Its provider may be told that nobody waits for the answer any more.
+            // Its provider may be notified that the call was cancelled.
             if let Expect::Forwarded(number) = call.expect {
                 self.model.forwards.remove(&number);
                 self.model.orphans += 1;

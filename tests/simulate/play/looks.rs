@@ -1,4 +1,4 @@
-//! Looks at what has come: it is held against the model, and nobody is cut off or waits for too long.
+//! Checks: received frames agree with the model, and no client is disconnected or waits too long.
 
 use std::time::Duration;
 
@@ -16,11 +16,11 @@ const COMPUTED_TURNS: u64 = 2_000;
 /// The same for what is computed in a few turns: in two thousand seeds one took 43, beside a flood, and all others
 /// fewer than 40.
 const SHORT_TURNS: u64 = 80;
-/// A light call's patience in virtual time.
+/// Longest wait of a light call in virtual time.
 const LIGHT_TIME: Duration = Duration::from_secs(1);
 
 impl Course {
-    /// Lets virtual time pass, and looks now and then.
+    /// Lets virtual time pass, with regular checks.
     pub(super) async fn pass(&mut self, time: Duration) {
         let mut left = time;
         while !left.is_zero() && self.court.failure().is_none() {
@@ -29,7 +29,7 @@ impl Course {
         }
     }
 
-    /// Takes what has come, and holds it against the model; providers answer.
+    /// Compares received frames with the model; providers answer.
     pub(super) fn look(&mut self) {
         self.listen(true);
     }
@@ -64,7 +64,7 @@ impl Course {
         }
     }
 
-    /// Nobody is cut off.
+    /// No client is disconnected.
     fn check_end(&mut self, at: usize) {
         let one = &self.honest[at];
         if one.is_excused || one.has_finished || !one.client.has_ended() {
@@ -92,7 +92,7 @@ impl Course {
                 court.fail(Verdict::NoProgress, words);
             }
         }
-        // Its computations are done one behind the other.
+        // Its computations run one after the other.
         let computations = one.calls.values().filter(|call| call.is_computation());
         if let Some(next) = computations.min_by_key(|call| call.order)
             && let Expect::Computed { is_short, .. } = next.expect

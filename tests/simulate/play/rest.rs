@@ -1,4 +1,4 @@
-//! The end of a seed: everything that is owed comes, and when all have left nothing is left of them.
+//! The end of a seed: every required frame arrives, and the runtime holds nothing once all clients have left.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use crate::court::Verdict;
 use crate::honest::{Expect, Honest, Phase};
 use crate::workload::waits;
 
-/// Once the faults are over, all that is owed has come within so much virtual time.
+/// Virtual time after the last fault within which all required frames arrive.
 const LIVENESS: Duration = Duration::from_secs(40);
-/// When all have left, nothing is held for anybody after so much virtual time.
+/// Virtual time after the last disconnection after which no client's memory is held.
 const EMPTY: Duration = Duration::from_secs(100);
 
 impl Course {
-    /// Faults and hostile clients are gone: all waiting messages come.
+    /// Without faults and hostile clients, all waiting messages arrive.
     pub(super) async fn come_to_rest(&mut self) {
         self.hostile.clear();
         self.resume();
@@ -148,7 +148,7 @@ impl Course {
         }
     }
 
-    /// All leave, some politely; nothing is held for anybody then.
+    /// All disconnect, some with a close frame; no memory is held afterwards.
     pub(super) async fn leave(&mut self) {
         for at in 0..self.honest.len() {
             if self.court.chance(0.5) {

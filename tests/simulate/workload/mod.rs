@@ -36,7 +36,7 @@ const WATCHED: [&str; 9] = [
 /// Hostile clients may have taken all places for others: then the powers of two below count.
 const PIECE_SIZES: [usize; 7] = [64, 65, 80, 127, 128, 200, 263];
 const FUNCTIONS: [&str; 4] = ["sin(t)", "-9.81", "t^2 / (1 + t)", "exp(-t) * cos(3 * t)"];
-/// How long a forwarded call waits that does not say.
+/// Default timeout of a forwarded call.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Turns after which what was sent has been handled, through the narrowest pipe.
 const SETTLED: u64 = 1000;
@@ -44,7 +44,7 @@ const SETTLED: u64 = 1000;
 const FLOODING: usize = 60_000;
 const DAY: Duration = Duration::from_secs(24 * 3600);
 
-/// Numbers that tell all calls and messages of a seed apart.
+/// Unique numbers for all calls and messages of a seed.
 #[derive(Default)]
 pub struct Numbers(u64);
 
@@ -55,7 +55,7 @@ impl Numbers {
     }
 }
 
-/// One client does one thing.
+/// One action of one client.
 pub struct Workload<'a> {
     pub court: &'a Court,
     pub plan: &'a Plan,
@@ -162,7 +162,7 @@ impl Workload<'_> {
     }
 }
 
-/// All that a client still waits for, in words.
+/// A text with all frames that a client still expects.
 pub fn waits(honest: &Honest) -> String {
     let call = |(id, call): (&String, &Call)| {
         format!(

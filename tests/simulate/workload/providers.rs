@@ -31,7 +31,7 @@ impl Workload<'_> {
             .map(|(name, _)| name.clone())
             .collect();
         if let Some(service) = mine.first() {
-            // Another may have become the provider on the way.
+            // Another client may have become the provider meanwhile.
             self.me().mistakes += 1;
             self.send(&format!(
                 "{{\"op\":\"unadvertise_service\",\"service\":\"{service}\"}}"
@@ -119,7 +119,7 @@ impl Workload<'_> {
             .extract_if(.., |(due, ..)| *due <= now)
             .collect();
         for (_, number, frame) in due {
-            // Its caller may have been told already that it took too long, or may be gone.
+            // Its caller may already have received a timeout, or may have disconnected.
             let is_late = self
                 .model
                 .forwards

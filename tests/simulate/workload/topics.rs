@@ -1,9 +1,9 @@
-//! Topics: messages published, and who has to hear them.
+//! Topics: published messages, and their expected receivers.
 
 use super::*;
 
 impl Workload<'_> {
-    /// Some JSON that must arrive as it is.
+    /// JSON that must arrive unchanged.
     pub(super) fn payload(&self, depth: usize) -> String {
         match self.court.below(if depth > 2 { 6 } else { 9 }) {
             0 => "null".to_owned(),
@@ -152,7 +152,8 @@ impl Workload<'_> {
             (place != self.at && one.is_active()).then(|| (place, plain.topic.clone()))
         };
         let (deaf, topic) = self.all.iter().enumerate().find_map(listens)?;
-        // Nobody takes so much at once: some of it may be dropped for those who read, too, and has to be counted.
+        // This is more than a client reads at once. Some messages may be dropped even for clients that read, and
+        // must be counted.
         for one in self.all.iter_mut() {
             let mut all = one.subscriptions.values();
             one.is_hampered |= all.any(|one| one.topic == topic);

@@ -1,4 +1,4 @@
-//! The timestep that is advised, tried: an arm that settles in small steps is not lost at it.
+//! The advised timestep in runs: an arm that settles in small steps does not diverge at it.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ use super::{Dice, Tally, advised, cases, property, run};
 /// Steps of a run at most; a longer one is cut.
 const MOST_STEPS: f64 = 3e5;
 
-/// From springs that hardly matter to stiff ones, from hardly damped to sluggish, integrals or not.
+/// From weak springs to stiff ones, from weak damping to strong, with or without integrals.
 fn gains<const N: usize>(dice: &mut Dice, control: &ControlLoop<N>) -> Gains<N> {
     let inertia = control.arm.masses().iter().sum::<f64>() * control.arm.reach().powi(2) / 3.0;
     let stiffness = 10.0 * dice.size(4.0);

@@ -14,8 +14,8 @@ use super::{Dice, Tally, cases, property, run, tells};
 /// How far below and above a predicted limit the arm is watched.
 const ASIDE: f64 = 0.03;
 
-/// By how many factors e the slowest mode's energy must change while a nudge is watched, or the watch is too short to
-/// tell what becomes of it: in the first of the windows compared faster modes have hidden it.
+/// Least change, in factors e, of the slowest mode's energy during a run. With less the run is too short to show the
+/// mode, since faster modes hide it in the first window.
 const DECIDED: f64 = 12.0;
 
 /// Growth of the energy of a small deviation at this timestep, infinite where it escapes, and whether the watch is long
@@ -27,8 +27,8 @@ fn watched<const N: usize>(control: &ControlLoop<N>, linear: &Linear) -> (f64, b
     (growth, changes.abs() > DECIDED)
 }
 
-/// Where it is said to rest nothing pushes, a nudge dies out below the limit and grows beyond it; unstable at every
-/// timestep means just that.
+/// At the resting pose there is no effort. A small deviation decays below the limit and grows beyond it, and always
+/// grows in a loop that is unstable at every timestep.
 fn a_limit_divides_decay_from_growth<const N: usize>(case: u64, tally: &mut Tally) {
     let control = Dice::of(case).control::<N>();
     let told = format!("case {case}: {control:?}");
@@ -45,7 +45,7 @@ fn a_limit_divides_decay_from_growth<const N: usize>(case: u64, tally: &mut Tall
     let mut judge = |timestep: f64, grows: bool| {
         let control = control.with_timestep(timestep);
         let (growth, is_shown) = watched(&control, &linear);
-        // Decay that is seen is decay; what seems to grow may be a slow mode that swings.
+        // Measured decay is reliable; apparent growth may be the swing of a slow mode.
         if is_shown || (growth < 1.0 && !grows) {
             tally.tried += 1;
             assert_eq!(growth >= 1.0, grows, "{told}: {growth:e} at {timestep} s");
@@ -79,7 +79,8 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         least == 0.0 || found.advised.is_none_or(|advised| advised <= least),
         "{told}: {found:?}"
     );
-    // A loop that runs away in earnest is said to, and one that is stable at some timestep is not.
+    // A loop that clearly runs away is reported as such, and one that is stable at some timestep is
+    // not.
     let is_said = found.rest == Rest::Unstable;
     assert!(
         if is_said {
@@ -89,7 +90,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         },
         "{told}: {found:?}"
     );
-    // A limit counts growth of 1e-11, which may be a hair before the bound or behind it.
+    // A limit counts growth of 1e-11, which may be slightly below or above the bound.
     assert!(
         found.bound.is_none_or(|bound| bound <= 1.0001 * least),
         "{told}: {found:?}"
@@ -122,7 +123,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         if least == 0.0 {
             continue;
         }
-        // A worst pose that is found by search alone may be missed by a little.
+        // A search alone may miss the worst pose by a little.
         let within = if found.certified { 0.99 } else { 0.9 };
         assert!(
             held >= within * least,
@@ -131,7 +132,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
     }
 }
 
-/// Whether the loop runs away from where it rests in continuous time.
+/// Whether the loop leaves its resting pose in continuous time.
 fn runs_away<const N: usize>(control: &ControlLoop<N>) -> bool {
     let modes = Linear::at_setpoint(control).flow().eigenvalues();
     let fastest = modes.iter().map(|mode| mode.modulus()).fold(0.0, f64::max);

@@ -37,7 +37,7 @@ impl Dice {
         2.0 * self.0.f64() - 1.0
     }
 
-    /// Within so many powers of ten about 1.
+    /// Within this many powers of ten around 1.
     fn size(&mut self, decades: f64) -> f64 {
         10_f64.powf(decades * self.any())
     }
@@ -53,7 +53,8 @@ impl Dice {
         Arm::new(lengths, masses, gravity).unwrap()
     }
 
-    /// From too soft to hold the arm to stiff, from hardly damped to sluggish, some of them zero.
+    /// From springs that cannot hold the arm to stiff ones, from weak damping to strong; some gains
+    /// are zero.
     fn gains<const N: usize>(&mut self, arm: &Arm<N>) -> Gains<N> {
         let (lengths, masses) = (arm.lengths(), arm.masses());
         let pace = 10.0 * self.size(1.0);
@@ -104,7 +105,7 @@ impl Dice {
     }
 }
 
-/// How often a claim was tried, and how often the case said nothing about it.
+/// How often a claim was tested, and how often the case did not apply.
 #[derive(Debug, Default, Clone, Copy)]
 struct Tally {
     tried: u64,
@@ -113,7 +114,7 @@ struct Tally {
     outside: u64,
 }
 
-/// Runs cases, and prints how many said something.
+/// Runs cases, and prints how many applied.
 fn run(claim: &str, cases: impl Iterator<Item = u64>, check: impl Fn(u64, &mut Tally)) -> Tally {
     let mut tally = Tally::default();
     for case in cases {
@@ -146,7 +147,7 @@ macro_rules! property {
 
 pub(crate) use property;
 
-/// At least two of three cases say something, or the test says little. One that is made again by its number need not.
+/// At least two of three cases must apply. A single case that is repeated by its number need not.
 fn tells(tally: Tally) {
     let is_one = std::env::var("COUNT").is_ok_and(|count| count == "1");
     assert!(is_one || tally.tried > 2 * tally.open, "{tally:?}");

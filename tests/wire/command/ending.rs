@@ -1,5 +1,5 @@
-//! How the commands end where there is nobody to ask, nobody to read, or nothing to be understood; their pages, and what a
-//! package has beside the program.
+//! The end of the commands without a server, without a reader, or with wrong input; their manual pages, and the other
+//! files of a package.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -10,7 +10,7 @@ use std::thread;
 
 use crate::common::{self, Runtime};
 
-/// Every command that asks a running one, with what it needs.
+/// Every command that needs a server, with its arguments.
 const COMMANDS: [&[&str]; 15] = [
     &["topic", "list"],
     &["topic", "echo", "/clock"],
@@ -35,7 +35,7 @@ fn output(arguments: &[&str]) -> Output {
     command.output().unwrap()
 }
 
-/// The one line with which a command ends that was not done.
+/// The error line of a command that failed.
 #[track_caller]
 fn complaint(output: &Output, status: i32) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -48,7 +48,7 @@ fn complaint(output: &Output, status: i32) -> String {
 
 #[test]
 fn without_a_runtime_the_status_is_3() {
-    // Nobody listens there. A port that was free a moment ago may be another test's by now.
+    // No server listens there. A port that was free before may now belong to another test.
     let address = "127.0.0.1:1";
     for command in COMMANDS {
         let said = output(&[command, &["--connect", address]].concat());
@@ -60,7 +60,7 @@ fn without_a_runtime_the_status_is_3() {
     }
 }
 
-/// A server that says these bytes to whoever comes, and then closes or says nothing more.
+/// A server that sends these bytes to every client, and then closes or sends nothing more.
 fn server(says: &'static [u8], closes: bool) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -70,7 +70,7 @@ fn server(says: &'static [u8], closes: bool) -> SocketAddr {
             let mut stream = stream.unwrap();
             let _ = stream.write_all(says);
             if closes {
-                // Reads what was sent, the opening and a frame, so that the end is no reset.
+                // Reads the opening and a frame, so that the connection ends without a reset.
                 BufReader::new(&stream).lines().take(2).for_each(drop);
             } else {
                 kept.push(stream);
@@ -211,7 +211,7 @@ fn the_pages_of_help_have_examples_and_the_exit_statuses() {
     }
 }
 
-/// The controller is off at the start, and a goal would be waited for without end.
+/// The controller is off at the start, and the command would wait for the goal without end.
 #[test]
 fn the_examples_of_a_goal_begin_with_the_controller() {
     let page = output(&["action", "send_goal", "--help"]);
@@ -246,7 +246,7 @@ fn completions_know_every_command_and_a_shell_can_read_them() {
     }
 }
 
-/// As packagers and the Python wheel do it.
+/// Like the package builds and the Python wheel.
 #[test]
 fn an_installation_has_program_and_completions() {
     let prefix = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install");
@@ -271,7 +271,7 @@ fn an_installation_has_program_and_completions() {
     }
 }
 
-/// The table of docs/command-line.md has the commands that there are.
+/// The table of docs/command-line.md has all commands.
 #[test]
 fn the_paper_lists_every_command() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/command-line.md");

@@ -1,4 +1,4 @@
-//! The commands against a server that means them harm: they end in time, in words, and hold little of what it sends.
+//! The commands against a hostile server: they end in time, with a message, and hold little of its data.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common;
 
-/// A server that answers questions for types, topics and parameters, and does `then` at the first other frame behind the
+/// A server that answers requests for types, topics and parameters, and does `then` at the first other frame after the
 /// opening of a command.
 fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -36,7 +36,7 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
     address
 }
 
-/// A command that asks the server there.
+/// A command that contacts that server.
 fn start(arguments: &[&str], address: &str) -> Child {
     let mut command = common::program();
     command.args(arguments).args(["--connect", address]);
@@ -63,7 +63,7 @@ fn end(mut child: Child) -> (Option<i32>, String, String) {
     (status, out.join().unwrap(), complaint.join().unwrap())
 }
 
-/// Sends the same again and again until nobody reads it.
+/// Repeats the same bytes until the client stops reading.
 fn drip(bytes: &'static [u8]) -> impl Fn(&mut TcpStream) + Send {
     move |stream| {
         while stream.write_all(bytes).is_ok() {
@@ -123,7 +123,7 @@ fn hold(stream: &mut TcpStream) {
 /// Publishes this text on the topic, once.
 fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
     move |stream| {
-        // A client that has had enough does not read the rest.
+        // A client at its limit does not read the rest.
         let _ = writeln!(
             stream,
             "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"
@@ -159,7 +159,7 @@ fn a_long_key_of_diagnostics_pads_no_other_line() {
     }
 }
 
-/// A command that may take so many kilobytes of memory.
+/// A command that may use this many kilobytes of memory.
 #[cfg(target_os = "linux")]
 fn start_within(kilobytes: u32, arguments: &[&str], address: &str) -> Child {
     let mut command = std::process::Command::new("bash");
@@ -182,7 +182,7 @@ fn values_that_say_nothing_to_a_command_are_not_spread_out() {
         let address = server(move |stream| {
             let value = "[[[1]]],".repeat(500_000);
             let foreign = format!("{{\"op\":\"service_response\",\"{member}\":[{value}1]}}\n");
-            // Type and fields have been asked for before.
+            // The command has asked for type and fields before.
             let answer = "{\"op\":\"service_response\",\"id\":3,\"values\":{},\"result\":true}\n";
             let _ = stream.write_all((foreign + answer).as_bytes());
             hold(stream);

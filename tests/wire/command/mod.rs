@@ -53,7 +53,7 @@ fn json_of(runtime: &Runtime, arguments: &[&str]) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// The one line of a command that has to be refused with this exit status.
+/// The error line of a command that must be refused with this exit status.
 #[track_caller]
 fn refusal(runtime: &Runtime, arguments: &[&str], status: i32) -> String {
     let output = ask(runtime, arguments);
@@ -72,7 +72,7 @@ fn refusal(runtime: &Runtime, arguments: &[&str], status: i32) -> String {
         .to_owned()
 }
 
-/// A command that goes on, and its output line by line.
+/// A command that keeps running, and its output line by line.
 struct Going(Child, BufReader<std::process::ChildStdout>);
 
 impl Going {

@@ -1,4 +1,4 @@
-//! The command line as people type it at first: fields that are not there, addresses in any form, the controller still off.
+//! The command line as beginners type it: unknown fields, addresses in any form, the controller still off.
 
 use serde_json::json;
 
@@ -7,7 +7,7 @@ use crate::common::{self, Runtime};
 
 const ENABLE: &str = "/pid_controller/enable";
 
-/// Commands, their names and values, the words that are wrong, and some that are right.
+/// Commands, their names and values, the wrong words, and some of the right ones.
 const UNKNOWN_FIELDS: &str = r#"
 service call | /pid_controller/enable | {data:true} | "data:true" | {data: true}
 service call | /pid_controller/enable | data:true | "data:true" | {data: true}
@@ -28,7 +28,7 @@ action send_goal | /ik_action | {x: 1, y: 1, epsilom: 1} | "epsilom" | epsilon
 action send_goal | /joint_trajectory_controller/follow_joint_trajectory | {trajectory: {points: [{positions: [0, 0], time_from_start: {sec: 1}}, {velocity: 1}]}} | "trajectory.points[1].velocity" | velocities
 "#;
 
-/// Each is refused before it is sent, in words that have what is wrong and what is right.
+/// Each is refused before it is sent, with a message that names the wrong word and the right ones.
 #[test]
 fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
     let runtime = Runtime::start();
@@ -44,7 +44,7 @@ fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
             "{words:?}: {refused}"
         );
     }
-    // The client hears the first message that is published since: this one.
+    // The client receives the first message that is published afterwards: this one.
     client.ask(ENABLE, json!({"data": true}));
     let stamped =
         "{header: {seq: 1, stamp: {secs: 0, nsecs: 0}}, points: [{positions: [0.1, 0.2]}]}";

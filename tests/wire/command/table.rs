@@ -8,7 +8,7 @@
 use super::ask;
 use crate::common::{self, Runtime};
 
-/// The words of a line, with quoted ones as they are.
+/// The words of a line; quoted ones are unchanged.
 fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut is_quoted = false;

@@ -36,7 +36,7 @@ fn what_another_client_says_acts_on_no_terminal_and_loses_nothing() {
     }
 }
 
-/// Until so many nodes subscribe to the topic: clients are one node together.
+/// Waits until this many nodes subscribe to the topic: all clients count as one node.
 fn wait_for_subscriber(client: &mut Client, topic: &str, count: usize) {
     let deadline = std::time::Instant::now() + common::PATIENCE;
     loop {

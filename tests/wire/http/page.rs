@@ -45,7 +45,7 @@ fn the_page_and_its_files_are_served_with_their_types() {
 /// As a browser does.
 #[test]
 fn all_files_of_the_page_come_over_one_connection() {
-    // A report in the working directory would change the page.
+    // A report in the working directory would add a link to the page.
     let runtime = Runtime::with(&["--report", "no-report"]);
     let mut stream = TcpStream::connect(runtime.address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();

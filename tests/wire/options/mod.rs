@@ -1,4 +1,4 @@
-//! The command line and the environment: accepted and refused values, with their words.
+//! The command line and the environment: accepted and refused values, with their messages.
 //!
 //! **Invariant:** arguments are passed in; with a variable of the environment the program itself is started.
 

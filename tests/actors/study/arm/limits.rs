@@ -1,4 +1,4 @@
-//! When the arm asks for its limit, and of which loop.
+//! When the arm asks for its limit, and for which loop.
 
 use super::*;
 
@@ -29,7 +29,7 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
         assert_eq!(first, [free]);
         sleep(Duration::from_secs(10)).await;
         assert_eq!(arm.questions().await, []);
-        // Changes that do not bear on the loop in force: with the controller off, gains and setpoint too.
+        // Changes that do not affect the present loop: with the controller off, also gains and setpoint.
         arm.ask(integrator(Some(0.002), Some(Method::Rk4))).await;
         arm.ask(gravity(9.81)).await;
         arm.ask(SetGains {

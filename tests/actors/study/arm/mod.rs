@@ -11,7 +11,7 @@ use crate::stage::{Client, Stage, asked};
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::node::{Ask, Call};
 
-/// Stands in for the study: keeps what it is asked, and always gives the same answer.
+/// A substitute for the study: records its requests, and always gives the same answer.
 #[derive(Clone)]
 struct Oracle {
     asked: Rc<RefCell<Vec<ControlLoop<2>>>>,

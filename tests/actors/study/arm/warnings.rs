@@ -1,4 +1,4 @@
-//! Words about a timestep, and the estimated error.
+//! Warnings about a timestep, and the estimated error.
 
 use super::*;
 
@@ -142,7 +142,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
             let said = "the predicted limit of rk4 for a motion of 16.403 rad/s";
             assert_eq!(warning.contains(said), warned, "{warning}");
         }
-        // Beyond both limits the smaller one is told.
+        // Beyond both limits the warning names the smaller one.
         arm.ask(integrator(Some(0.3), None)).await;
         sleep(Duration::from_secs(2)).await;
         let told = arm.told(Topic::Diagnostics.name()).await;

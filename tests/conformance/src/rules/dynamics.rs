@@ -43,7 +43,7 @@ fn falls(bench: &mut Bench) -> Got {
     Ok(format!("moved {moved:.3} rad"))
 }
 
-/// Holds a pose beside the starting pose; passes if the effort there is the arm's gravity load.
+/// Holds a pose near the starting pose; passes if the effort there is the arm's gravity load.
 fn holds(bench: &mut Bench, arm: &Arm, by: [f64; 3]) -> Got {
     let pose = bench.reset()?;
     let setpoint: Vec<f64> = pose.iter().zip(by).map(|(angle, by)| angle + by).collect();

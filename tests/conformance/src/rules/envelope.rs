@@ -67,7 +67,7 @@ fn rejection(bench: &mut Bench) -> Got {
 fn relayed(bench: &mut Bench) -> Got {
     let mut publisher = bench.another()?;
     bench.watch("/conformance/chatter")?;
-    // The answer to a later call says that the subscription has been taken.
+    // The answer to a later call shows that the subscription is active.
     bench.peer.call("/arm_sim/pause", &json!({}))?;
     let msg = json!({"data": "hello"});
     publisher.peer.send(&json!({"op": "advertise", "topic": "/conformance/chatter", "type": "std_msgs/msg/String"}))?;

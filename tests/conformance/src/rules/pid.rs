@@ -285,7 +285,7 @@ fn bounded(bench: &mut Bench) -> Got {
     Ok(format!("effort {}, then {}", fine(&early), fine(&late)))
 }
 
-/// A setpoint beside the starting pose.
+/// A setpoint near the starting pose.
 fn aim(bench: &mut Bench) -> Result<Vec<f64>, String> {
     let pose = bench.reset()?;
     let by = [0.5, -0.4, 0.3];
