@@ -26,7 +26,7 @@ import { Surface } from "./surface.js";
 
 const SHAKES = 2; // rad/s: a visible speed beyond the limit
 const LOOK_MS = 500;
-const STEPS_SHOWN = 40; // measurements per second in slow motion
+const STEPS_SHOWN = 40; // measurements shown in slow motion
 const ROWS = 13; // of the map's border
 const SPAN = 5; // s of the strip chart
 const ALL_JOINTS = [true, true, true];

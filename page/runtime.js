@@ -51,7 +51,7 @@ export function start(whenReset, whenChanging) {
   watch(["integrator", "gains", "params", "enabled", "setpoint", "links"], askStability);
   watch(["params", "enabled"], () => {
     set("pushed", false);
-    if (state.goal?.outcome === "reached") set("goal", null); // there is no arm any more
+    if (state.goal?.outcome === "reached") set("goal", null); // the arm is not at the goal any more
   });
   watch("paused", pace);
   document.addEventListener("visibilitychange", pace);
@@ -268,7 +268,7 @@ export async function setState(position, velocity = position.map(() => 0)) {
   if (answer.result) {
     touch();
     state.pushed = false; // energy is measured from here
-    if (state.goal?.outcome === "reached") set("goal", null); // there is no arm any more
+    if (state.goal?.outcome === "reached") set("goal", null); // the arm is not at the goal any more
   }
   return answer;
 }

@@ -68,7 +68,7 @@ fn a_divergence_is_reached_again_at_its_step() {
         let difference = replayed(&other).difference.unwrap();
         assert_eq!(difference.step, step);
         assert!(
-            difference.what.contains("was not finite, and is"),
+            difference.what.contains("was not finite in the record"),
             "{difference:?}"
         );
     });
