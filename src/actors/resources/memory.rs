@@ -135,21 +135,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_permit_travels_with_long_bytes_and_ends_with_their_last_copy() {
-        let memory = Memory::of(1, MIB);
-        for (length, taken) in [(SHORT, 0), (SHORT + 1, 2)] {
-            let permit = memory.answer(2 * ANSWER_PART).unwrap();
-            let bytes = cover(Some(&permit), vec![0; length].into());
-            drop(permit);
-            let part = bytes.slice(..1);
-            drop(bytes);
-            assert_eq!((memory.taken(), part.len()), (taken, 1));
-            drop(part);
-            assert_eq!(memory.taken(), 0);
-        }
-    }
-
-    #[test]
     fn an_answer_longer_than_the_pool_has_it_alone() {
         let memory = Memory::of(1, MIB);
         let longest = memory.answer(usize::MAX).unwrap();

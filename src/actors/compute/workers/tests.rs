@@ -46,28 +46,7 @@ fn computation(
     })
 }
 
-/// A computation that has begun does not occupy the worker, and each one gets all its turns.
-#[test]
-fn computations_take_turns() {
-    const TURNS: usize = 100;
-    let (log, seen) = mpsc::channel();
-    let pool = WorkerPool::start(1).unwrap();
-    {
-        // Both wait before the worker takes the first one, because the lock is held meanwhile.
-        let mut queue = pool.lock();
-        for name in ["a", "b"] {
-            queue.ready.push_back(computation(name, TURNS, &log));
-        }
-    }
-    pool.shared.1.notify_all();
-    let order: Vec<String> = seen.iter().take(2 * TURNS).collect();
-    assert_eq!(order, ["a", "b"].repeat(TURNS));
-    while !pool.is_idle() {
-        thread::yield_now();
-    }
-}
-
-/// Finds no memory a few times.
+/// Finds no room a few times.
 struct Hesitating {
     tries: usize,
     began: mpsc::Sender<()>,
@@ -158,14 +137,4 @@ fn a_panic_leaves_the_worker_working() {
     pool.submit(ConnectionId(1), computation("panics", 1, &log));
     pool.submit(ConnectionId(2), computation("next", 1, &log));
     assert_eq!(seen.recv().unwrap(), "next");
-}
-
-#[test]
-fn a_closed_pool_refuses() {
-    let (log, seen) = mpsc::channel();
-    let pool = WorkerPool::start(1).unwrap();
-    pool.close("shutting down");
-    pool.submit(ConnectionId(1), computation("late", 1, &log));
-    assert_eq!(seen.recv().unwrap(), "late: shutting down");
-    assert!(pool.is_idle());
 }
