@@ -7,50 +7,7 @@ use std::collections::HashSet;
 
 use pendularm::protocol::catalog::{Service, Topic, types};
 
-#[test]
-fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
-    let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
-        Service::ALL
-            .into_iter()
-            .filter(|&service| chosen(service))
-            .collect()
-    };
-    assert_eq!(
-        of(Service::is_computation),
-        [
-            Service::IntegrationStep,
-            Service::Stability,
-            Service::Rollout,
-            Service::SuggestGains,
-            Service::Plan
-        ]
-    );
-    assert_eq!(
-        of(Service::all_or_nothing),
-        [
-            Service::IntegrationStep,
-            Service::Step,
-            Service::Disturb,
-            Service::ListParameters,
-            Service::GetParameters,
-            Service::GetParameterTypes,
-            Service::DescribeParameters,
-            Service::SetParameters,
-            Service::Solve,
-            Service::SendGoal,
-            Service::CancelGoal,
-            Service::TrialStart,
-            Service::RepublishTfs,
-            Service::Stability,
-            Service::Rollout,
-            Service::SuggestGains,
-            Service::Plan,
-            Service::RecorderStart
-        ]
-    );
-}
-
-/// A topic that changes rarely must reach late subscribers.
+/// A topic that changes seldom has to reach those that come late.
 #[test]
 fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
     let latched: Vec<_> = Topic::ALL

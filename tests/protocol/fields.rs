@@ -31,37 +31,6 @@ fn reading<T>(
 }
 
 #[test]
-fn an_absent_optional_field_is_no_rejection() {
-    let (value, status) = reading(Service::SetIntegrator, "{}", |fields| {
-        (
-            fields.number("timestep", Bound::Positive),
-            fields.boolean("method"),
-        )
-    });
-    assert_eq!((value, status.as_str()), ((None, None), ""));
-}
-
-#[test]
-fn null_means_absent_only_in_optional_fields_of_services_that_take_all_or_nothing() {
-    let (value, status) = reading(Service::Solve, r#"{"x":null,"y":1,"phi":null}"#, |fields| {
-        (
-            fields.number("phi", Bound::Finite),
-            fields.number("x", Bound::Finite),
-        )
-    });
-    assert_eq!(value, (None, None));
-    assert_eq!(status, "x must be a number, got null");
-    let (value, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
-        fields.text("goal_id").map(std::borrow::Cow::into_owned)
-    });
-    assert_eq!((value, status.as_str()), (None, ""));
-    let (_, status) = reading(Service::SetParams, r#"{"gravity":null}"#, |fields| {
-        fields.number("gravity", Bound::NonNegative)
-    });
-    assert_eq!(status, "gravity must be a number, got null");
-}
-
-#[test]
 fn members_of_an_object_are_read_like_fields_and_named_after_it() {
     let read = |args: &str| {
         reading(Service::Stability, args, |fields| {
@@ -97,32 +66,6 @@ fn a_reason_given_from_outside_for_a_member_names_it_with_its_object() {
         fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"))
     });
     assert_eq!(status, "gains.kp is not to my taste");
-}
-
-#[test]
-fn a_positional_array_is_read_in_documented_order() {
-    let (value, status) = reading(Service::SendGoal, "[1,2,null,0.5]", |fields| {
-        let mut read = |name| fields.number(name, Bound::Finite);
-        [
-            read("x"),
-            read("y"),
-            read("phi"),
-            read("epsilon"),
-            read("success_hold"),
-        ]
-    });
-    assert_eq!(value, [Some(1.0), Some(2.0), None, Some(0.5), None]);
-    assert_eq!(status, "");
-}
-
-#[test]
-fn of_a_repeated_field_the_last_counts() {
-    let (value, status) = reading(
-        Service::SetIntegrator,
-        r#"{"timestep":"x","timestep":2}"#,
-        |fields| fields.number("timestep", Bound::Positive),
-    );
-    assert_eq!((value, status.as_str()), (Some(2.0), ""));
 }
 
 #[test]

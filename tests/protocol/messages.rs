@@ -4,9 +4,8 @@
 
 use bytes::Bytes;
 use pendularm::protocol::messages::{
-    Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState, KeyValue,
-    Level, Stamp, action_feedback, action_result, call, failure, message_text, publish,
-    publish_raw, respelled, response, status,
+    Clock, DiagnosticArray, DiagnosticStatus, ErrorForm, Header, JointState, KeyValue, Level,
+    Stamp, call, failure, message_text, publish, publish_raw, respelled, response, status,
 };
 use pendularm::protocol::wire::json::Payload;
 use proptest::prelude::*;
@@ -94,38 +93,6 @@ fn numbers_that_are_not_finite_are_null() {
     );
 }
 
-#[test]
-fn what_passes_through_is_untouched_but_for_numbers_that_overflow() {
-    assert_eq!(
-        line(&publish_raw("/x", &raw(r#"{ "a": 1.500, "b": [1e999 ] }"#))),
-        r#"{"op":"publish","topic":"/x","msg":{ "a": 1.500, "b": [null ] }}"#
-    );
-    assert_eq!(
-        line(&call("/s", "call:7", &raw(r#"{"a":-9e999}"#))),
-        r#"{"op":"call_service","service":"/s","id":"call:7","args":{"a":null}}"#
-    );
-    assert_eq!(
-        line(&response(
-            "/s",
-            Some(&raw("1e999")),
-            &raw("[1e999]"),
-            true,
-            ""
-        )),
-        r#"{"op":"service_response","service":"/s","id":null,"values":[null],"result":true,"status":""}"#
-    );
-}
-
-/// To some readers they end a line. Within a string there can be none but as an escape.
-#[test]
-fn carriage_returns_between_tokens_of_what_passes_through_become_spaces() {
-    let msg = raw("{\r\"a\"\r:\t[\r1e999,\"\\r\"]\r}");
-    assert_eq!(
-        line(&publish_raw("/x", &msg)),
-        "{\"op\":\"publish\",\"topic\":\"/x\",\"msg\":{ \"a\" :\t[ null,\"\\r\"] }}"
-    );
-}
-
 /// How much memory a frame holds on to.
 fn memory(frame: Bytes) -> usize {
     frame.try_into_mut().expect("nobody else has it").capacity()
@@ -157,64 +124,6 @@ fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_t
     // Another spelling is counted exactly too.
     let frame = respelled("/x", "x", &publish("/x", &[1, 2, 3]));
     assert!(memory(frame) <= publish("/x", &[1, 2, 3]).len());
-}
-
-#[test]
-fn a_response_carries_the_callers_id_exactly() {
-    for id in [
-        "123456789012345678901234567890",
-        "\"x\\u00e9\"",
-        "null",
-        "[1, 2]",
-        "{\"a\":1.0}",
-    ] {
-        assert_eq!(
-            line(&response("/s", Some(&raw(id)), &Empty {}, true, "")),
-            format!(
-                r#"{{"op":"service_response","service":"/s","id":{id},"values":{{}},"result":true,"status":""}}"#
-            )
-        );
-    }
-}
-
-#[test]
-fn an_id_that_never_came_is_left_out() {
-    assert_eq!(
-        line(&failure("/s", None, "x is required", ErrorForm::Object)),
-        r#"{"op":"service_response","service":"/s","values":{},"result":false,"status":"x is required"}"#
-    );
-    assert_eq!(
-        line(&status(Level::Error, "no", None)),
-        r#"{"op":"status","level":"error","msg":"no"}"#
-    );
-}
-
-#[test]
-fn progress_and_end_of_a_goal_carry_the_senders_id() {
-    let feedback = action_feedback("/ik_action", Some(&raw("[1]")), &json!({"a": 1}));
-    assert_eq!(
-        line(&feedback),
-        r#"{"op":"action_feedback","action":"/ik_action","id":[1],"values":{"a":1}}"#
-    );
-    let result = action_result("/ik_action", None, &json!("why"), 6, false);
-    assert_eq!(
-        line(&result),
-        r#"{"op":"action_result","action":"/ik_action","values":"why","status":6,"result":false}"#
-    );
-}
-
-#[test]
-fn a_status_has_a_level_and_the_id_of_what_it_answers() {
-    for (level, name) in [
-        (Level::Info, "info"),
-        (Level::Warning, "warning"),
-        (Level::Error, "error"),
-    ] {
-        assert_eq!(
-            line(&status(level, "a \"b\"\n", Some(&raw("7")))),
-            format!(r#"{{"op":"status","level":"{name}","msg":"a \"b\"\n","id":7}}"#)
-        );
-    }
 }
 
 #[test]

@@ -5,25 +5,6 @@ use pendularm::protocol::outbox::MAX_MESSAGE;
 
 use super::Bench;
 
-#[test]
-fn responses_count_until_they_have_been_written() {
-    let mut bench = Bench::new();
-    bench.respond("12345678", &[]);
-    bench.push("/a", "mmmm");
-    bench.respond("1234", &[]);
-    assert_eq!(bench.outbox.response_bytes(), 12);
-    assert_eq!(bench.take(2, usize::MAX).len(), 2);
-    assert_eq!(bench.outbox.response_bytes(), 12);
-    bench.outbox.written(3);
-    assert_eq!(bench.outbox.response_bytes(), 9);
-    bench.outbox.written(7);
-    assert_eq!(bench.outbox.response_bytes(), 4);
-    bench.outbox.written(2);
-    assert_eq!(bench.take(1, usize::MAX), ["1234"]);
-    bench.outbox.written(4);
-    assert_eq!(bench.outbox.response_bytes(), 0);
-}
-
 /// Messages that take a permit are not among them.
 #[test]
 fn short_responses_count_by_themselves() {
