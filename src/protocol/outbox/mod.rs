@@ -26,7 +26,7 @@ use self::message::{QueuedMessage, by_itself, counted};
 pub use self::throttle::Throttle;
 use self::throttle::{HeldBack, TopicLimits};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM, SHORT};
-use crate::protocol::wire::series::{first_message, last_message, messages};
+use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection, each with [`MESSAGE_BYTES`]: ten seconds of the arm's
 /// own. A message longer than [`MEDIUM`] uses the shared pool and counts as [`MEDIUM`] here, so at most one of them
@@ -96,16 +96,12 @@ impl Outbox {
         if !self.may_fit(&frame) {
             return;
         }
-        match self.limits.get(topic).map(TopicLimits::holds_back) {
-            Some(holds_back) => {
+        match self.limits.get(topic) {
+            Some(limits) if limits.holds_back() => self.offer(topic, frame, now),
+            Some(_) => {
                 let is_series = first_message(&frame) < frame.len();
                 for frame in messages(frame) {
-                    let frame = by_itself(frame, is_series);
-                    if holds_back {
-                        self.offer(topic, frame, now);
-                    } else {
-                        self.enqueue(Some(topic), now, frame);
-                    }
+                    self.enqueue(Some(topic), now, by_itself(frame, is_series));
                 }
             }
             None => self.enqueue(Some(topic), now, frame),
@@ -344,30 +340,21 @@ impl Outbox {
         }
     }
 
-    /// Gives the throttle a message.
-    fn offer(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
-        let number = self.number();
-        let Some(limits) = self.limits.get_mut(topic) else {
-            return;
-        };
-        if limits.held.is_empty() && limits.is_due(now) {
+    /// Passes each message to the throttle separately. Once one is held back, the following ones are too, and only the
+    /// newest of these remain.
+    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
+        let is_series = first_message(&frames) < frames.len();
+        while !frames.is_empty() {
+            let Some(limits) = self.limits.get_mut(topic) else {
+                return;
+            };
+            if !limits.held.is_empty() || !limits.is_due(now) {
+                return self.hold_back(topic, frames, is_series, now);
+            }
             limits.last = Some(now);
-            return self.enqueue(Some(topic), now, frame);
+            let frame = frames.split_to(first_message(&frames));
+            self.enqueue(Some(topic), now, by_itself(frame, is_series));
         }
-        if frame.len() > MEDIUM && !limits.may_hold_long(now) {
-            self.dropped += 1;
-            return;
-        }
-        self.held_count += 1;
-        self.held_bytes += counted(&frame);
-        limits.held.push_back(QueuedMessage {
-            number,
-            since: now,
-            topic: Some(Arc::clone(topic)),
-            frame,
-        });
-        let surplus = limits.trim();
-        self.forget_held(&surplus);
     }
 
     /// Holds back the newest of these messages, as many as the throttle may.
@@ -513,7 +500,7 @@ impl Outbox {
         }
         // The pieces of a message are dropped together.
         if first_message(&message.frame) < message.frame.len() {
-            let newest = by_itself(last_message(message.frame.clone()), true);
+            let newest = by_itself(last_messages(message.frame.clone(), 1), true);
             self.dropped += message.count() - 1;
             self.topic_bytes -= counted(&message.frame);
             self.topic_bytes += counted(&newest);
@@ -538,12 +525,13 @@ impl Outbox {
         Some(message)
     }
 
-    /// Drops topic messages, the oldest first, until what is left takes at most [`MAX_TOPIC_BYTES`]. The oldest is the
-    /// queue's first or the one that was held back first. A series loses one message after the other.
+    /// Drops topic messages, the oldest first, until at most [`MAX_TOPIC_BYTES`] are left. The oldest is the first in
+    /// the queue or the first held one. A series loses as many messages at once as necessary.
     fn keep_bounded(&mut self) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * MESSAGE_BYTES;
-            if cost <= MAX_TOPIC_BYTES {
+            let excess = cost.saturating_sub(MAX_TOPIC_BYTES);
+            if excess == 0 {
                 return;
             }
             let first = self.topics.front_mut();
@@ -556,8 +544,8 @@ impl Outbox {
                 }
                 self.dropped += 1;
             } else if let Some(QueuedMessage { frame, .. }) = first {
-                let bytes = first_message(frame);
-                self.dropped += 1;
+                let (bytes, count) = first_messages(frame, excess);
+                self.dropped += count as u64;
                 if bytes < frame.len() {
                     self.topic_bytes -= counted(frame);
                     frame.advance(bytes);

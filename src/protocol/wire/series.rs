@@ -66,21 +66,47 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
 /// (fragments, binary, or more bytes than a series has). The time does not depend on the length of the message.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
-    if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
-        return frames.len();
-    }
-    let end = frames.iter().position(|byte| *byte == b'\n');
-    end.map_or(frames.len(), |end| end + 1)
+    first_messages(frames, 0).0
 }
 
-/// The last message of a series.
+/// The length and number of the first messages of frames for one client that have at least `bytes` bytes together:
+/// at least one, at most all.
 #[must_use]
-pub fn last_message(mut frames: Bytes) -> Bytes {
-    // A message ends with a newline, its own.
-    let before = frames.len().saturating_sub(1);
-    let before = frames.get(..before).unwrap_or_default();
-    let end = before.iter().rposition(|byte| *byte == b'\n');
-    frames.split_off(end.map_or(0, |end| end + 1))
+pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
+    if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
+        return (frames.len(), 1);
+    }
+    let from = bytes.saturating_sub(1).min(frames.len());
+    let (before, behind) = frames.split_at(from);
+    let end = behind.iter().position(|byte| *byte == b'\n');
+    let end = end.map_or(frames.len(), |end| from + end + 1);
+    (end, lines(before) + 1)
+}
+
+/// The number of line ends in `bytes`. They are counted in chunks whose count fits into a byte, which compiles to much
+/// faster code.
+fn lines(bytes: &[u8]) -> usize {
+    let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
+    let parts = bytes.chunks(u8::MAX.into());
+    parts.map(|part| usize::from(ends(part))).sum()
+}
+
+/// The last messages of a series, at most `count`.
+#[must_use]
+pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
+    let mut start = frames.len();
+    for _ in 0..count {
+        // A message ends with its newline.
+        let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
+        start = before
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .map_or(0, |end| end + 1);
+        if start == 0 {
+            break;
+        }
+    }
+    frames.split_off(start)
 }
 
 /// Each message of `frames`.

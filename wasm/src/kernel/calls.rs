@@ -12,7 +12,9 @@ use pendularm::services::arm::{
     Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
-use pendularm::services::study::{Computed, PlanRun, PredictStability, RunOffline, SuggestGains};
+use pendularm::services::study::{
+    Computed, PlanRun, PredictStability, RunOffline, SuggestGains, Work,
+};
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
 use pendularm::services::{Address, Answered, NoService};
 
@@ -75,12 +77,12 @@ impl<const N: usize> Kernel<N> {
                 self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
             }
             Service::Stability => {
-                self.begin::<PredictStability<N>, _>(own, &args, to, PredictStability::work);
+                self.begin::<PredictStability<N>, _>(own, &args, to, Computed::work);
             }
             Service::SuggestGains => {
-                self.begin::<SuggestGains<N>, _>(own, &args, to, SuggestGains::work);
+                self.begin::<SuggestGains<N>, _>(own, &args, to, Computed::work);
             }
-            Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, PlanRun::work),
+            Service::Plan => self.begin::<PlanRun<N>, _>(own, &args, to, Computed::work),
             Service::Rollout => self.begin::<RunOffline<N>, _>(own, &args, to, Repeated::new),
             _ => self.send(to.failure(&NoService::NotServed(to.name().to_owned()).to_string())),
         }
@@ -135,10 +137,11 @@ impl<const N: usize> Kernel<N> {
         service: Service,
         args: &Arguments,
         to: Address,
+        work: impl FnOnce(A, pendularm::services::study::Present<N>) -> W,
     ) {
         match A::read(service, args) {
             Ok(ask) => {
-                let work = ask.work(self.arm.present());
+                let work = work(ask, self.arm.present());
                 self.computations
                     .push_back(Box::new(Answering::<A, W>::new(work, to)));
             }

@@ -17,7 +17,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::Connection;
-use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, yield_turn};
+use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, LONG_CHUNK, yield_turn};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;

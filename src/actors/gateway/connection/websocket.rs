@@ -19,7 +19,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, ClientLost};
+use super::plain::{self, CHUNK, ClientLost};
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM};
@@ -136,7 +136,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         self.stream().left = TURN;
-        plain::poll_read(self.stream(), cx, chunk)
+        plain::poll_read(self.stream(), cx, chunk, CHUNK)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
