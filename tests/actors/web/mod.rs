@@ -5,10 +5,8 @@
 
 #![cfg(feature = "web")]
 
-mod closing;
 mod heads;
 mod http;
-mod life;
 mod messages;
 mod unread;
 
@@ -22,7 +20,6 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::gateway::limits::FRAME_TIME;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::Service;
@@ -32,9 +29,6 @@ use pendularm_client::websocket::{LAST, append, opcode};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep};
-
-const PING_INTERVAL: Duration = Duration::from_secs(15);
-const PONG_TIME: Duration = Duration::from_secs(30);
 
 /// The client's end of a new connection.
 fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
