@@ -3,14 +3,14 @@
 //! [`Client::next_event`] and [`Client::write`] return errors. The other methods are for tests, and panic.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use crate::codec::{Codec, Event, Framing};
 use crate::websocket::{LAST, append, append_close, handshake, opcode};
-use crate::{Error, call, is_response_to, reason, values};
+use crate::{Error, call, is_response_to, values};
 
 /// Default limit of every wait. It is long, because machines may be busy.
 pub const PATIENCE: Duration = Duration::from_secs(20);
@@ -49,15 +49,8 @@ impl Client {
     #[must_use]
     #[track_caller]
     pub fn web(address: SocketAddr) -> Self {
-        Self::web_with(address, "/", "")
-    }
-
-    /// Connects by WebSocket at `target`. `headers` are further lines of the request, each with its line end.
-    #[must_use]
-    #[track_caller]
-    pub fn web_with(address: SocketAddr, target: &str, headers: &str) -> Self {
         let opened = Self::dial(Framing::WebSocket, address, PATIENCE).and_then(|mut client| {
-            client.shake_hands(&handshake(&address.to_string(), target, headers))?;
+            client.shake_hands(&handshake(&address.to_string(), "/", ""))?;
             Ok(client)
         });
         expect("a WebSocket", opened)
@@ -153,28 +146,13 @@ impl Client {
         expect("room for what is sent", self.write(bytes));
     }
 
-    /// Sends a WebSocket frame with the mask 0; `first_byte` as in [`append`].
-    #[track_caller]
-    pub fn send_frame(&mut self, first_byte: u8, payload: &[u8]) {
-        let mut bytes = Vec::with_capacity(payload.len() + 16);
-        append(&mut bytes, first_byte, [0; 4], payload);
-        self.send_bytes(&bytes);
-    }
-
-    /// Sends a close frame.
+    /// Says that the WebSocket is to end.
     #[track_caller]
     pub fn close(&mut self, code: u16, reason: &str) {
         let mut bytes = Vec::new();
         append_close(&mut bytes, MASK, code, reason);
         self.has_closed = true;
         self.send_bytes(&bytes);
-    }
-
-    /// Stops sending. Waiting answers still arrive.
-    #[track_caller]
-    pub fn finish(&mut self) {
-        let finished = self.stream.shutdown(Shutdown::Write);
-        expect("an open socket", finished.map_err(Error::Socket));
     }
 
     fn read(&mut self, deadline: Instant) -> Result<(), Error> {
@@ -247,12 +225,6 @@ impl Client {
         }
     }
 
-    /// The next message, pong or close.
-    #[track_caller]
-    pub fn event(&mut self) -> Event {
-        expect("a message", self.next_event(Instant::now() + self.patience))
-    }
-
     /// The next frame.
     #[track_caller]
     pub fn receive(&mut self) -> Value {
@@ -262,8 +234,8 @@ impl Client {
     /// The next frame as text.
     #[track_caller]
     pub fn receive_text(&mut self) -> String {
-        match self.event() {
-            Event::Text(text) => text,
+        match self.next_event(Instant::now() + self.patience) {
+            Ok(Event::Text(text)) => text,
             other => panic!("{other:?} instead of a text"),
         }
     }
@@ -327,13 +299,7 @@ impl Client {
         values(self.call(service, args))
     }
 
-    /// Calls a service that must refuse the call, and returns the reason.
-    #[track_caller]
-    pub fn refusal(&mut self, service: &str, args: Value) -> String {
-        reason(&self.call(service, args))
-    }
-
-    /// Subscribes and waits for the confirmation. Over WebSocket there is one only if the client has set a level.
+    /// Subscribes and waits for the confirmation, which comes over TCP only unless the client has set a level.
     #[track_caller]
     pub fn subscribe(&mut self, topic: &str) {
         self.send(&json!({"op": "subscribe", "topic": topic}));
@@ -347,18 +313,7 @@ impl Client {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
-    /// The close code of the other side. Earlier messages are ignored.
-    #[track_caller]
-    pub fn close_code(&mut self) -> Option<u16> {
-        let deadline = Instant::now() + self.patience;
-        loop {
-            if let Event::Close(code, _) = expect("a close frame", self.next_event(deadline)) {
-                return code;
-            }
-        }
-    }
-
-    /// Whether the stream ends or breaks in time. Earlier bytes are ignored.
+    /// True if the stream ends (or breaks) in time, whatever comes before.
     #[track_caller]
     pub fn is_closed(&mut self) -> bool {
         self.set_patience(self.patience);

@@ -5,7 +5,6 @@
     reason = "test programs that share helpers need not use every part"
 )]
 
-mod admission;
 mod arm_steps;
 mod arm_turns;
 #[path = "../support/askers.rs"]
@@ -29,12 +28,10 @@ mod pacing;
 #[cfg(feature = "record")]
 mod recorder;
 mod refusals;
-mod registrations;
 mod registry;
 #[cfg(feature = "record")]
 mod replay;
 mod rosapi;
-mod slow;
 #[path = "../support/stage.rs"]
 mod stage;
 mod study;

@@ -1,5 +1,4 @@
-//! Who asks a node that stands alone, without registry and connections: a client with JSON, whose call is read and whose
-//! answer is written, and clients with typed messages, whose turns on the pool can be told apart.
+//! Clients that ask a node without registry and connections, by typed messages: their turns on the pool can be told apart.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,12 +8,7 @@ use actix::dev::ToEnvelope;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Respond, Unserved, ask, guard};
-use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
-use pendularm::protocol::catalog::Service;
-use pendularm::protocol::op::Arguments;
-use serde_json::value::to_raw_value;
-use serde_json::{Value, json};
+use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Unserved, ask, guard};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
@@ -22,92 +16,7 @@ use tokio::time::timeout;
 /// How long anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The connection of the client that calls with JSON.
-pub const CALLER: ConnectionId = ConnectionId(7);
-
-/// Hands a client's call to its node, as the registry does; the receiver ends with the call.
-pub fn hand_on(
-    routes: &Nodes,
-    respond: Recipient<Respond>,
-    service: Service,
-    args: &Value,
-) -> oneshot::Receiver<()> {
-    let name = service.name().into();
-    let (caller, ended) = Caller::new(respond, CALLER, service, name, None, Arc::default());
-    let raw = to_raw_value(args).unwrap().into();
-    let arguments = if args.is_array() {
-        Arguments::Positional(raw)
-    } else {
-        Arguments::Object(raw)
-    };
-    routes.services[&service](ServiceCall {
-        service,
-        arguments,
-        caller,
-    });
-    ended
-}
-
-/// Stands in for the registry: passes on every response.
-struct Responses(UnboundedSender<Value>);
-
-impl Actor for Responses {
-    type Context = Context<Self>;
-}
-
-impl Handler<Respond> for Responses {
-    type Result = ();
-
-    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        let frame = serde_json::from_slice(&respond.frame.write()).expect("valid JSON");
-        let _ = self.0.send(frame);
-    }
-}
-
-/// A client that calls with JSON.
-pub struct JsonCaller {
-    routes: Nodes,
-    respond: Recipient<Respond>,
-    responses: UnboundedReceiver<Value>,
-}
-
-impl JsonCaller {
-    /// One whose calls go to the node that attaches itself here.
-    pub fn of(attach: impl FnOnce(&mut Nodes)) -> Self {
-        let (sender, responses) = unbounded_channel();
-        let mut routes = Nodes::default();
-        attach(&mut routes);
-        Self {
-            routes,
-            respond: Responses(sender).start().recipient(),
-            responses,
-        }
-    }
-
-    /// The whole response to a call, which ends with it.
-    pub async fn call(&mut self, service: Service, args: &Value) -> Value {
-        let ended = hand_on(&self.routes, self.respond.clone(), service, args);
-        let response = timeout(PATIENCE, self.responses.recv()).await;
-        let response = response.expect("a response in time").expect("the registry");
-        let ended = timeout(PATIENCE, ended).await.expect("an end in time");
-        assert!(ended.is_err(), "the call ends with its answer");
-        response
-    }
-
-    /// The values of a call that must succeed.
-    pub async fn values(&mut self, service: Service, args: &Value) -> Value {
-        pendularm_client::values(self.call(service, args).await)
-    }
-
-    /// The reason of a call that must be refused.
-    pub async fn refusal(&mut self, service: Service, args: &Value) -> String {
-        let response = self.call(service, args).await;
-        assert_eq!(response["values"], json!({}), "{response}");
-        pendularm_client::reason(&response)
-    }
-}
-
-/// A substitute for a client: reports that its answer has come, and passes it on.
+/// Stands in for a client that has asked: says that it has its answer, and hands it on.
 struct Asking<T> {
     connection: u64,
     gone: Arc<AtomicBool>,

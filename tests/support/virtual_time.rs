@@ -19,7 +19,7 @@ use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::io::{AsyncReadExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep, timeout};
 
 /// Longer than anything in here waits.
@@ -85,12 +85,6 @@ impl Peer {
 
     pub async fn send_text(&mut self, text: &str) {
         self.send_bytes(text.as_bytes()).await;
-    }
-
-    /// Sends as much text as the pipe accepts at once; false if some is left, or the client has been disconnected.
-    pub async fn offer(&mut self, text: &str) -> bool {
-        let send = self.stream().write_all(text.as_bytes());
-        matches!(timeout(GRAIN, send).await, Ok(Ok(())))
     }
 
     /// Shuts down the writing side.

@@ -1,14 +1,11 @@
-//! Parts that the tests of HTTP and WebSocket share: requests as bytes, answers taken apart, and the client over WebSocket.
+//! Parts that the tests of HTTP and WebSocket share: requests as bytes, and answers taken apart.
 
 use std::fs;
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-
-use crate::common::{Client, PATIENCE};
+use crate::common::PATIENCE;
 
 /// A folder of one test's own, below the build's.
 pub fn folder(name: &str) -> PathBuf {
@@ -117,42 +114,4 @@ pub fn try_handshake(address: SocketAddr, path: &str, headers: &str) -> (u16, St
     }
     let answer = Answer::parse(&bytes);
     (answer.status, answer.text().to_owned())
-}
-
-/// A client over WebSocket that receives only what it asked for.
-pub struct Socket(Client);
-
-impl Deref for Socket {
-    type Target = Client;
-
-    fn deref(&self) -> &Client {
-        &self.0
-    }
-}
-
-impl DerefMut for Socket {
-    fn deref_mut(&mut self) -> &mut Client {
-        &mut self.0
-    }
-}
-
-impl Socket {
-    pub fn open(address: SocketAddr) -> Self {
-        Self(Client::web(address))
-    }
-
-    /// Calls a service and returns its response, which must be the very next frame.
-    #[track_caller]
-    pub fn call(&mut self, service: &str, args: Value) -> Value {
-        let response = self.0.call(service, args);
-        assert!(self.kept.is_empty(), "{:?}", self.kept);
-        response
-    }
-
-    /// Waits until all sent frames have been handled, and asserts that no other frame came.
-    #[track_caller]
-    pub fn settle(&mut self) {
-        let response = self.call("/arm_sim/set_params", json!({}));
-        assert_eq!(response["result"], true, "{response}");
-    }
 }

@@ -236,7 +236,7 @@ fn a_log_that_nobody_reads_blocks_nobody_and_the_lines_that_are_lost_are_counted
 #[cfg(feature = "web")]
 #[test]
 fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
-    use crate::web_client::{Socket, exchange, handshake};
+    use crate::web_client::{exchange, handshake};
 
     let (mut runtime, _) = talkative("hostile_log_web", "text");
     let address = runtime.address;
@@ -259,7 +259,7 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
             let answer = exchange(address, (head + "\r\n\r\n").as_bytes());
             assert!(!answer.is_empty());
         }
-        let mut socket = Socket::open(address);
+        let mut socket = Client::web(address);
         socket.send(&json!({"op": text, "id": text}));
         socket.close(1000, text);
         assert!(socket.is_closed());

@@ -17,7 +17,6 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
-mod advice;
 #[path = "../support/arm.rs"]
 mod arm;
 mod backpressure;
@@ -29,7 +28,6 @@ mod common;
 mod computations;
 #[path = "../support/diagnostics.rs"]
 mod diagnostics;
-mod faults;
 mod faults_files;
 mod faults_slow;
 mod faults_threads;
@@ -37,7 +35,6 @@ mod hostile_log;
 mod http;
 mod launch;
 mod mishaps;
-mod opening;
 mod options;
 mod order;
 mod places;
@@ -54,4 +51,3 @@ mod time;
 mod token;
 #[path = "../support/web_client.rs"]
 mod web_client;
-mod websocket;

@@ -45,7 +45,7 @@ fn diagnostics(address: SocketAddr) -> Output {
 #[cfg(all(feature = "web", feature = "cli"))]
 #[test]
 fn a_script_that_takes_all_places_leaves_the_kept_one_to_pages_and_commands() {
-    use crate::web_client::{Socket, get};
+    use crate::web_client::get;
 
     let mut runtime = serving("8");
     let address = runtime.address;
@@ -60,7 +60,7 @@ fn a_script_that_takes_all_places_leaves_the_kept_one_to_pages_and_commands() {
     assert_eq!(get(address, "/").status, 200);
     let output = diagnostics(address);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
-    let mut page = Socket::open(address);
+    let mut page = Client::web(address);
     page.settle();
     // Now the kept place is taken too.
     let answer = get(address, "/");

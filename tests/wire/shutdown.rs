@@ -5,7 +5,7 @@
 use std::io::Write;
 use std::time::Duration;
 
-use crate::common::{Client, Runtime, signal};
+use crate::common::{Client, Runtime, provide, signal};
 use pendularm::protocol::op::GoalStatus;
 use pendularm_client::websocket::{self as frames, LAST, opcode};
 use serde_json::{Value, json};
@@ -49,7 +49,7 @@ fn a_signal_ends_an_idle_program_and_one_that_is_only_watched() {
 }
 
 #[test]
-fn goals_are_told_that_the_program_is_shutting_down() {
+fn goals_calls_and_computations_are_told_that_the_program_is_shutting_down() {
     let mut runtime = Runtime::start();
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));
@@ -74,11 +74,24 @@ fn goals_are_told_that_the_program_is_shutting_down() {
             frame["op"] == "action_feedback" && frame["action"] == *action
         });
     }
+    let mut provider = runtime.connect();
+    provide(&mut provider, "/s");
+    client.send(&json!({"op": "call_service", "id": "call", "service": "/s"}));
+    provider.receive();
+    // Minutes of work in a test build.
+    let endless = json!({"function": "sin(sin(sin(sin(sin(sin(t))))))^2+cos(cos(cos(cos(t))))^3", "x0": 0.1,
+        "dt": 1e-3, "steps": 1_000_000, "integrator": "rk4"});
+    client.send(
+        &json!({"op": "call_service", "id": "steps", "service": "/arm_sim/integration_step",
+        "args": endless}),
+    );
     ends_on(&mut runtime, "TERM");
-    let ends: Vec<Value> = rest(&mut client)
-        .into_iter()
-        .filter(|frame| frame["op"] == "action_result")
-        .collect();
+    let mut ends = rest(&mut client);
+    for id in ["call", "steps"] {
+        let is_told = |end: &Value| end["id"] == id && end["status"] == "shutting down";
+        assert!(ends.iter().any(is_told), "{id}: {ends:?}");
+    }
+    ends.retain(|frame| frame["op"] == "action_result");
     let mut told: Vec<&str> = ends.iter().filter_map(|end| end["id"].as_str()).collect();
     told.sort_unstable();
     let mut sent = goals.map(|(action, _)| action);

@@ -1,11 +1,17 @@
 //! Messages that a response of the arm discards while a throttle holds them back.
 
 use super::*;
+use crate::virtual_time::{Held, Node};
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::protocol::catalog::Service;
 
 #[test]
 fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
     in_virtual_time(async {
-        let (gateway, _, calls) = held_back().await;
+        let calls = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&calls).attach(&mut nodes, &[Service::SetParams], &[]);
+        let gateway = Gateway::with(nodes).await;
         let mut client = gateway.connect(WIDE);
         client
             .send(json!({"op": "subscribe", "topic": "/joint_states", "throttle_rate": 1000}))
@@ -19,7 +25,7 @@ fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
             gateway.registry.do_send(publish(n));
         }
         assert_eq!(client.receive().await["msg"]["n"], 0);
-        client.call(PARAMS, 7).await;
+        client.call(Service::SetParams.name(), 7).await;
         settle().await;
         calls.answer();
         assert_eq!(client.receive().await["id"], 7);

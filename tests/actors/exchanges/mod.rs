@@ -8,6 +8,8 @@
 //! | --- | --- |
 //! | `a > text` | client `a` sends this frame; clients whose names begin with `w` use WebSocket |
 //! | `a bytes text` | client `a` sends this text without a line end |
+//! | `w raw text` | sends the bytes of this text, which has the escapes of JSON: `\u0089` is one byte |
+//! | `w pinged` | the next that comes is a ping |
 //! | `a < pattern` | the next frame that `a` receives matches |
 //! | `a << pattern` | a later frame matches; the frames before it are dropped |
 //! | `a ~ text` | the frame that `a` received last contains this text, byte by byte |
@@ -24,6 +26,15 @@
 //! | `request text = 200,404 part` | a new connection sends this request and ends; the answers have these statuses, and contain this part, or with `!` do not |
 //! | `pass ms` | virtual time passes |
 //! | `stall ms` | virtual time passes, and no actor runs in it |
+//! | `mark`, `elapsed 1..2` | at `elapsed`, this many ms have passed since `mark` |
+//! | `a room n`, `a take n` | connects by a pipe that holds this many bytes, takes this many out of it |
+//! | `a finish` | stops sending |
+//! | `a read 200 part` | all that comes to the end is an answer over HTTP with this status, and contains this part |
+//! | `held`, `memory frames bytes` | as a first step: in place of all nodes there are two that keep their calls, `steps` of `/arm_sim/integration_step` and `params` of `/arm_sim/set_params`; with `memory`, all clients share this room |
+//! | `steps = 1`, `params = 1` | this many calls are kept |
+//! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
+//! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
+//! | `shutting down`, `finish all` | the two messages by which the runtime ends its clients |
 //! | `floating` | gravity and gains are zero and the controller is on: an arm at rest stays where it is |
 //! | `for x \| y in 1 \| a; 2 \| b` | the steps up to `end` run once for each row, with its values in place of `@x` and `@y` |
 //! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
@@ -34,61 +45,46 @@
 //! The text of a request has the escapes of JSON. The first answer to it has the headers that keep a browser
 //! strict.
 //!
-//! In a sent text, `%3*x%` is `xxx`, `%MAX_NAME*x%` repeats as often as that limit says, `%cr%` is a carriage return, `%lf%` is a line feed, and
+//! A number may be a limit by its name, times in ms, and `LIMIT - 1` or `LIMIT + 1`. In a sent text, `%3*x%` is `xxx`, `%MAX_NAME*x%` repeats as often as that limit says, `%cr%` is a carriage return, `%lf%` is a line feed, and
 //! `$name` is a value that a pattern has bound. A pattern is JSON. An object may have more members than its pattern. The texts `*`, `-`, `~part`
 //! and `$name` match any value, no value, a value that contains this part, and the value that the name is bound to. The text `1..2` matches
 //! numbers from 1 to 2, also as texts. `{"=": value}` matches this value only. At the end, no client has a frame that was not received, other than messages of
 //! topics that are published periodically.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+mod held;
+mod patterns;
+mod peer;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use self::held::KeptCalls;
+use self::patterns::{check, expand, number, range};
+use self::peer::{LONG_PATIENCE, Peer, SOON, ask};
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::admission::{Admission, MAX_AUTH_BYTES};
-use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
+use pendularm::actors::gateway::connection::admission::Admission;
+use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
+use pendularm::actors::resources::memory::Memory;
 use pendularm::math::pid::Gains;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
-use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME};
-use pendularm::protocol::op::follow::MAX_POINTS;
-use pendularm::protocol::ros::parameters::MAX_NAMED;
 #[cfg(feature = "web")]
 use pendularm::web::{Site, access::Access};
 use pendularm_client::codec::Event;
-use pendularm_client::{Error, pipe};
+use pendularm_client::pipe;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
-use tokio::time::{Instant, advance, sleep, timeout, timeout_at};
+use tokio::time::{Instant, advance, sleep, timeout};
 
-/// Virtual time that a frame may take to come.
+/// Virtual time that a frame may take to come behind others.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Virtual time in which all that is under way arrives.
-const SOON: Duration = Duration::from_millis(10);
-
-/// Limits that a repetition or a loop may have as its count.
-const LIMITS: [(&str, usize); 7] = [
-    ("MAX_AUTH_BYTES", MAX_AUTH_BYTES),
-    ("MAX_FRAME", MAX_FRAME),
-    ("MAX_FRAMES", MAX_FRAMES),
-    ("MAX_NAME", MAX_NAME),
-    ("MAX_NAMED", MAX_NAMED),
-    ("MAX_POINTS", MAX_POINTS),
-    ("MAX_WISHES", MAX_WISHES),
-];
-
-/// Topics that are published periodically.
-const PERIODIC: [&str; 5] = [
-    "/joint_states",
-    "joint_states",
-    "/clock",
-    "/tf",
-    "/diagnostics",
-];
+/// How much later than at its time something may come \[ms\].
+const GRAIN: usize = 20;
 
 /// Headers that every answer over HTTP has, in lower case.
 #[cfg(feature = "web")]
@@ -107,7 +103,7 @@ const STRICT: [&str; 8] = [
 const NEVER: [&str; 2] = ["\r\naccess-control-", "\r\nserver:"];
 
 /// The conditions of these options.
-pub fn admission(options: &str) -> Result<Admission, String> {
+fn admission(options: &str) -> Result<Admission, String> {
     let arguments = std::iter::once("pendularm").chain(options.split(' '));
     let options = match Options::parse(arguments) {
         Ok(Parsed::Serve(options)) => *options,
@@ -129,110 +125,6 @@ pub fn admission(options: &str) -> Result<Admission, String> {
     })
 }
 
-/// A frame: its text, which is empty for a binary message, and its value.
-struct Frame(String, Value);
-
-struct Peer {
-    stream: pipe::Client<DuplexStream>,
-    /// Frames that came while another was awaited, oldest first.
-    kept: VecDeque<Frame>,
-    last: String,
-}
-
-impl Peer {
-    async fn read(&mut self) -> Result<Frame, String> {
-        loop {
-            return match self.stream.next_event().await {
-                // Some readers end a line at a carriage return.
-                Ok(Event::Text(text)) if text.contains('\r') => Err(format!("two lines: {text}")),
-                Ok(Event::Text(text)) => match serde_json::from_str(&text) {
-                    Ok(value) => Ok(Frame(text, value)),
-                    Err(error) => Err(format!("{error}: {text}")),
-                },
-                Ok(Event::Binary(bytes)) => {
-                    let value = json!({"binary": String::from_utf8_lossy(&bytes)});
-                    Ok(Frame(String::new(), value))
-                }
-                Ok(Event::Ping(_) | Event::Pong(_)) => continue,
-                Ok(Event::Close(code, _)) => Ok(Frame(String::new(), json!({"close": code}))),
-                Err(Error::Ended) => Ok(Frame(String::new(), json!("the end"))),
-                Err(error) => Err(error.to_string()),
-            };
-        }
-    }
-
-    async fn next(&mut self) -> Result<Value, String> {
-        let Frame(text, value) = match self.kept.pop_front() {
-            Some(frame) => frame,
-            None => self.read().await?,
-        };
-        self.last = text;
-        Ok(value)
-    }
-
-    async fn send(&mut self, text: &str) {
-        self.stream.send_text(text).await;
-    }
-
-    /// The response to a call; the frames before it are kept.
-    async fn call(&mut self, service: &str, args: &str) -> Result<Value, String> {
-        self.send(&format!(
-            "{{\"op\":\"call_service\",\"service\":\"{service}\",\"id\":\"the call\",\"args\":{args}}}"
-        ))
-        .await;
-        loop {
-            let frame = self.read().await?;
-            if frame.1["id"] == "the call" && frame.1["op"] == "service_response" {
-                self.last = frame.0;
-                return Ok(frame.1);
-            }
-            self.kept.push_back(frame);
-        }
-    }
-
-    /// Takes the frames that were received already and all that arrive within `time`.
-    async fn take_for(&mut self, time: Duration) -> Vec<Value> {
-        let end = Instant::now() + time;
-        while let Ok(Ok(frame)) = timeout_at(end, self.read()).await {
-            let is_end = frame.1 == "the end";
-            self.kept.push_back(frame);
-            if is_end {
-                break;
-            }
-        }
-        self.kept.drain(..).map(|frame| frame.1).collect()
-    }
-
-    /// Takes the frames of a time, and checks how many match.
-    async fn count(
-        &mut self,
-        given: &str,
-        wanted: &str,
-        bound: &mut BTreeMap<String, Value>,
-    ) -> Result<(), String> {
-        let (time, pattern) = given.split_once(' ').ok_or("no pattern")?;
-        let time = time.parse().map_err(|_| "no time")?;
-        let came = self.take_for(Duration::from_millis(time)).await;
-        let is_one = |frame: &&Value| check(pattern, frame, &mut bound.clone()).is_ok();
-        let count = came.iter().filter(is_one).count();
-        let range = wanted.split_once("..").unwrap_or((wanted, wanted));
-        let is_bound =
-            wanted.starts_with('$') && matches(&json!(wanted), Some(&json!(count)), bound);
-        if is_bound || is_within(range, count as f64) {
-            return Ok(());
-        }
-        Err(format!("{count} came of {}", came.len()))
-    }
-
-    /// The frames that have come and were not received, without those of periodic topics.
-    async fn rest(&mut self) -> Vec<Value> {
-        let mut rest = self.take_for(SOON).await;
-        let is_periodic = |value: &Value| PERIODIC.iter().any(|topic| value["topic"] == *topic);
-        rest.retain(|value| !is_periodic(value) && *value != "the end");
-        rest
-    }
-}
-
 /// A runtime, its clients by their names, and the values that patterns have bound.
 struct World {
     gateway: Gateway,
@@ -240,6 +132,8 @@ struct World {
     admission: Arc<Admission>,
     peers: BTreeMap<String, Peer>,
     bound: BTreeMap<String, Value>,
+    kept: KeptCalls,
+    marked: Instant,
 }
 
 impl World {
@@ -250,19 +144,30 @@ impl World {
         let gateway = Gateway::bare().await;
         let (registry, gauges) = (&gateway.registry, &gateway.gauges);
         work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.pool);
-        let (peers, bound) = (BTreeMap::new(), BTreeMap::new());
+        Self::at(gateway, N, KeptCalls::default())
+    }
+
+    /// A gateway with the two nodes that keep their calls.
+    async fn held(memory: Memory) -> Self {
+        let kept = KeptCalls::default();
+        Self::at(kept.gateway(memory).await, 2, kept)
+    }
+
+    fn at(gateway: Gateway, links: usize, kept: KeptCalls) -> Self {
         Self {
             gateway,
-            links: N,
+            links,
             admission: Arc::default(),
-            peers,
-            bound,
+            peers: BTreeMap::new(),
+            bound: BTreeMap::new(),
+            kept,
+            marked: Instant::now(),
         }
     }
 
-    /// The client's end of a new connection.
-    fn open(&self) -> DuplexStream {
-        let (ours, theirs) = duplex(WIDE);
+    /// The client's end of a new connection, whose pipe holds `room` bytes each way.
+    fn open(&self, room: usize) -> DuplexStream {
+        let (ours, theirs) = duplex(room);
         let (registry, gauges) = (
             self.gateway.registry.clone(),
             Arc::clone(&self.gateway.gauges),
@@ -272,25 +177,21 @@ impl World {
         ours
     }
 
-    async fn connect(&self, name: &str) -> Peer {
-        let ours = self.open();
+    async fn connect(&self, name: &str, room: usize) -> Peer {
+        let ours = self.open(room);
         let stream = if name.starts_with('w') {
-            pipe::Client::web_on(ours, PATIENCE, "127.0.0.1:9095", "/").await
+            pipe::Client::web_on(ours, LONG_PATIENCE, "127.0.0.1:9095", "/").await
         } else {
-            pipe::Client::on(ours, PATIENCE)
+            pipe::Client::on(ours, LONG_PATIENCE)
         };
-        Peer {
-            stream,
-            kept: VecDeque::new(),
-            last: String::new(),
-        }
+        Peer::new(stream)
     }
 
     /// Sends a request and checks its answers.
     #[cfg(feature = "web")]
     async fn request(&self, text: &str, wanted: &str) -> Result<(), String> {
         let text: String = serde_json::from_str(&format!("\"{text}\"")).map_err(|_| "no text")?;
-        let mut stream = self.open();
+        let mut stream = self.open(WIDE);
         stream
             .write_all(text.as_bytes())
             .await
@@ -328,7 +229,7 @@ impl World {
 
     async fn step(&mut self, line: &str) -> Result<(), String> {
         let (name, rest) = line.split_once(' ').unwrap_or((line, ""));
-        let time = || rest.parse().map(Duration::from_millis);
+        let time = || number(rest).map(|ms| Duration::from_millis(ms as u64));
         match name {
             "options" => self.admission = Arc::new(admission(rest)?),
             #[cfg(feature = "web")]
@@ -347,8 +248,32 @@ impl World {
                     self.step_of("first", call).await?;
                 }
             }
-            "pass" => sleep(time().map_err(|_| "no time")?).await,
-            "stall" => advance(time().map_err(|_| "no time")?).await,
+            "pass" => sleep(time().ok_or("no time")?).await,
+            "stall" => advance(time().ok_or("no time")?).await,
+            "mark" => self.marked = Instant::now(),
+            "elapsed" => {
+                let (low, high) = range(rest).ok_or("no time")?;
+                let elapsed = self.marked.elapsed();
+                let high = if low == high { high + GRAIN } else { high };
+                if !(low..=high).contains(&(elapsed.as_millis() as usize)) {
+                    return Err(format!("{elapsed:?}"));
+                }
+            }
+            "connections" | "dropped" | "taken" | "steps" | "params" => {
+                self.kept.count(&self.gateway, name, rest)?;
+            }
+            "answer" | "reply" | "refuse" | "lose" | "gone" => self.kept.decide(name, rest).await?,
+            "release" => self.kept.release().await,
+            "shutting" => {
+                let refuse = RefuseCalls("shutting down");
+                let sent = self.gateway.registry.send(refuse).await;
+                sent.map_err(|error| error.to_string())?;
+            }
+            "finish" => {
+                let sent = self.gateway.registry.send(FinishAll).await;
+                sent.map_err(|error| error.to_string())?;
+                settle().await;
+            }
             _ => self.step_of(name, rest).await?,
         }
         Ok(())
@@ -357,14 +282,14 @@ impl World {
     /// A step of a client, which is connected with its first one.
     async fn step_of(&mut self, name: &str, rest: &str) -> Result<(), String> {
         if !self.peers.contains_key(name) {
-            let peer = self.connect(name).await;
+            let room = rest.strip_prefix("room ").map_or(Some(WIDE), number);
+            let peer = self.connect(name, room.ok_or("no room")?).await;
             self.peers.insert(name.to_owned(), peer);
         }
         let peer = self.peers.get_mut(name).ok_or("no client")?;
         let (verb, rest) = rest.split_once(' ').unwrap_or((rest, ""));
         let (given, wanted) = rest.split_once(" = ").unwrap_or((rest, ""));
         let (service, args) = given.split_once(' ').unwrap_or((given, "{}"));
-        let args = expand(args, &self.bound);
         match verb {
             ">" => {
                 peer.send(&expand(rest, &self.bound)).await;
@@ -373,6 +298,19 @@ impl World {
             "bytes" => {
                 let text = expand(rest, &self.bound);
                 peer.stream.send_bytes(text.as_bytes()).await;
+            }
+            "raw" => {
+                let text: String =
+                    serde_json::from_str(&format!("\"{}\"", expand(rest, &self.bound)))
+                        .map_err(|error| error.to_string())?;
+                let bytes: Vec<u8> = text.chars().map(|one| one as u8).collect();
+                peer.stream.send_bytes(&bytes).await;
+            }
+            "pinged" => {
+                let event = peer.stream.next_event().await;
+                if !matches!(event, Ok(Event::Ping(_))) {
+                    return Err(format!("{event:?}"));
+                }
             }
             "<" => {
                 let got = peer.next().await?;
@@ -400,7 +338,7 @@ impl World {
                 )?;
             }
             "call" | "refused" | "goal" | "error" => {
-                let text = expand(given, &self.bound);
+                let (args, text) = (expand(args, &self.bound), expand(given, &self.bound));
                 ask(peer, verb, [service, &args, &text, wanted], &mut self.bound).await?;
             }
             "quiet" => {
@@ -410,6 +348,29 @@ impl World {
                 }
             }
             "forget" => drop(peer.take_for(SOON).await),
+            "room" => {}
+            "take" => {
+                let mut bytes = vec![0; number(rest).ok_or("no number")?];
+                let taken = peer.stream.stream().read_exact(&mut bytes).await;
+                taken.map_err(|error| error.to_string())?;
+                settle().await;
+            }
+            "finish" => {
+                peer.stream.finish().await;
+                settle().await;
+            }
+            "read" => {
+                let mut bytes = Vec::new();
+                let reading = peer.stream.stream().read_to_end(&mut bytes);
+                let read = timeout(LONG_PATIENCE, reading).await;
+                read.map_err(|_| "no end")?.map_err(|_| "no orderly end")?;
+                let (status, part) = rest.split_once(' ').unwrap_or((rest, ""));
+                let text = String::from_utf8_lossy(&bytes);
+                let head = format!("HTTP/1.1 {status} ");
+                if !(text.starts_with(&head) && text.contains(part)) {
+                    return Err(text.into_owned());
+                }
+            }
             "count" => peer.count(given, wanted, &mut self.bound).await?,
             "leave" => {
                 self.peers.remove(name);
@@ -418,127 +379,6 @@ impl World {
             _ => return Err("no step".to_owned()),
         }
         Ok(())
-    }
-}
-
-/// Asks something, and checks the answer.
-async fn ask(
-    peer: &mut Peer,
-    verb: &str,
-    [service, args, text, wanted]: [&str; 4],
-    bound: &mut BTreeMap<String, Value>,
-) -> Result<(), String> {
-    match verb {
-        "call" => {
-            let got = peer.call(service, args).await?;
-            check("{\"result\":true,\"status\":\"\"}", &got, bound)?;
-            let wanted = if wanted.is_empty() { "{}" } else { wanted };
-            check(wanted, &got["values"], bound)?;
-        }
-        "refused" => {
-            let got = peer.call(service, args).await?;
-            let status = got["status"].as_str().unwrap_or_default();
-            if got["result"] != false || wanted.is_empty() || !status.contains(wanted) {
-                return Err(format!("{wanted}: {got}"));
-            }
-        }
-        "goal" => {
-            let goal = json!({"op": "send_action_goal", "id": "the goal", "action": service});
-            let args = format!(",\"args\":{args}}}");
-            peer.send(&goal.to_string().replace('}', &args)).await;
-            let got = peer.next().await?;
-            let refused = r#"{"op":"action_result","id":"the goal","status":0,"result":false}"#;
-            check(refused, &got, bound)?;
-            let why = got["values"].as_str().unwrap_or_default();
-            if wanted.is_empty() || !why.contains(wanted) {
-                return Err(format!("{wanted}: {got}"));
-            }
-        }
-        "error" => {
-            peer.send(text).await;
-            let got = peer.next().await?;
-            let msg = got["msg"].as_str().unwrap_or_default();
-            if got["level"] != "error" || wanted.is_empty() || !msg.contains(wanted) {
-                return Err(format!("{wanted}: {got}"));
-            }
-        }
-        _ => return Err("no question".to_owned()),
-    }
-    Ok(())
-}
-
-/// A number, or the limit of that name.
-fn number(text: &str) -> Option<usize> {
-    let limit = LIMITS.iter().find(|(name, _)| *name == text);
-    limit.map_or_else(|| text.parse().ok(), |(_, limit)| Some(*limit))
-}
-
-/// The text to send.
-fn expand(text: &str, bound: &BTreeMap<String, Value>) -> String {
-    let mut text = text.to_owned();
-    for (name, value) in bound {
-        text = text.replace(&format!("${name}"), &value.to_string());
-    }
-    while let Some((before, rest)) = text.split_once('%') {
-        let (repeated, after) = rest.split_once('%').expect("an end of the repetition");
-        let (count, part) = match repeated {
-            "cr" => ("1", "\r"),
-            "lf" => ("1", "\n"),
-            _ => repeated.split_once('*').expect("a count"),
-        };
-        let count = number(count).expect("a count");
-        text = format!("{before}{}{after}", part.repeat(count));
-    }
-    text
-}
-
-fn check(pattern: &str, got: &Value, bound: &mut BTreeMap<String, Value>) -> Result<(), String> {
-    let wanted = serde_json::from_str(pattern).map_err(|error| format!("{error}: {pattern}"))?;
-    if matches(&wanted, Some(got), bound) {
-        return Ok(());
-    }
-    Err(format!("{pattern}: {got}"))
-}
-
-/// Whether a number is within the range between two texts.
-fn is_within((low, high): (&str, &str), number: f64) -> bool {
-    let bounds = low.parse::<f64>().ok().zip(high.parse::<f64>().ok());
-    bounds.is_some_and(|(low, high)| (low..=high).contains(&number))
-}
-
-fn matches(wanted: &Value, got: Option<&Value>, bound: &mut BTreeMap<String, Value>) -> bool {
-    let Some(got) = got else { return wanted == "-" };
-    match (wanted, got) {
-        (Value::String(text), _) => match text.split_at_checked(1) {
-            Some(("*", "")) => true,
-            Some(("~", part)) => got
-                .as_str()
-                .map_or_else(|| got.to_string(), str::to_owned)
-                .contains(part),
-            Some(("$", name)) => bound.entry(name.to_owned()).or_insert_with(|| got.clone()) == got,
-            _ => {
-                text == got || {
-                    let number = got.as_str().map_or(got.as_f64(), |text| text.parse().ok());
-                    let range = text.split_once("..").zip(number);
-                    range.is_some_and(|(range, number)| is_within(range, number))
-                }
-            }
-        },
-        (Value::Object(members), _) if members.len() == 1 && members.contains_key("=") => {
-            members["="] == *got
-        }
-        (Value::Object(members), Value::Object(_)) => members
-            .iter()
-            .all(|(name, one)| matches(one, got.get(name), bound)),
-        (Value::Array(wanted), Value::Array(got)) => {
-            wanted.len() == got.len()
-                && wanted
-                    .iter()
-                    .zip(got)
-                    .all(|(one, got)| matches(one, Some(got), bound))
-        }
-        (Value::Number(wanted), Value::Number(got)) => wanted.as_f64() == got.as_f64(),
-        (wanted, got) => wanted == got,
     }
 }
 
@@ -594,15 +434,23 @@ async fn run<const N: usize>(file: &str, title: &str, steps: &[Step]) -> Result<
 where
     Gains<N>: Default,
 {
-    let mut world = World::start::<N>().await;
-    let is_guarded = steps
-        .first()
-        .is_some_and(|(_, step)| step.starts_with("options "));
-    for quiet in ["/arm_sim/pause {\"data\":true}", "/arm_sim/reset"] {
-        if !is_guarded {
-            world.step(&format!("first call {quiet}")).await?;
+    let first = steps.first().map_or("", |(_, step)| step);
+    let words: Vec<&str> = first.split(' ').collect();
+    let (mut world, steps) = match words[..] {
+        ["held"] => (World::held(Memory::default()).await, &steps[1..]),
+        ["memory", frames, bytes] => {
+            let room = number(frames).zip(number(bytes)).ok_or("no room")?;
+            (World::held(Memory::of(room.0, room.1)).await, &steps[1..])
         }
-    }
+        ["options", ..] => (World::start::<N>().await, steps),
+        _ => {
+            let mut world = World::start::<N>().await;
+            for quiet in ["/arm_sim/pause {\"data\":true}", "/arm_sim/reset"] {
+                world.step(&format!("first call {quiet}")).await?;
+            }
+            (world, steps)
+        }
+    };
     for (number, line) in steps {
         let at = |why| format!("{file}.txt:{}: {line}: {why}", number + 1);
         world.step(line).await.map_err(at)?;
@@ -682,6 +530,21 @@ fn what_the_arm_publishes_and_refuses() {
 }
 
 #[test]
+fn calls_and_ends_of_connections() {
+    play("connections");
+}
+
+#[test]
+fn room_for_what_is_long() {
+    play("memory");
+}
+
+#[test]
+fn places_and_the_way_to_them() {
+    play("places");
+}
+
+#[test]
 fn goals_of_inverse_kinematics() {
     play("goals");
 }
@@ -709,6 +572,18 @@ fn exchanges_over_websocket() {
 
 #[cfg(feature = "web")]
 #[test]
+fn life_and_ends_of_websockets() {
+    play("sockets");
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn heads_of_requests() {
+    play("heads");
+}
+
+#[cfg(feature = "web")]
+#[test]
 fn requests_over_http() {
     play("http");
 }
@@ -717,7 +592,7 @@ fn requests_over_http() {
 #[test]
 fn every_question_of_rosapi_is_answered_with_the_fields_of_the_catalogue() {
     in_virtual_time(async {
-        let mut peer = World::start::<2>().await.connect("a").await;
+        let mut peer = World::start::<2>().await.connect("a", WIDE).await;
         for question in Rosapi::ALL {
             let service = Service::Rosapi(question);
             let argument = match question {

@@ -97,13 +97,28 @@ where
     stage.registry.send(SetTap(None)).await.unwrap();
 }
 
-/// A random action of a client that changes the arm's steps.
+/// Sends a path of two points, which takes a third of a second.
+async fn follow_path(client: &mut Client, positions: &[f64]) {
+    let names: Vec<String> = (1..=positions.len())
+        .map(|joint| format!("joint{joint}"))
+        .collect();
+    let point = |positions: &[f64], time: u32| json!({"positions": positions, "time_from_start": {"sec": 0, "nanosec": time}});
+    let halfway: Vec<f64> = positions.iter().map(|position| 0.5 * position).collect();
+    let points = [point(&halfway, 150_000_000), point(positions, 350_000_000)];
+    let action = "/joint_trajectory_controller/follow_joint_trajectory";
+    let trajectory = json!({"joint_names": names, "points": points});
+    client
+        .send(&json!({"op": "send_action_goal", "id": "path", "action": action, "args": {"trajectory": trajectory}}))
+        .await;
+}
+
+/// Something that a client may do, out of everything that changes the arm's steps.
 async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::Rng) {
     let mut numbers = |low: f64, high: f64| -> Vec<f64> {
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()
     };
     let (poses, weights) = (numbers(-2.0, 2.0), numbers(0.5, 2.0));
-    let (service, args) = match rng.u32(..16) {
+    let (service, args) = match rng.u32(..17) {
         0 => ("/pid_controller/enable", json!({"data": rng.bool()})),
         1 => ("/pid_controller/set_gains", json!({"kp": weights})),
         2 => (
@@ -138,6 +153,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
             json!({"steps": rng.u32(1..50), "effort": weights}),
         ),
         14 => return client.command_effort(json!(weights)).await,
+        15 => return follow_path(client, &poses).await,
         _ => return client.publish_trajectory(json!(poses)).await,
     };
     client.call(service, args).await;

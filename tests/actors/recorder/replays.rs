@@ -81,7 +81,7 @@ fn the_first_state_that_differs_in_its_last_bit_is_named_with_its_step() {
     let states: Vec<usize> = (0..entries.len())
         .filter(|&at| is_state(&entries[at]))
         .collect();
-    let (before, changed) = (states[10], states[11]);
+    let (before, changed) = (states[1], states[2]);
     let step_of = |entry: &RecordEntry| match entry.content {
         Content::State { step, .. } => step,
         _ => unreachable!(),

@@ -13,9 +13,10 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use crate::askers::{JsonCaller, PATIENCE, PoolBench, ask_as};
+use crate::askers::{PATIENCE, PoolBench, ask_as};
 use crate::stage::{ms, pass};
 use crate::system::in_virtual_time;
+use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmSettings, Consult, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
@@ -25,6 +26,7 @@ use pendularm::actors::compute::study::{
     NotPlanned, PlanRun, PredictStability, RunOffline, Study, SuggestGains,
 };
 use pendularm::actors::compute::workers::WorkerPool;
+use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::node::Unserved;
 use pendularm::actors::resources::work_clock;
 use pendularm::math::arm::{Arm, State};
@@ -101,8 +103,10 @@ fn study<const N: usize>() -> PoolBench<Study<N>> {
 }
 
 /// A client that calls the node.
-fn caller_of<const N: usize>(bench: &PoolBench<Study<N>>) -> JsonCaller {
-    JsonCaller::of(|routes| Study::attach(&bench.node, routes))
+async fn caller_of<const N: usize>(bench: &PoolBench<Study<N>>) -> Peer {
+    let mut nodes = Nodes::default();
+    Study::attach(&bench.node, &mut nodes);
+    Gateway::with(nodes).await.connect(WIDE)
 }
 
 fn gravity(gravity: f64) -> SetParams<2> {

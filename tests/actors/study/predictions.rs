@@ -38,7 +38,7 @@ fn stability_values<const N: usize>(
 
 async fn assert_predictions_are_the_studys<const N: usize>() {
     let bench = study::<N>();
-    let mut client = caller_of(&bench);
+    let mut client = caller_of(&bench).await;
     let Present { control, state } = settings::<N>();
     let expected = limits(&control);
     let motion = Motion::ahead(&control, &state);
@@ -50,7 +50,7 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     let nulls =
         json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
     for args in [json!({}), all, nulls] {
-        assert_eq!(client.values(Service::Stability, &args).await, written);
+        assert_eq!(client.ask(Service::Stability.name(), args).await, written);
     }
 }
 
@@ -91,10 +91,10 @@ fn members_that_are_left_out_of_an_object_are_the_arms_own() {
 fn no_limit_is_null_and_no_stable_timestep_is_zero() {
     in_real_time(async {
         let bench = study::<2>();
-        let mut client = caller_of(&bench);
+        let mut client = caller_of(&bench).await;
         let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
         let args = json!({"gains": none, "params": {"gravity": 0}});
-        let values = client.values(Service::Stability, &args).await;
+        let values = client.ask(Service::Stability.name(), args).await;
         for limit in [
             "timestep_limit_held",
             "timestep_limit_continuous",
@@ -112,7 +112,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
         assert_eq!(values["timestep_limit_motion"], 0.3 / speed);
         assert_eq!(values["advised_timestep"], 0.8 * (0.3 / speed));
         let args = json!({"gains": none, "integrator": "euler"});
-        let values = client.values(Service::Stability, &args).await;
+        let values = client.ask(Service::Stability.name(), args).await;
         assert_eq!(values["timestep_limit_held"], 0.0, "{values}");
         assert_eq!(values["advised_timestep"], 0.0, "{values}");
     });
@@ -124,7 +124,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
 fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
     in_real_time(async {
         let bench = study::<2>();
-        let mut client = caller_of(&bench);
+        let mut client = caller_of(&bench).await;
         let Present { control, state } = settings::<2>();
         let requirements = GainsRequirements {
             settling_time: 4.0,
@@ -134,7 +134,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let suggested = bench.ask(SuggestGains::default()).await.unwrap();
         assert_eq!(suggested.found, found);
         assert_eq!(suggested.timestep, control.timestep);
-        let values = client.values(Service::SuggestGains, &json!({})).await;
+        let values = client.ask(Service::SuggestGains.name(), json!({})).await;
         assert_eq!(values["kp"], json!(found.gains.kp));
         assert_eq!(values["timestep_limit"], json!(found.limit));
         let task = Task {
@@ -148,13 +148,13 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         assert_eq!(run.planned, planned);
         assert_eq!(run.control_period, Some(run.best.timestep));
         let args = json!({"error": 0.05, "servo": true});
-        let values = client.values(Service::Plan, &args).await;
+        let values = client.ask(Service::Plan.name(), args).await;
         let best = planned.best().unwrap();
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
         assert_eq!(
             client
-                .refusal(Service::Plan, &json!({"error": -1, "servo": 1}))
+                .refusal(Service::Plan.name(), json!({"error": -1, "servo": 1}))
                 .await,
             "error must be greater than 0, got -1; servo must be true or false, got 1"
         );
@@ -180,7 +180,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
 fn refused_advice_names_a_field_and_spells_no_number_out() {
     in_real_time(async {
         let bench = study::<2>();
-        let mut client = caller_of(&bench);
+        let mut client = caller_of(&bench).await;
         for (service, args, why) in [
             (
                 Service::SuggestGains,
@@ -193,7 +193,7 @@ fn refused_advice_names_a_field_and_spells_no_number_out() {
                 "error must be larger or duration shorter: the motion itself ",
             ),
         ] {
-            let refused = client.refusal(service, &args).await;
+            let refused = client.refusal(service.name(), args).await;
             assert!(
                 refused.starts_with(why) && !refused.contains("inf"),
                 "{refused}"

@@ -12,7 +12,7 @@ fn joints(values: &Value) -> Vec<[f64; 2]> {
 fn a_rollout_is_the_live_simulation_bit_for_bit() {
     in_real_time(async {
         let bench = study::<2>();
-        let mut client = caller_of(&bench);
+        let mut client = caller_of(&bench).await;
         for method in Method::ALL {
             for controlled in [false, true] {
                 let mut args = json!({"q0": [0.4, -0.3], "qdot0": [0.5, 1], "duration": 1, "timestep": 0.005,
@@ -40,7 +40,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                     position: [1.0, -0.5],
                     velocity: [0.0; 2],
                 });
-                let values = client.values(Service::Rollout, &args).await;
+                let values = client.ask(Service::Rollout.name(), args.clone()).await;
                 let times: Vec<f64> = serde_json::from_value(values["times"].clone()).unwrap();
                 assert_eq!(times.len(), 51);
                 let (positions, velocities) =

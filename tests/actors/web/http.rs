@@ -10,8 +10,6 @@ use pendularm::web::stream::{ANSWER_TIME, IDLE_TIME};
 use tokio::io::{AsyncRead, split};
 
 const HEAD: &str = "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n";
-/// From the first bytes to the end of the head, and to the token.
-const HEAD_TIME: Duration = Duration::from_secs(5);
 
 /// All that comes up to the end of the stream.
 async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
@@ -21,56 +19,6 @@ async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
         .await
         .expect("an orderly end");
     text
-}
-
-#[test]
-fn a_head_that_does_not_come_is_given_up_after_five_seconds() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut stream = connect(&gateway, WIDE);
-        stream.write_all(HEAD.as_bytes()).await.unwrap();
-        let began = Instant::now();
-        // A header line every second is no head either.
-        let dripping = async {
-            for _ in 0..4 {
-                sleep(Duration::from_secs(1)).await;
-                stream.write_all(b"X: y\r\n").await.unwrap();
-            }
-            rest(&mut stream).await
-        };
-        let answer = dripping.await;
-        assert!(answer.starts_with("HTTP/1.1 408 "), "{answer}");
-        assert_elapsed(began, HEAD_TIME);
-        drop(stream);
-        settle().await;
-        assert_eq!(gateway.gauges.connections(), 0);
-    });
-}
-
-#[test]
-fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        let mut silent = connect(&gateway, WIDE);
-        let mut begun = connect(&gateway, WIDE);
-        begun.write_all(b"GE").await.unwrap();
-        let began = Instant::now();
-        let answer = rest(&mut begun).await;
-        assert!(answer.contains("\"level\":\"error\""), "{answer}");
-        assert_elapsed(began, HEAD_TIME);
-        // A stream that can only become JSON, or BSON, has more time: a frame's.
-        let mut open = connect(&gateway, WIDE);
-        open.write_all(b"{").await.unwrap();
-        let began = Instant::now();
-        let answer = rest(&mut open).await;
-        assert!(answer.contains("\"level\":\"error\""), "{answer}");
-        assert_elapsed(began, FRAME_TIME);
-        sleep(Duration::from_secs(24 * 3600)).await;
-        silent.write_all(b"{}\n").await.unwrap();
-        let mut byte = [0];
-        silent.read_exact(&mut byte).await.unwrap();
-        assert_eq!(byte, *b"{");
-    });
 }
 
 /// A report of one file, `a.csv`, that has a length, and no content on the disk: its folder, and the way to it.
@@ -197,22 +145,5 @@ fn a_client_that_takes_a_few_bytes_at_a_time_gets_the_last_answer_whole() {
             assert_eq!(body.len().to_string(), length, "{last}");
         }
         open(&gateway, 16).await;
-    });
-}
-
-#[test]
-fn a_browser_that_does_not_take_its_answer_is_given_up() {
-    in_virtual_time(async {
-        let gateway = Gateway::bare().await;
-        // The answer is longer than the pipe.
-        let mut stream = connect(&gateway, 64);
-        stream
-            .write_all(format!("{HEAD}\r\n").as_bytes())
-            .await
-            .unwrap();
-        settle().await;
-        assert_eq!(gateway.gauges.connections(), 1);
-        sleep(ANSWER_TIME).await;
-        assert_eq!(gateway.gauges.connections(), 0);
     });
 }

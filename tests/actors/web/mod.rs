@@ -5,7 +5,6 @@
 
 #![cfg(feature = "web")]
 
-mod closing;
 mod heads;
 mod http;
 mod messages;
@@ -21,7 +20,6 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::gateway::limits::FRAME_TIME;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::catalog::Service;

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Stdio;
 
 use crate::common::{Logged, PATIENCE, Runtime, program};
-use crate::web_client::{Answer, folder, get, rest};
+use crate::web_client::{Answer, folder, get, handshake, rest, try_handshake};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -99,6 +99,17 @@ fn the_log_names_the_pages_address_at_the_start() {
     let mut runtime = Logged::start(program(), Stdio::null());
     let page = format!("page: http://{}/", runtime.address);
     runtime.await_line(&page);
+}
+
+/// A browser shows nobody the answer to a handshake.
+#[test]
+fn the_log_names_the_option_for_a_foreign_origin() {
+    let mut runtime = Logged::start(program(), Stdio::null());
+    let headers = handshake(runtime.address) + "Origin: https://class.example\r\n";
+    try_handshake(runtime.address, "/", &headers);
+    let line = runtime.await_line("--allow-origin");
+    assert!(line.contains("WARN"), "{line}");
+    assert!(line.contains("https://class.example"), "{line}");
 }
 
 #[test]

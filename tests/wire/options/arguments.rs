@@ -1,48 +1,10 @@
-//! Arguments that do not exist, lack their value or come twice, those that are no text, and any at all.
+//! Arguments that are no text, and any at all. `tests/wire/command/rows.txt` has those that are refused by name.
 
 #[cfg(unix)]
 use std::ffi::OsString;
 
-use super::refusal;
 use pendularm::options::Options;
 use proptest::prelude::*;
-
-#[test]
-fn arguments_that_do_not_exist_are_refused_by_name() {
-    for argument in ["--speed", "-x", "--link"] {
-        let expected = format!(
-            "unexpected argument '{argument}' found; --help lists all commands and options"
-        );
-        assert_eq!(refusal(&[argument]), expected);
-    }
-    assert!(refusal(&["fly"]).starts_with("unrecognized subcommand 'fly'"));
-    assert!(refusal(&["plan", "help"]).starts_with("unexpected argument 'help' found"));
-    assert!(refusal(&["--speed=3"]).starts_with("unexpected argument '--speed' found"));
-    assert!(refusal(&["--links", "2", "3"]).contains("'3' cannot be used with '--links"));
-}
-
-#[test]
-fn an_option_without_its_value_or_given_twice_is_refused_by_name() {
-    for (arguments, expected) in [
-        (
-            &["--links"][..],
-            "a value is required for '--links <N>' but none was supplied",
-        ),
-        (
-            &["--bind", "--links", "2"],
-            "a value is required for '--bind <ADDRESS>' but none was supplied",
-        ),
-        (&["--links="], "--links must be 2 or 3, got \"\""),
-        (
-            &["--links", "2", "--links", "2"],
-            "the argument '--links <N>' cannot be used multiple times",
-        ),
-        (&["--help=3"], "unexpected value '3' for '--help' found"),
-    ] {
-        let refused = refusal(arguments);
-        assert!(refused.starts_with(expected), "{refused}");
-    }
-}
 
 #[cfg(unix)]
 #[test]

@@ -52,14 +52,3 @@ fn help_is_a_command_too() {
     assert_eq!(parse(&["help"]), parse(&["--help"]));
     assert_eq!(parse(&["help", "plan"]), parse(&["plan", "--help"]));
 }
-
-#[test]
-fn the_version_is_the_packages_and_says_what_is_in_this_build() {
-    let web = if cfg!(feature = "web") {
-        "web"
-    } else {
-        "without web"
-    };
-    let expected = format!("pendularm {} ({web})\n", env!("PENDULARM_VERSION"));
-    assert_eq!(parse(&["--version"]), Ok(Parsed::Show(expected)));
-}

@@ -1,0 +1,83 @@
+//! Two nodes that keep their calls until an exchange decides about them, and the counts of a gateway.
+
+use std::sync::Arc;
+
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::memory::Memory;
+use pendularm::actors::wire::Caller;
+use pendularm::protocol::catalog::Service;
+use serde_json::Value;
+
+use super::patterns::{expand, range};
+use crate::virtual_time::{Gateway, Held, Node, settle};
+
+/// The calls of `/arm_sim/integration_step` and of `/arm_sim/set_params`.
+#[derive(Default)]
+pub(super) struct KeptCalls {
+    steps: Held,
+    params: Held,
+    /// A call that was answered and has not ended.
+    answered: Option<Caller>,
+}
+
+impl KeptCalls {
+    /// A gateway with these nodes, whose clients share this room.
+    pub(super) async fn gateway(&self, memory: Memory) -> Gateway {
+        let mut nodes = Nodes::default();
+        Node::holding(&self.steps).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+        Node::holding(&self.params).attach(&mut nodes, &[Service::SetParams], &[]);
+        Gateway::within(memory, nodes).await
+    }
+
+    /// Whether the count of this name is as it is said behind ` = `.
+    pub(super) fn count(&self, gateway: &Gateway, what: &str, wanted: &str) -> Result<(), String> {
+        let gauges = Arc::clone(&gateway.gauges);
+        let count = match what {
+            "connections" => gauges.connections() as usize,
+            "dropped" => gauges.messages_dropped() as usize,
+            "taken" => gauges.memory().taken(),
+            "steps" => self.steps.count(),
+            _ => self.params.count(),
+        };
+        let wanted = wanted.strip_prefix("= ").and_then(range);
+        let (low, high) = wanted.ok_or("no count")?;
+        let is_right = (low..=high).contains(&count);
+        is_right.then_some(()).ok_or(format!("{count}"))
+    }
+
+    /// Decides about the oldest call of a node: `steps` or `params`, and the text of the answer or of the refusal.
+    pub(super) async fn decide(&mut self, how: &str, rest: &str) -> Result<(), String> {
+        let (node, text) = rest.split_once(' ').unwrap_or((rest, "{}"));
+        let node = if node == "steps" {
+            &self.steps
+        } else {
+            &self.params
+        };
+        if node.count() == 0 {
+            return Err("no call".to_owned());
+        }
+        let mut caller = node.take();
+        match how {
+            "answer" | "reply" => {
+                let values = serde_json::from_str::<Value>(&expand(text, &Default::default()));
+                caller.succeed(&values.map_err(|error| error.to_string())?);
+            }
+            "refuse" => caller.refuse(text),
+            "gone" if !caller.is_gone() => return Err("it is waited for".to_owned()),
+            _ => {}
+        }
+        if how == "reply" {
+            self.answered = Some(caller);
+        } else {
+            drop(caller);
+        }
+        settle().await;
+        Ok(())
+    }
+
+    /// Ends the call that was answered.
+    pub(super) async fn release(&mut self) {
+        self.answered = None;
+        settle().await;
+    }
+}
