@@ -9,7 +9,6 @@
 //! | `a > text` | client `a` sends this frame; clients whose names begin with `w` use WebSocket |
 //! | `a bytes text` | client `a` sends this text without a line end |
 //! | `w raw text` | sends the bytes of this text, which has the escapes of JSON: `\u0089` is one byte |
-//! | `w pinged` | the next that comes is a ping |
 //! | `a < pattern` | the next frame that `a` receives matches |
 //! | `a << pattern` | a later frame matches; the frames before it are dropped |
 //! | `a ~ text` | the frame that `a` received last contains this text, byte by byte |
@@ -305,12 +304,6 @@ impl World {
                         .map_err(|error| error.to_string())?;
                 let bytes: Vec<u8> = text.chars().map(|one| one as u8).collect();
                 peer.stream.send_bytes(&bytes).await;
-            }
-            "pinged" => {
-                let event = peer.stream.next_event().await;
-                if !matches!(event, Ok(Event::Ping(_))) {
-                    return Err(format!("{event:?}"));
-                }
             }
             "<" => {
                 let got = peer.next().await?;

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use pendularm::actors::gateway::connection::admission::{MAX_UNAUTHENTICATED, WRONG_TOKEN_TIME};
+use pendularm::actors::gateway::connection::admission::{
+    MAX_AUTH_BYTES, MAX_NEWCOMERS, WRONG_TOKEN_TIME,
+};
 use pendularm::actors::gateway::limits::{
     DEFAULT_TIMEOUT, ENTRY_BYTES, FRAME_TIME, HEAD_TIME, KEPT_PLACES, LINGER,
     MAX_COMPUTATIONS_WAITING, MAX_KEPT, MAX_RESPONSES_WAITING, OPENING_TIME, RESPONSES_TIME,
@@ -12,7 +14,6 @@ use pendularm::actors::gateway::limits::{
 use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
 use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME, MEDIUM, SHORT};
-use pendularm::protocol::op::MAX_ARGS;
 use pendularm::protocol::op::follow::MAX_POINTS;
 use pendularm::protocol::ros::parameters::MAX_NAMED;
 #[cfg(feature = "web")]
@@ -30,8 +31,8 @@ const LIMITS: &[(&str, usize)] = &[
     ("KEPT_OF_1000", MAX_KEPT / (ENTRY_BYTES + 3 * 1000)),
     ("KEPT_PLACES", KEPT_PLACES),
     ("LINGER", ms(LINGER)),
-    ("MAX_ARGS", MAX_ARGS),
     ("MAX_COMPUTATIONS_WAITING", MAX_COMPUTATIONS_WAITING),
+    ("MAX_AUTH_BYTES", MAX_AUTH_BYTES),
     ("MAX_FRAME", MAX_FRAME),
     ("MAX_FRAMES", MAX_FRAMES),
     #[cfg(feature = "web")]
@@ -42,7 +43,7 @@ const LIMITS: &[(&str, usize)] = &[
     ("MAX_NAMED", MAX_NAMED),
     ("MAX_POINTS", MAX_POINTS),
     ("MAX_RESPONSES_WAITING", MAX_RESPONSES_WAITING),
-    ("MAX_UNAUTHENTICATED", MAX_UNAUTHENTICATED),
+    ("MAX_NEWCOMERS", MAX_NEWCOMERS),
     ("MAX_WISHES", MAX_WISHES),
     ("MEDIUM", MEDIUM),
     ("OPENING_TIME", ms(OPENING_TIME)),
