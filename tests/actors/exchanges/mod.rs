@@ -74,7 +74,6 @@ use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
 #[cfg(feature = "web")]
 use pendularm::web::{Site, access::Access};
-use pendularm_client::codec::Event;
 use pendularm_client::pipe;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
