@@ -412,7 +412,7 @@ impl Payload {
         counts + size_of::<Inner>() + self.get().len() + line
     }
 
-    /// The text as it is written: [strict](strict), on one line.
+    /// The text as it is written: [strict], on one line.
     #[must_use]
     pub fn line(&self) -> &str {
         self.written().get()
