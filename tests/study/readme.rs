@@ -144,10 +144,10 @@ fn the_plans_of_the_study_are_runs() {
         error: 0.01,
     };
     for (task, before, method) in [
-        (servo, "take Euler ", Method::Euler),
+        (servo, "the plan is Euler with ", Method::Euler),
         (
             falling(Arm::default(), 10.0, 1e-6),
-            "takes RK4 ",
+            "the plan is RK4 with ",
             Method::Rk4,
         ),
     ] {
