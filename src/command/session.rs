@@ -50,11 +50,10 @@ pub struct RuntimeOptions {
     )]
     #[arg(value_parser = ValueReader(read_address))]
     connect: String,
-    /// Longest wait for an answer or the next message, in seconds; without it there is no limit,
-    /// except 5 s for the connection
+    /// Longest wait for an answer or message, in seconds; without it only connecting has a limit, 5 s
     #[arg(long, global = true, value_name = "SECONDS", value_parser = ValueReader(read_positive))]
     timeout: Option<f64>,
-    /// The runtime's token; prefer the variable, because other users can see options
+    /// The runtime's token; safer in the variable, since users can see options
     #[arg(long, global = true, value_name = "TOKEN", env = "ARM_SIM_TOKEN")]
     #[arg(value_parser = ValueReader(|text| Token::new(text).map_err(|why| why.to_string())))]
     token: Option<Token>,
