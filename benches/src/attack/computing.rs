@@ -64,9 +64,7 @@ pub const ATTACKS: &[Attack] = &[
                 .returns()
                 .times(20)
         },
-    )
-    // A client that has stopped sending keeps its place until its computations are done, for 15 s at most.
-    .fills(),
+    ),
     Attack::new(
         "busy",
         "200 clients ask for a computation without end",

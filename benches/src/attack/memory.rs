@@ -152,8 +152,7 @@ pub const ATTACKS: &[Attack] = &[
                 })
                 .collect()
         },
-    )
-    .fills(),
+    ),
 ];
 
 fn deaf_topics() -> Vec<Client> {
