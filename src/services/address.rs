@@ -65,12 +65,6 @@ impl Address {
         messages::response(&self.name, self.id.as_ref(), values, is_good, status)
     }
 
-    /// The response with values that may be long: about `bytes` of them.
-    #[must_use]
-    pub fn long_response(&self, values: &impl Serialize, bytes: usize) -> Bytes {
-        messages::long_response(&self.name, self.id.as_ref(), values, true, "", bytes)
-    }
-
     /// The response `result: false` without values.
     #[must_use]
     pub fn failure(&self, why: &str) -> Bytes {

@@ -134,21 +134,7 @@ pub fn response(
     result: bool,
     status: &str,
 ) -> Bytes {
-    long_response(service, id, values, result, status, USUAL_FRAME)
-}
-
-/// The same for an answer of about `bytes`. A long text that grew would pass through ever larger blocks, which the
-/// allocator keeps; one block of its size goes back to the system.
-#[must_use]
-pub fn long_response(
-    service: &str,
-    id: Option<&Payload>,
-    values: &impl Serialize,
-    result: bool,
-    status: &str,
-    bytes: usize,
-) -> Bytes {
-    Encoder::with_room("service_response", bytes)
+    Encoder::op("service_response")
         .text("service", service)
         .optional("id", id)
         .value("values", values)

@@ -3,7 +3,7 @@
 //! **Invariant:** a worker parses the formula's text, and writes the response. No actor's thread does.
 
 use bytes::Bytes;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use crate::actors::node::Ask;
 use crate::actors::wire::{Address, Answered, Callable};
@@ -12,7 +12,6 @@ use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::study::NUMBER_BYTES;
 
 /// Integrates a particle of one degree of freedom. One bad field rejects the whole request.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -68,7 +67,7 @@ impl Answered for IntegrationStep {
         /// The samples, in the order of the documentation.
         #[derive(Serialize)]
         struct Samples<'a> {
-            times: Times<'a>,
+            times: Vec<f64>,
             positions: &'a [f64],
             velocities: &'a [f64],
         }
@@ -78,20 +77,10 @@ impl Answered for IntegrationStep {
         };
         let positions = particle.positions();
         let samples = Samples {
-            times: Times(&particle),
+            times: (0..positions.len()).map(|at| particle.time(at)).collect(),
             positions,
             velocities: particle.velocities(),
         };
-        to.long_response(&samples, 3 * NUMBER_BYTES * positions.len())
-    }
-}
-
-/// The time of each sample.
-struct Times<'a>(&'a Particle);
-
-impl Serialize for Times<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let samples = 0..self.0.positions().len();
-        serializer.collect_seq(samples.map(|at| self.0.time(at)))
+        to.response(&samples, "")
     }
 }
