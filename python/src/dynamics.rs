@@ -1,6 +1,6 @@
 //! The equation of motion and the kinematics, for one state or for many.
 //!
-//! **Invariant:** the functions are those that step the live arm. There is no second implementation.
+//! **Invariant:** the same functions step the live arm. There is no second implementation.
 
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::{self, dynamics, kinematics};

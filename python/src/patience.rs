@@ -49,7 +49,7 @@ pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T
 /// A signal's handler that runs during its thread's turn shares this turn. Otherwise it would wait for itself.
 #[derive(Debug, Default)]
 pub(crate) struct Turns {
-    /// The thread that has the turn, and those that wait.
+    /// The thread that has the turn, and the threads that wait.
     line: Mutex<VecDeque<ThreadId>>,
     moved: Condvar,
 }

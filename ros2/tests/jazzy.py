@@ -1,6 +1,6 @@
 """Type hashes by ROS 2 Jazzy itself: jazzy.py PENDULARM_INTERFACES ANSWER.
 
-The hashes are those in its built packages, and those that its generator computes from definitions. Both come from
+The hashes are in its built packages, or its generator computes them from definitions. Both come from
 PyPI, as packages `ros-...` (jazzy.txt). The answer is a file with the names of types and their hashes. Standard
 output is the generator's.
 """

@@ -153,7 +153,7 @@ impl Client {
         self.repeats_bytes(&bytes.repeat(times))
     }
 
-    /// Sends at most so many bytes every `pause`.
+    /// Sends at most this number of bytes every `pause`.
     pub fn drips(mut self, bytes: usize, pause: Duration) -> Self {
         self.drip = Some((bytes, pause));
         self

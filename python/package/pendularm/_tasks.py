@@ -42,7 +42,7 @@ class Task:
     """Arms with the same task: starts, observations and rewards."""
 
     strength: ClassVar[float]
-    """Efforts of an action of 1, relative to those that hold the stretched arm."""
+    """Efforts of an action of 1, relative to the efforts that hold the stretched arm."""
     most_steps: ClassVar[int]
     """Default number of steps after which an episode is truncated."""
 

@@ -12,7 +12,7 @@ use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::pid::{Control, Pid};
 
-/// Most steps of a control period. Whole numbers up to it are exact as `f64`, and so many steps take years.
+/// Most steps of a control period. Whole numbers up to it are exact as `f64`, and this number of steps takes years.
 const MOST_STEPS: u64 = 1 << 53;
 
 /// The time between two runs of the law, and whether their results are delayed.

@@ -348,39 +348,32 @@ impl Outbox {
             let Some(limits) = self.limits.get_mut(topic) else {
                 return;
             };
-            if !limits.held.is_empty() || !limits.is_due(now) {
-                return self.hold_back(topic, frames, is_series, now);
-            }
-            limits.last = Some(now);
-            let frame = frames.split_to(first_message(&frames));
-            self.enqueue(Some(topic), now, by_itself(frame, is_series));
-        }
-    }
-
-    /// Holds back the newest of these messages, as many as the throttle may.
-    fn hold_back(&mut self, topic: &Arc<str>, mut frames: Bytes, is_series: bool, now: Instant) {
-        let Some(limits) = self.limits.get_mut(topic) else {
-            return;
-        };
-        if is_series {
-            frames = last_messages(frames, limits.throttle.held_back);
-        }
-        for frame in messages(frames) {
-            if frame.len() > MEDIUM && !limits.may_hold_long(now) {
-                self.dropped += 1;
+            if limits.held.is_empty() && limits.is_due(now) {
+                limits.last = Some(now);
+                let frame = frames.split_to(first_message(&frames));
+                self.enqueue(Some(topic), now, by_itself(frame, is_series));
                 continue;
             }
-            self.produced += 1;
-            let message = QueuedMessage {
-                number: self.produced,
-                since: now,
-                topic: Some(Arc::clone(topic)),
-                frame: by_itself(frame, is_series),
-            };
-            self.held.add(&message);
-            limits.held.push_back(message);
+            if is_series {
+                frames = last_messages(frames, limits.throttle.held_back);
+            }
+            for frame in messages(std::mem::take(&mut frames)) {
+                if frame.len() > MEDIUM && !limits.may_hold_long(now) {
+                    self.dropped += 1;
+                    continue;
+                }
+                self.produced += 1;
+                let message = QueuedMessage {
+                    number: self.produced,
+                    since: now,
+                    topic: Some(Arc::clone(topic)),
+                    frame: by_itself(frame, is_series),
+                };
+                self.held.add(&message);
+                limits.held.push_back(message);
+            }
+            limits.trim(&mut self.held);
         }
-        limits.trim(&mut self.held);
     }
 
     /// Takes all that is held back of a topic, oldest first; its throttle stays.

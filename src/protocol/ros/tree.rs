@@ -50,7 +50,7 @@ impl<'a> MessageTree<'a> {
     #[must_use]
     pub fn room(text: &[u8]) -> usize {
         let is_in_front = |byte: &u8| u8::from(matches!(byte, b',' | b':' | b'[' | b'{'));
-        // The counts of a chunk are sums in bytes, so many are added at a time. No chunk has more than 255 of them.
+        // The counts of a chunk are sums in bytes: many are added at a time. No chunk has more than 255 of them.
         let chunks = text.chunks(usize::from(u8::MAX));
         let counts = chunks.map(|chunk| chunk.iter().map(is_in_front).sum::<u8>());
         let in_front: usize = counts.map(usize::from).sum();

@@ -16,6 +16,7 @@ use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
+use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// Steps of the coarsest run of a row: a power of two, so that the timesteps of a duration that is one too are exact.
@@ -165,9 +166,7 @@ fn arm_scene<const N: usize>(
         limits: Vec::new(),
         task: Task {
             duration: ARM_DURATION,
-            uncertainty: times
-                .map(|time| reference.uncertainty(time))
-                .fold(0.0, f64::max),
+            uncertainty: largest(times.map(|time| reference.uncertainty(time))),
             looks: LOOKS,
             unit: 1,
             ready: Box::new(move |method, steps| {

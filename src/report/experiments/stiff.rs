@@ -183,7 +183,7 @@ impl StiffScene {
     }
 }
 
-/// A run of a solver with so many steps, before its first.
+/// A run of a solver with this number of steps, before its first.
 fn ready(control: &ControlLoop<2>, solver: Solver, steps: u64) -> Box<dyn TaskRun> {
     let h = DURATION / in_f64(steps);
     let step: fn(&mut Implicit) -> Option<Whole> = match solver {

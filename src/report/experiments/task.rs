@@ -89,8 +89,8 @@ impl<S: Copy> Task<S> {
         }
     }
 
-    /// The run with the fewest steps that keeps within `most`, of those that a search tries between `first` and `last`
-    /// steps, to a `part` of them: see [`fewest`].
+    /// The run with the fewest steps that keeps within `most`. A search tries step counts between `first` and `last`,
+    /// to a `part` of them: see [`fewest`].
     #[must_use]
     pub fn fewest(
         &self,

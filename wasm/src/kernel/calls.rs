@@ -13,7 +13,7 @@ use pendularm::services::arm::{
 };
 use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
-    Computed, PlanRun, PredictStability, RunOffline, SuggestGains, Work,
+    Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
 use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
 use pendularm::services::{Address, Answered, NoService};
@@ -137,7 +137,7 @@ impl<const N: usize> Kernel<N> {
         service: Service,
         args: &Arguments,
         to: Address,
-        work: impl FnOnce(A, pendularm::services::study::Present<N>) -> W,
+        work: impl FnOnce(A, Present<N>) -> W,
     ) {
         match A::read(service, args) {
             Ok(ask) => {

@@ -53,7 +53,7 @@ const GRAIN: Duration = Duration::from_millis(20);
 /// Most entries of the history of writing: 5 s of it.
 const MAX_HISTORY: usize = 256;
 
-/// Counts bytes that were written to a client, and those that it has read.
+/// Counts bytes that were written to a client, and the bytes that it has read.
 pub(super) struct FlowControl {
     source: UnreadSource,
     /// Bytes written so far.

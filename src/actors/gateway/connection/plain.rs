@@ -40,24 +40,24 @@ pub(super) fn yield_turn(cx: &mut Context<'_>) {
     let _ = pin!(tokio::task::yield_now()).poll(cx);
 }
 
-/// Appends the available bytes to `chunk`, at most so many; 0 at the end of the stream.
+/// Appends the available bytes to `chunk`, at most `most` of them; 0 at the end of the stream.
 pub(super) fn poll_read<S: AsyncRead + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,
     chunk: &mut BytesMut,
     most: usize,
 ) -> Poll<io::Result<usize>> {
-    chunk.reserve(most);
-    pin!(stream.read_buf(&mut chunk.limit(most))).poll(cx)
+    pin!(read_some(stream, chunk, most)).poll(cx)
 }
 
-/// Appends the available bytes to `chunk`, for a task of its own; 0 at the end of the stream.
+/// The same for a task of its own.
 pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream: &mut S,
     chunk: &mut BytesMut,
+    most: usize,
 ) -> io::Result<usize> {
-    chunk.reserve(CHUNK);
-    stream.read_buf(chunk).await
+    chunk.reserve(most);
+    stream.read_buf(&mut chunk.limit(most)).await
 }
 
 /// Writes some of `frames`, in order, and gives the number of bytes.

@@ -343,7 +343,7 @@ impl ClientReader {
         let Some(mut performer) = self.performer.take() else {
             return false;
         };
-        performer.give_back(self.is_long_coming());
+        performer.give_back(self.is_coming(MEDIUM));
         self.waits_since = None;
         let cut = match self.messages.pop_front() {
             Some((message, permit)) => {
@@ -357,7 +357,7 @@ impl ClientReader {
         }
         let Some(cut) = cut else {
             self.is_cut = true;
-            if performer.permit.is_none() && self.is_long_coming() {
+            if performer.permit.is_none() && self.is_coming(MEDIUM) {
                 self.frame_due = None;
                 self.room = Some(Box::pin(performer.room()));
             }
@@ -373,9 +373,9 @@ impl ClientReader {
         true
     }
 
-    /// Whether a frame has begun that takes room.
-    fn is_long_coming(&self) -> bool {
-        self.frames.is_unfinished() && self.frames.buffered() > MEDIUM
+    /// Whether a frame has begun, and its buffer is longer than this.
+    fn is_coming(&self, longer_than: usize) -> bool {
+        self.frames.is_unfinished() && self.frames.buffered() > longer_than
     }
 
     /// The end of the stream. A frame that has begun there is incomplete.
@@ -400,8 +400,11 @@ impl ClientReader {
         let Some(transport) = &mut connection.transport else {
             return Poll::Ready(Err(ClientLost::Gone));
         };
-        let is_long = self.frames.is_unfinished() && self.frames.buffered() > CHUNK;
-        let most = if is_long { LONG_CHUNK } else { CHUNK };
+        let most = if self.is_coming(CHUNK) {
+            LONG_CHUNK
+        } else {
+            CHUNK
+        };
         if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk, most) {
             return Poll::Ready(read.map(Some));
         }
@@ -417,7 +420,7 @@ impl ClientReader {
             if late.is_some_and(|late| late <= Instant::now()) {
                 return Poll::Ready(transport.give_up(TOO_SLOW).map(|()| None));
             }
-            let is_coming = self.is_long_coming();
+            let is_coming = self.is_coming(MEDIUM);
             if let Some(performer) = &mut self.performer {
                 performer.fragments.forget_old(Instant::now().into_std());
                 performer.give_back(is_coming);

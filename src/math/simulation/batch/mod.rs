@@ -26,7 +26,7 @@ use crate::math::number::Registers;
 /// these evaluations alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// Most arms that wait for a lane. With so many, empty lanes at the end have little effect.
+/// Most arms that wait for a lane. With this number, empty lanes at the end have little effect.
 const QUEUE: usize = 1024;
 
 impl Registers {

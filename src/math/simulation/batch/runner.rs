@@ -23,7 +23,7 @@ const K: usize = 2;
 /// Pairs of registers that take each step in turn.
 pub(super) const PAIRS: usize = 2;
 
-/// The arms of one kind: those in the lanes of a few pairs, and those that wait for a lane.
+/// The arms of one kind: some are in the lanes of a few pairs, and the others wait for a lane.
 pub(super) struct BatchRunner<'q, 'a, S: Simd, const N: usize> {
     pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     /// The arm in each lane, pair after pair.

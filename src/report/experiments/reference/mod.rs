@@ -181,7 +181,7 @@ impl<const N: usize> ReferenceMotion<N> {
         let (piece, after) = at(&self.fine, time.into());
         let zeros = [Real::ZERO; N];
         // The derivative of Horner's rule, beside it.
-        let (_, rate) = piece
+        let (change, rate) = piece
             .change
             .iter()
             .rev()
@@ -191,7 +191,7 @@ impl<const N: usize> ReferenceMotion<N> {
                 (sum.map(|sum| sum * after), rate)
             });
         State {
-            position: self.angles(time).map(Real::to_f64),
+            position: plus(&piece.position, &change).map(Real::to_f64),
             velocity: rate.map(Real::to_f64),
         }
     }
