@@ -1,26 +1,26 @@
 //! The two ends of a connection.
 //!
-//! **Invariant:** where one end is not known, the client counts as one of the same machine.
+//! **Invariant:** if one end is unknown, the client counts as local.
 
 use std::net::{Ipv4Addr, SocketAddr};
 
-/// The addresses between which a client has connected.
+/// The two addresses of a client's connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ends {
-    /// Ours.
+    /// The runtime's.
     pub local: SocketAddr,
     /// The client's.
     pub peer: SocketAddr,
 }
 
-/// Unknown ends: those of a client of the same machine.
+/// Unknown ends, as of a local client.
 impl Default for Ends {
     fn default() -> Self {
         SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into()
     }
 }
 
-/// A client of the same machine.
+/// A local client.
 impl From<SocketAddr> for Ends {
     fn from(local: SocketAddr) -> Self {
         let peer = local;

@@ -1,16 +1,16 @@
-//! Open files: as many as all clients need, or as many clients as there are files for.
+//! The limit of open files, and the number of connections that it allows.
 //!
-//! Every client is an open file. A process usually may have 1,024 of them and is allowed to ask for more. Where it is
-//! not, fewer clients are served: even one too many needs a file, to be sent the reason.
+//! Every client is an open file. A process usually may have 1,024 of them, and may raise that limit. If it may not,
+//! fewer clients are served. A refused client needs a file too, to receive the reason.
 //!
-//! **Invariant:** the clients that are served never need all files that there may be.
+//! **Invariant:** the served clients never use all files that may be open.
 
 use super::connection::admission::MAX_NEWCOMERS;
 
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
-/// report, and the clients that are just being refused for being too many.
+/// report, and clients that are being refused.
 pub const OTHER_FILES: usize = 32;
-/// Files that are asked for beyond that, so that many clients can be refused at once.
+/// Additional files, so that many clients can be refused at once.
 const REFUSED_AT_ONCE: usize = 480;
 
 /// How many connections there can be.
@@ -18,16 +18,16 @@ const REFUSED_AT_ONCE: usize = 480;
 pub struct Room {
     /// Clients that are served.
     pub clients: usize,
-    /// Connections that have not shown the token yet, or for which no place is free; they are counted apart.
+    /// Connections without a token yet, or without a free place. They are counted separately.
     pub newcomers: usize,
 }
 
-/// Raises the limit of open files as far as `wanted_clients` need and the system allows. Returns how many connections
-/// there can be. They are fewer where the limit stays too low, which is logged.
+/// Raises the limit of open files as far as `wanted_clients` need and the system allows. Returns the number of possible
+/// connections, and logs a warning if the limit reduces it.
 #[must_use]
 pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
     let wanted = wanted_clients + MAX_NEWCOMERS + OTHER_FILES + REFUSED_AT_ONCE;
-    // It is never lowered.
+    // The limit is never lowered.
     match raise_limit(wanted) {
         Ok(files) => {
             let room = room_with(files, wanted_clients, asks_token);
@@ -36,7 +36,7 @@ pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
                 tracing::warn!(
                     files,
                     clients,
-                    "few files may be open, so few clients are served"
+                    "the limit of open files is low, so fewer clients are served"
                 );
             }
             room
@@ -48,7 +48,7 @@ pub fn make_room(wanted_clients: usize, asks_token: bool) -> Room {
     }
 }
 
-/// Raises the limit to `wanted` or the most that is allowed. Returns how many files may be open now.
+/// Raises the limit to `wanted` or the largest allowed value. Returns the new limit.
 #[cfg(unix)]
 fn raise_limit(wanted: usize) -> std::io::Result<usize> {
     let files = rlimit::increase_nofile_limit(wanted as u64)?;
@@ -61,8 +61,8 @@ fn raise_limit(_: usize) -> std::io::Result<usize> {
     Ok(usize::MAX)
 }
 
-/// Counts the places that `files` open files allow: at least one client. Where a token is asked for and files are few,
-/// those without the token have half of them.
+/// Returns the places that `files` open files allow, for at least one client. If a token is required and files are few,
+/// newcomers get half of the files.
 #[must_use]
 pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room {
     let files = files.saturating_sub(OTHER_FILES);
@@ -84,7 +84,7 @@ pub fn room_with(files: usize, wanted_clients: usize, asks_token: bool) -> Room 
 mod tests {
     use super::*;
 
-    /// More than the 1,024 files that a process usually may have.
+    /// More than the usual limit of 1,024 files.
     const WANTED: usize = 2000;
 
     fn clients_with(files: usize) -> usize {

@@ -1,7 +1,7 @@
-//! Limits that several parts of the gateway keep, and those that tests name, whose files are private; and their sum.
+//! Limits that several parts of the gateway share, limits that tests read, and the sum of all of them.
 //!
-//! **Invariant:** nothing of the gateway is imported here, so that every part of it can import this; and all clients
-//! together take no more memory than [`MAX_MEMORY`].
+//! **Invariant:** this module imports nothing from the gateway, so every part of it can import this module. All clients
+//! together take at most [`MAX_MEMORY`] bytes.
 
 use std::time::Duration;
 
@@ -11,13 +11,12 @@ use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 const KIB: usize = 1024;
 
-/// Bytes that the program has resident at most with the default number of places. The system's
-/// buffers for sockets are not in it.
+/// Largest resident size of the program with the default number of places \[bytes\]. It excludes the system's socket
+/// buffers.
 pub const MAX_MEMORY: usize = 640 * KIB * KIB;
-/// Bytes of one client at most, without long frames and answers. They are its input, as it comes and as a frame,
-/// pieces of a message, and topic messages that wait or are being written. Responses and computations count with
-/// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are in it
-/// too.
+/// Most bytes of one client, without long frames and answers. The sum has its input (received bytes and a frame),
+/// the pieces of a message, and topic messages that wait or are being written. Responses and computations count with
+/// one more than may wait. The entries of the registry, a WebSocket's buffers and the idle connection are included.
 pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + SHORT
     + MAX_TOPIC_BYTES
@@ -27,8 +26,8 @@ pub const CLIENT_BYTES: usize = 2 * MEDIUM
     + 2 * SHORT
     + MAX_KEPT
     + 96 * KIB;
-/// Bytes that a long frame takes at most: as it comes, as a message, as text, as a value, as the frame that is sent
-/// on, and that in another form.
+/// Most bytes of a long frame. It exists as received bytes, as a message, as text, as a value, as the forwarded frame,
+/// and as that frame in another form.
 pub const LONG_FRAME_BYTES: usize = 6 * MAX_FRAME;
 /// Bytes of the program itself, and of the trees of messages that are being encoded.
 const PROGRAM_BYTES: usize = 40 * KIB * KIB;
@@ -37,46 +36,45 @@ const _: () = assert!(
         <= MAX_MEMORY
 );
 
-/// The most places that are kept for HTTP, WebSocket and the program's own commands. Few clients have fewer.
+/// Most places that are kept for HTTP, WebSocket and the program's own commands. A small `--clients` keeps fewer.
 pub const KEPT_PLACES: usize = 16;
-/// How long a client has to show that it may use a kept place, where no other place is free. A kept place that is taken
-/// may become free in this time too.
+/// Time for a client to show that it may use a kept place, if no other place is free. A client also waits this long for
+/// a kept place to become free.
 pub const OPENING_TIME: Duration = Duration::from_secs(1);
-/// While more bytes of responses than this wait, the client is not read and none of its computations starts.
+/// While more response bytes than this wait, the client is not read and none of its computations starts.
 pub const MAX_RESPONSES_WAITING: usize = SHORT;
-/// How long a provider may take where its caller sets no timeout.
+/// Timeout of a forwarded call if its caller sets none.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
-/// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
-/// answers to its own calls) is refused. The connection is not read at that point, but others would go on sending to
-/// it.
+/// Bytes of responses that may wait for one connection. Above this limit, calls to it as a provider and answers to its
+/// own calls are refused. At that point the connection is not read, but other clients could still send to it.
 pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 /// Bytes that the registry keeps of one connection: subscriptions, advertisements, services, and calls and goals that
 /// wait for other clients.
 pub const MAX_KEPT: usize = 128 * 1024;
-/// Bytes that each of these takes beside three times its names: its places in the tables.
+/// Bytes of each entry in the tables, without three times its names.
 pub const ENTRY_BYTES: usize = 640;
-/// How long a request may take from its first bytes to the end of its head, and a client from connecting to its
-/// token. It is enough for a slow line, and too little to hold a place with.
+/// Timeout of a request's head from its first bytes, and of a client's token from the connection. It is enough for a
+/// slow line, and too short to occupy a place.
 pub const HEAD_TIME: Duration = Duration::from_secs(5);
-/// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
-/// end of the stream itself may take.
+/// Timeout of a client that has stopped sending and takes no byte of the remaining topic messages. Also the timeout of
+/// the end of the stream.
 pub const LINGER: Duration = Duration::from_secs(5);
-/// A client that takes no byte in this time is disconnected, while responses wait or a topic message that takes shared
-/// room.
+/// A client that takes no byte in this time is disconnected, if responses or a long topic message wait. A long message
+/// occupies shared memory.
 pub const STALL_LIMIT: Duration = Duration::from_secs(20);
-/// How long a frame may take from its first byte to its last, while the rest of it is waited for. A skipped frame has
-/// no limit. The slowest line by which anybody would steer an arm needs less.
+/// Timeout of a frame from its first byte to its last, while the reader waits for the rest. A skipped frame has no
+/// timeout. The slowest line that can control an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
-/// How long responses that are not ready yet are kept for a client that has stopped sending: longer than other clients
-/// usually have for theirs. The client may be gone altogether, which shows only when something is sent to it.
+/// Timeout of pending responses to a client that has stopped sending. It is longer than [`DEFAULT_TIMEOUT`]. The client
+/// may have disconnected, which is detected only by sending to it.
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
-/// Bytes offered in one write; then the other connections have a turn.
+/// Bytes offered in one write. Then other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames of a chunk after which the reader yields.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
-/// How long after their time pieces of a message are forgotten, and how often a client without a place asks again.
+/// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Computations of one connection that wait at most behind the one that runs. The client is not read meanwhile.
+/// Most waiting computations of one connection, besides the running one. At this limit the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

@@ -1,7 +1,7 @@
 //! Accepts clients and gives each its connection actor.
 //!
-//! **Invariant:** an error of `accept` (too many open files, a client gone already) never ends the listening and never
-//! spins.
+//! **Invariant:** an error of `accept`, such as too many open files or a client that has disconnected, never ends the
+//! accept loop. The loop never spins.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -17,16 +17,16 @@ use super::ends::Ends;
 use super::registry::Registry;
 use crate::actors::resources::gauges::Gauges;
 
-/// Bytes that the system keeps for a client that does not read, beside as many of its own.
+/// Bytes of the socket's send buffer. Linux allocates twice as much.
 pub const SEND_BUFFER: u32 = 128 * 1024;
 /// Connections that wait to be accepted.
 pub const BACKLOG: u32 = 1024;
-/// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
+/// Pause of the accept loop after an error. It prevents a busy loop, and clients do not notice it.
 const BACKOFF: Duration = Duration::from_millis(50);
-/// After this time of silence a client's machine is asked whether it is still there. That is seldom enough to cost
-/// nothing, and often enough for a router in between to keep the connection.
+/// Silence of a client before the first TCP keepalive probe. The cost is negligible, and routers do not drop the
+/// connection in this time.
 pub const KEEPALIVE_IDLE: Duration = Duration::from_secs(60);
-/// Time between two such questions, and how many may go unanswered: a client survives half a minute without a network.
+/// Time between two probes, of which [`KEEPALIVE_PROBES`] may fail. A client survives half a minute without a network.
 pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(15);
 /// See [`KEEPALIVE_INTERVAL`].
 pub const KEEPALIVE_PROBES: u32 = 4;
@@ -42,13 +42,13 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// A listener on a socket that is bound already; nothing is asked of its clients first.
+    /// A listener on a bound socket. It requires no token.
     #[must_use]
     pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
         Self::with(Arc::default(), socket, registry, gauges)
     }
 
-    /// A listener that admits clients on these conditions.
+    /// A listener that admits clients under these conditions.
     #[must_use]
     pub fn with(
         admission: Arc<Admission>,
@@ -106,7 +106,7 @@ async fn accept(
     gauges: Arc<Gauges>,
     admission: Arc<Admission>,
 ) {
-    // Logged once, not twenty times a second.
+    // An error is logged once, not twenty times a second.
     let mut failing = false;
     loop {
         match socket.accept().await {
@@ -115,7 +115,7 @@ async fn accept(
                     tracing::info!("clients are accepted again");
                 }
                 if let Err(error) = prepare(&stream) {
-                    tracing::debug!(%peer, %error, "a socket option refused");
+                    tracing::debug!(%peer, %error, "a socket option was refused");
                 }
                 tracing::debug!(%peer, "client connected");
                 let local = stream.local_addr().unwrap_or(Ends::default().local);
@@ -125,7 +125,7 @@ async fn accept(
             }
             Err(error) => {
                 if !std::mem::replace(&mut failing, true) {
-                    tracing::warn!(%error, "cannot accept a client; trying again and again");
+                    tracing::warn!(%error, "cannot accept a client; retrying");
                 }
                 actix_rt::time::sleep(BACKOFF).await;
             }
@@ -134,9 +134,9 @@ async fn accept(
 }
 
 fn prepare(stream: &TcpStream) -> std::io::Result<()> {
-    // Small frames must not wait for one another's acknowledgements.
+    // Without it, a small frame waits for the acknowledgement of the previous one.
     stream.set_nodelay(true)?;
-    // Nothing else tells a silent client from one whose machine is gone.
+    // Only keepalive distinguishes a silent client from a machine that is gone.
     let keepalive = TcpKeepalive::new()
         .with_time(KEEPALIVE_IDLE)
         .with_interval(KEEPALIVE_INTERVAL)
@@ -144,19 +144,19 @@ fn prepare(stream: &TcpStream) -> std::io::Result<()> {
     SockRef::from(stream).set_tcp_keepalive(&keepalive)
 }
 
-/// Binds a TCP socket in the present runtime, and listens.
+/// Binds a TCP socket in the current runtime, and listens.
 ///
 /// # Errors
-/// The operating system's, for instance when the port is in use.
+/// The error of the operating system, for instance when the port is in use.
 pub fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
     let socket = match address {
         SocketAddr::V4(_) => TcpSocket::new_v4(),
         SocketAddr::V6(_) => TcpSocket::new_v6(),
     }?;
-    // A port that was just given up may be taken at once.
+    // A port that was just released can be bound at once.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
-    // Accepted sockets have it too.
+    // Accepted sockets inherit it.
     socket.set_send_buffer_size(SEND_BUFFER)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)

@@ -22,11 +22,11 @@ use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::json::Payload;
 
-/// A new client. From its connection; the answer is its id.
+/// A new client. From its connection. Returns its id.
 #[derive(Message)]
 #[rtype(result = "Result<ConnectionId, Refused>")]
 pub struct Connect {
-    /// The ways to its connection.
+    /// The handles to its connection.
     pub outlets: Outlets,
     /// Its address.
     pub from: IpAddr,
@@ -39,16 +39,16 @@ pub struct Connect {
 #[rtype(result = "()")]
 pub struct CountRefusal;
 
-/// The way to a connection, and what it shares with the registry.
+/// The handles to a connection, and the state that it shares with the registry.
 #[derive(Clone)]
 pub struct Outlets {
     /// Its mailbox.
     pub mailbox: Recipient<ToClient>,
-    /// Set while a failed call has its reason in `values` too.
+    /// Set while the reason of a failed call is sent in `values` too.
     pub wants_text: Arc<AtomicBool>,
-    /// Set when the client is gone: heavy computations for it stop.
+    /// Set when the client has disconnected. Heavy computations for it stop.
     pub gone: Arc<AtomicBool>,
-    /// Bytes of responses that wait to be written; kept by the connection.
+    /// Bytes of responses that wait to be written. The connection updates the number.
     pub backlog: Arc<AtomicUsize>,
 }
 
@@ -60,7 +60,7 @@ impl Outlets {
     }
 }
 
-/// The form of errors that a connection's flag stands for.
+/// The form of errors that a connection's flag selects.
 pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
     if wants_text.load(Ordering::Relaxed) {
         ErrorForm::Text
@@ -69,7 +69,7 @@ pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
     }
 }
 
-/// Why a client was not taken.
+/// Why a client was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
     /// No place is free.
@@ -88,18 +88,18 @@ pub enum Refused {
     Closed,
 }
 
-/// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
-/// one, ends when the calls that it made have been answered.
+/// The client has stopped sending. The registry withdraws its registrations. From its connection. The receiver, if
+/// there is one, ends when the client's calls have been answered.
 #[derive(Message)]
 #[rtype(result = "Handled")]
 pub struct Retire(pub ConnectionId);
 
-/// The client is gone: all that it registered is withdrawn. From its connection; repeating is harmless.
+/// The client has disconnected. The registry withdraws its registrations. From its connection. Idempotent.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Disconnect(pub ConnectionId);
 
-/// One op of a client. From its connection, which waits for [`Handled`] before it reads on.
+/// One op of a client. From its connection, which waits for [`Handled`] before it continues to read.
 #[derive(Message)]
 #[rtype(result = "Handled")]
 pub struct Request {
@@ -109,25 +109,25 @@ pub struct Request {
     pub id: Option<Payload>,
     /// Its request.
     pub op: Op,
-    /// The room that the frame takes, if it is long: its later forms take the same.
+    /// The memory permit of a long frame. All forms made of the frame share it.
     pub permit: Option<Permit>,
 }
 
-/// The op has been routed. Its effect may be still to come, in a node or at the subscribers' sockets: the receiver ends
-/// when it has.
+/// The op has been routed. A node or the subscribers' sockets may still have to process it. The receiver ends after
+/// that.
 #[derive(MessageResponse, Default)]
 pub struct Handled {
     effect: Option<oneshot::Receiver<()>>,
 }
 
 impl Handled {
-    /// Nothing is still to come.
+    /// The op has already taken effect.
     #[must_use]
     pub fn at_once() -> Self {
         Self::default()
     }
 
-    /// The op has gone to a node or a client that serves it, or a message to its subscribers.
+    /// The op was sent to its provider, or the message to its subscribers.
     #[must_use]
     pub fn with(effect: oneshot::Receiver<()>) -> Self {
         Self {
@@ -138,22 +138,22 @@ impl Handled {
     /// Waits until the op has taken effect.
     pub async fn effect(self) {
         if let Some(effect) = self.effect {
-            // The sender is dropped, never used: its end is the news.
+            // The sender never sends: dropping it is the signal.
             let _ = effect.await;
         }
     }
 }
 
-/// Asks for the topics and services that clients have. From `rosapi`.
+/// Requests the topics and services of the clients. From `rosapi`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Census")]
 pub struct TakeCensus;
 
-/// Something that passes the registry, as the tap gets it.
+/// A message or call in the registry, as the tap gets it.
 pub enum Tapped<'a> {
     /// A message of the runtime, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
-    /// A client's message on a topic that the runtime listens to.
+    /// A client's message on a topic to which the runtime subscribes.
     NodeMessage(Topic, &'a Payload),
     /// A client's call of one of the runtime's services.
     Called {
@@ -166,7 +166,7 @@ pub enum Tapped<'a> {
         /// The arguments.
         args: &'a Payload,
     },
-    /// The answer to such a call, as the whole frame.
+    /// The response to such a call, as the whole frame.
     Answered {
         /// The client.
         to: ConnectionId,
@@ -177,17 +177,16 @@ pub enum Tapped<'a> {
     },
 }
 
-/// Gets a copy of all that passes the registry, on the registry's thread, and may not wait.
+/// Gets every message and call of the runtime, on the registry's thread. It must not block.
 pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
 
-/// Sets the tap, or takes it away. While there is one, every topic of the runtime counts as subscribed to. From the
-/// recorder.
+/// Sets or removes the tap. While a tap is set, every topic of the runtime counts as subscribed. From the recorder.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct SetTap(pub Option<Tap>);
 
-/// The registry takes no call any more, and refuses those calls and goals that wait for clients, for the reason given.
-/// From the runtime, when it ends.
+/// The registry rejects new calls, and the calls and goals that wait for clients, with this reason. From the runtime,
+/// when it ends.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct RefuseCalls(pub &'static str);
@@ -199,14 +198,14 @@ pub struct FinishAll;
 
 // ---- from the registry to a connection ------------------------------------------------------------------------------
 
-/// All that the registry sends a connection, in one order.
+/// The registry's messages to a connection, in one order.
 #[derive(Message, Clone)]
 #[rtype(result = "()")]
 pub enum ToClient {
     /// A topic message, or a [series](crate::protocol::wire::series) of them. It may be dropped, oldest first, when the
     /// client is slow.
     Deliver {
-        /// The topic, for throttling; none for feedback of a goal.
+        /// The topic, for throttling. `None` for feedback of a goal.
         topic: Option<Arc<str>>,
         /// The message, shared by all subscribers of this form.
         frame: Bytes,
@@ -217,14 +216,14 @@ pub enum ToClient {
     Respond {
         /// The whole frame.
         frame: Bytes,
-        /// The service that it answers, if it is the runtime's own.
+        /// The service that responds, if it is the runtime's own.
         service: Option<Service>,
     },
     /// How a topic is throttled for this client.
     Configure {
         /// The topic.
         topic: Arc<str>,
-        /// The smallest of the subscriptions' values; `None` once it is not subscribed.
+        /// The smallest values of all subscriptions. `None` once it is not subscribed.
         throttle: Option<Throttle>,
     },
     /// Send the queue, then end. The runtime is ending.

@@ -1,6 +1,6 @@
-//! The gateway stands between the sockets and the nodes: a listener, an actor for each connection, and the registry.
+//! The gateway connects the sockets to the nodes. It has a listener, an actor for each connection, and the registry.
 //!
-//! **Invariant:** the runtime's own names come from the catalog, and no client's input stops the service of others.
+//! **Invariant:** the runtime's own names come from the catalog. No client's input stops the service of others.
 
 pub mod connection;
 mod ends;

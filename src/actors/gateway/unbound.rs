@@ -1,6 +1,6 @@
-//! Addresses that cannot be listened on: the remedy of each.
+//! The remedy for an address on which the runtime cannot listen.
 //!
-//! **Invariant:** a port that another program has is never passed over in silence.
+//! **Invariant:** a port in use by another program is always reported.
 
 use std::io::{Error, ErrorKind};
 use std::net::SocketAddr;
@@ -12,20 +12,20 @@ pub(in crate::actors) fn remedy(why: &Error) -> String {
             "another program has that port, perhaps another pendularm; --bind 127.0.0.1:0 takes a free one"
         }
         ErrorKind::PermissionDenied => {
-            "this user may not take that port, and mostly none below 1024; --bind 127.0.0.1:0 takes a free one"
+            "this user may not use that port (ports below 1024 usually need root); --bind 127.0.0.1:0 takes a free one"
         }
         ErrorKind::AddrNotAvailable => {
-            "this machine does not have that address; every machine has --bind 127.0.0.1:9095"
+            "this machine does not have that address; use --bind 127.0.0.1:9095"
         }
         _ => return why.to_string(),
     };
     remedy.to_owned()
 }
 
-/// Logs why there is no listening on the IPv6 twin of the default address.
+/// Logs why the runtime does not listen on the IPv6 twin of the default address.
 pub(in crate::actors) fn report_twin(twin: SocketAddr, why: &Error) {
     if why.kind() == ErrorKind::AddrInUse {
-        tracing::warn!(address = %twin, "another program listens there, and clients of localhost may reach it");
+        tracing::warn!(address = %twin, "another program listens there, and may get clients of localhost");
     } else {
         tracing::info!(address = %twin, error = %why, "not listening on IPv6");
     }
@@ -68,7 +68,7 @@ mod tests {
     fn a_port_of_the_systems_is_refused_with_the_remedy() {
         let remedy = remedy(&ErrorKind::PermissionDenied.into());
         assert!(
-            remedy.contains("below 1024; --bind 127.0.0.1:0"),
+            remedy.contains("need root); --bind 127.0.0.1:0"),
             "{remedy}"
         );
     }

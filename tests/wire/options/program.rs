@@ -41,7 +41,7 @@ fn an_address_that_cannot_be_had_is_refused_with_the_remedy() {
         ),
         (
             "192.0.2.1:0",
-            "this machine does not have that address; every machine has --bind 127.0.0.1:9095",
+            "this machine does not have that address; use --bind 127.0.0.1:9095",
         ),
     ] {
         let arguments = [

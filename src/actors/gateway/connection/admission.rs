@@ -1,7 +1,7 @@
-//! Admission: the conditions under which a client is served, whichever protocol it speaks.
+//! Admission: the conditions under which a client is served, for every protocol.
 //!
-//! **Invariant:** with a token set, nothing behind a first frame that does not show it is looked at. Clients that have
-//! not shown it, however many and however silent, keep nobody out who has.
+//! **Invariant:** with a token set, bytes after a first frame without the token are not read. Any number of clients
+//! without the token cannot block a client with the token.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,21 +22,21 @@ use crate::web::Site;
 
 /// Bytes that a client may send before it has shown its token.
 pub const MAX_AUTH_BYTES: usize = 16 * 1024;
-/// Newcomers at once: connections that have not shown the token yet, or for which no place is free. They are counted
-/// apart from the clients, and the oldest is closed for the next. A newcomer that shows its token at once is never the
+/// Most newcomers: connections without a token yet, or without a free place. They are counted separately from the
+/// clients, and the next newcomer evicts the oldest. A newcomer that sends its token at once never becomes the
 /// oldest.
 pub const MAX_NEWCOMERS: usize = 128;
 
-/// How long the answer to a wrong token takes. No more of them are answered in that time than there may be newcomers.
-/// The [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
+/// Delay of the answer to a wrong token. In this time at most [`MAX_NEWCOMERS`] wrong tokens are answered. The
+/// [length](crate::protocol::op::token::MIN_TOKEN) of a token makes guessing hopeless.
 pub const WRONG_TOKEN_TIME: Duration = Duration::from_millis(500);
 
 /// The conditions under which a listener admits clients.
 #[derive(Debug, Default)]
 pub struct Admission {
-    /// Every client has to show this, if it is set.
+    /// If it is set, every client must send it.
     pub token: Option<Token>,
-    /// Says which clients are served over HTTP, and with which files.
+    /// Selects the clients that are served over HTTP, and the files for them.
     #[cfg(feature = "web")]
     pub site: Site,
     /// Slots of newcomers.
@@ -45,8 +45,8 @@ pub struct Admission {
 
 // ---- the slots of newcomers -----------------------------------------------------------------------------------------
 
-/// A fixed number of slots, oldest holder first. When all are in use, a newcomer evicts the oldest holder. If clients
-/// finish quickly, only slow ones become the oldest. To refuse the newcomer instead would shut out honest clients.
+/// A fixed number of slots, oldest holder first. When all are in use, a newcomer evicts the oldest holder. Honest
+/// clients finish quickly, so slow ones become the oldest. Refusing the newcomer would block honest clients.
 #[derive(Debug)]
 pub struct Slots {
     most: usize,
@@ -71,7 +71,7 @@ impl Slots {
         }
     }
 
-    /// Takes a slot: the oldest one, if none is free.
+    /// Takes a slot. Evicts the oldest holder if none is free.
     pub(super) fn take(&self) -> HeldSlot<'_> {
         let notice = Arc::new(Semaphore::new(0));
         let mut taken = self.taken();
@@ -92,7 +92,7 @@ impl Slots {
     }
 }
 
-/// A slot that is held; it is free again when this is dropped.
+/// A slot that is in use. Dropping this frees it.
 #[derive(Debug)]
 pub(super) struct HeldSlot<'a> {
     slots: &'a Slots,
@@ -100,11 +100,11 @@ pub(super) struct HeldSlot<'a> {
 }
 
 impl HeldSlot<'_> {
-    /// Ends when somebody else has the slot.
+    /// Ends when the holder is evicted.
     pub(super) fn evicted(&self) -> impl Future<Output = ()> + use<> {
         let notice = Arc::clone(&self.notice);
         async move {
-            // It never has a permit.
+            // The semaphore never has a permit, so this ends only when it is closed.
             let _ = notice.acquire().await;
         }
     }
@@ -119,22 +119,22 @@ impl Drop for HeldSlot<'_> {
 
 // ---- the token over raw TCP: in the first frame ---------------------------------------------------------------------
 
-/// Why a client that has to show a token is not admitted.
+/// Why a client that must send a token is not admitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum AuthError {
-    #[error("this runtime asks for its token first: {{\"op\":\"auth\",\"token\":...}}")]
+    #[error("this runtime requires its token first: {{\"op\":\"auth\",\"token\":...}}")]
     NotShown,
     #[error("token: not this runtime's")]
     Wrong,
-    #[error("this runtime asks for its token first, and waited for {} s", HEAD_TIME.as_secs())]
+    #[error("this runtime requires its token first, and waited for {} s", HEAD_TIME.as_secs())]
     TooLate,
-    #[error("this runtime asks for its token first, in at most {MAX_AUTH_BYTES} bytes")]
+    #[error("this runtime requires its token first, in at most {MAX_AUTH_BYTES} bytes")]
     TooMuch,
-    #[error("this runtime asks for its token first, and too many others have yet to show it")]
+    #[error("this runtime requires its token first, and too many connections wait without a token")]
     Crowded,
 }
 
-/// The op of a client's first frame, if it shows the token.
+/// Returns the op of a client's first frame, if it has the token.
 pub(super) fn authenticate(token: &Token, op: Op) -> Result<Op, AuthError> {
     match &op {
         Op::Auth {
@@ -145,12 +145,12 @@ pub(super) fn authenticate(token: &Token, op: Op) -> Result<Op, AuthError> {
     }
 }
 
-/// Whether a first frame is that of a command of this program.
+/// Whether a first frame is from a command of this program.
 pub(super) const fn is_command(op: &Op) -> bool {
     matches!(op, Op::Auth { is_command, .. } if *is_command)
 }
 
-/// Reads until `due` up to a first frame. All that was read stays in `first`.
+/// Reads a first frame until `due`. All bytes read stay in `first`.
 pub(super) async fn first_op<S: AsyncRead + Unpin>(
     stream: &mut S,
     first: &mut BytesMut,

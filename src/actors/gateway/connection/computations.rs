@@ -1,6 +1,6 @@
-//! The heavy calls of one client: one runs, some wait.
+//! The heavy calls of one client: one runs, and others wait.
 //!
-//! **Invariant:** they run one after the other, in the order in which they came.
+//! **Invariant:** they run one at a time, in order of arrival.
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ use crate::actors::resources::memory::SHORT;
 #[derive(Default)]
 pub(super) struct Computations {
     waiting: VecDeque<(Request, usize)>,
-    /// Bytes of those that wait.
+    /// Bytes of the waiting calls.
     bytes: usize,
     is_running: bool,
 }
@@ -23,17 +23,17 @@ impl Computations {
         self.waiting.push_back((request, length));
     }
 
-    /// Whether the client is not read because of the number or the bytes that wait.
+    /// Whether too many calls or bytes wait, so that the client is not read.
     pub(super) fn are_too_many(&self) -> bool {
         self.waiting.len() >= MAX_COMPUTATIONS_WAITING || self.bytes >= SHORT
     }
 
-    /// Whether one waits and none runs.
+    /// Whether a call waits and none runs.
     pub(super) fn can_start(&self) -> bool {
         !self.is_running && !self.waiting.is_empty()
     }
 
-    /// Takes the next call; it runs from now on.
+    /// Removes and returns the next call, and marks it as running.
     pub(super) fn start(&mut self) -> Option<Request> {
         let (request, length) = self.waiting.pop_front()?;
         self.bytes -= length;

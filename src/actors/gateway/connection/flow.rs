@@ -1,15 +1,14 @@
 //! Flow control by the bytes that a client has read.
 //!
-//! Bytes in a client's socket get old, and can't be dropped any more. The size of a socket's buffers says nothing about
-//! time: the buffers of Linux hold 15 s of `/joint_states`. So a client that is slower than its topics is only written
-//! as much as it reads in `AHEAD`, and the rest is dropped before it is written. Where a client's unread bytes
-//! are unknown, its socket's buffers are the only bound. A client that reads all that it is sent within `HOLD` is never
-//! kept waiting.
+//! Bytes in a client's socket get old, and cannot be dropped. The buffers of Linux hold 15 s of `/joint_states`. So a
+//! client slower than its topics is sent only as much as it reads in `AHEAD`. The rest is dropped before it is
+//! written. If a client's unread bytes are unknown, its socket's buffers are the only limit. A client that reads all
+//! its bytes within `HOLD` is never delayed.
 //!
-//! How many bytes a client has not read Linux tells for one on the same machine: `NETLINK_SOCK_DIAG` describes one
-//! socket in some microseconds, the client's too (`man 7 sock_diag`).
+//! Linux returns the unread bytes of a client on the same machine: `NETLINK_SOCK_DIAG` describes one socket in some
+//! microseconds, the client's socket too (`man 7 sock_diag`).
 //!
-//! **Invariant:** where the system does not tell, nothing is asked for that client again, and nothing is held back.
+//! **Invariant:** once a query for a client fails, its unread bytes are not queried again, and nothing is held back.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -19,7 +18,7 @@ use tokio::time::Instant;
 use super::Ends;
 use crate::protocol::outbox::MAX_AGE;
 
-/// Gives the bytes that a client has not read, if that is known.
+/// Returns the bytes that a client has not read, if that is known.
 pub type UnreadSource = Box<dyn FnMut() -> Option<usize>>;
 
 /// The source for a client with these ends.
@@ -32,25 +31,25 @@ pub(super) fn between(ends: Ends) -> UnreadSource {
     })
 }
 
-/// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time: half a second of
-/// messages to a client that takes half of them.
+/// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time, which is half a
+/// second of messages to a client that reads at half the rate.
 const HOLD: Duration = Duration::from_millis(100);
-/// A slow client is written as much as it reads in that time.
+/// A slow client is sent as much as it reads in this time.
 const AHEAD: Duration = Duration::from_millis(200);
-/// How old a topic message may be that a client which is far behind gets only because a response is behind it.
+/// Largest age of a topic message ahead of a response, for a client that is far behind.
 pub(super) const FRESH: Duration = Duration::from_millis(200);
-/// Time between two looks at the client's unread bytes: after a look that found none, after one that found some, and
-/// while the client is slow. A look takes two calls of the system.
+/// Time between two queries of the client's unread bytes: after a query that found none, after one that found some, and
+/// while the client is slow. A query takes two system calls.
 const ASK_CALM: Duration = Duration::from_millis(300);
 const ASK: Duration = Duration::from_millis(100);
 const ASK_SLOW: Duration = Duration::from_millis(50);
-/// A client that reads all within that time keeps up: it is sent twice as much.
+/// A slow client that reads all bytes within this time gets twice as much.
 const KEEPS_UP: Duration = Duration::from_millis(25);
-/// How long the pace of reading is kept in mind, and how long a client counts as slow.
+/// Window of the measured read rate. Also the time for which a client counts as slow.
 const MEMORY: Duration = Duration::from_secs(1);
-/// Bytes that are written within this time count as written at once.
+/// Bytes written within this time share one entry of the history.
 const GRAIN: Duration = Duration::from_millis(20);
-/// Most entries of the history of writing: 5 s of it.
+/// Most entries of the write history, which is 5 s of writing.
 const MAX_HISTORY: usize = 256;
 
 /// Counts bytes that were written to a client, and the bytes that it has read.
@@ -58,19 +57,19 @@ pub(super) struct FlowControl {
     source: UnreadSource,
     /// Bytes written so far.
     written: u64,
-    /// For each stretch of bytes that may be unread: its end, and when its first byte was written.
+    /// For each range of bytes that may be unread: its end, and the time when its first byte was written.
     history: VecDeque<(u64, Instant)>,
-    /// How many bytes had been read when it was looked at, over the last second.
+    /// The time and the bytes read so far, for each query of the last second.
     read: VecDeque<(Instant, u64)>,
-    /// When the next look is due.
+    /// Time of the next query.
     next: Instant,
-    /// Until when the client counts as slow.
+    /// The client counts as slow until this time.
     slow_until: Option<Instant>,
     /// Bytes that a slow client may have unread.
     window: u64,
-    /// Bytes that may be written before the next look.
+    /// Bytes that may be written before the next query.
     room: u64,
-    /// How long ago the oldest byte was written that had not been read at the last look.
+    /// Age of the oldest unread byte at the last query.
     age: Duration,
 }
 
@@ -103,8 +102,7 @@ impl FlowControl {
         }
     }
 
-    /// How many bytes of topic messages may be written now. If there is a limit it is looked at again at
-    /// [`next_look`](Self::next_look).
+    /// Bytes of topic messages that may be written now. A limit is updated at [`next_look`](Self::next_look).
     pub(super) fn room(&mut self, now: Instant) -> usize {
         if now >= self.next {
             self.look(now);
@@ -112,17 +110,17 @@ impl FlowControl {
         usize::try_from(self.room).unwrap_or(usize::MAX)
     }
 
-    /// Whether the client reads what was written more than a second ago.
+    /// Whether the client still reads bytes that were written more than a second ago.
     pub(super) fn is_far_behind(&self) -> bool {
         self.age > MAX_AGE
     }
 
-    /// How long ago the oldest byte was written that had not been read at the last look.
+    /// Age of the oldest unread byte at the last query.
     pub(super) const fn age(&self) -> Duration {
         self.age
     }
 
-    /// When there may be room again, if there is none.
+    /// The time of the next query, if nothing may be written before it.
     pub(super) fn next_look(&self) -> Option<Instant> {
         (self.room == 0).then_some(self.next)
     }
@@ -165,7 +163,7 @@ impl FlowControl {
         self.next = now + ASK_SLOW;
     }
 
-    /// Bytes that the client reads in [`AHEAD`], by the last second.
+    /// Bytes that the client reads in [`AHEAD`], at its rate over the last second.
     fn pace(&self, now: Instant) -> u64 {
         let (Some((since, first)), Some((_, last))) = (self.read.front(), self.read.back()) else {
             return 0;
@@ -176,7 +174,7 @@ impl FlowControl {
     }
 }
 
-// ---- what the system tells ------------------------------------------------------------------------------------------
+// ---- unread bytes from the system -----------------------------------------------------------------------------------
 
 #[cfg(target_os = "linux")]
 mod sockets {
@@ -190,12 +188,12 @@ mod sockets {
 
     use crate::actors::gateway::ends::Ends;
 
-    /// Bytes of the head of a netlink message.
+    /// Bytes of the header of a netlink message.
     const HEAD: usize = 16;
-    /// The kind of message that asks for a socket (`SOCK_DIAG_BY_FAMILY`), and the flag of a request (`NLM_F_REQUEST`).
+    /// The message type for a query of a socket (`SOCK_DIAG_BY_FAMILY`), and the request flag (`NLM_F_REQUEST`).
     const BY_FAMILY: u16 = 20;
     const REQUEST: u16 = 1;
-    /// The places of `idiag_rqueue` and `idiag_wqueue` in `inet_diag_msg`.
+    /// The offsets of `idiag_rqueue` and `idiag_wqueue` in `inet_diag_msg`.
     const RECEIVED: usize = HEAD + 56;
     const SENT: usize = HEAD + 60;
 
@@ -206,7 +204,7 @@ mod sockets {
         };
     }
 
-    /// Bytes in the client's receive queue, and where there are some, in our send queue too.
+    /// Bytes in the client's receive queue. If there are some, plus those in our send queue.
     pub(super) fn unread(ends: Ends) -> Option<usize> {
         let received = queue(ends.peer, ends.local, RECEIVED)?;
         if received == 0 {
@@ -275,7 +273,7 @@ mod sockets {
                 };
                 let mut connect = listener.local_addr().unwrap();
                 if connect.ip().is_unspecified() {
-                    // Our end is `::ffff:127.0.0.1` then, the client's is not.
+                    // Our end is then `::ffff:127.0.0.1`, and the client's end is not.
                     connect.set_ip("127.0.0.1".parse().unwrap());
                 }
                 let mut client = TcpStream::connect(connect).unwrap();

@@ -1,6 +1,6 @@
-//! HTTP clients: requests are answered, until the client ends or opens a WebSocket. Then it is served like any other.
+//! HTTP clients: requests are answered until the client ends or opens a WebSocket. After that it is served like others.
 //!
-//! **Invariant:** over WebSocket no status is sent before the client has asked for such.
+//! **Invariant:** over WebSocket, no status is sent before the client requests statuses.
 
 use std::cell::Cell;
 use std::future::pending;
@@ -18,10 +18,10 @@ use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::web::serve::{self, Gate};
 
-/// A client without a place: the way to it, its slot, and why it has none. `None` stands for the missing token.
+/// A client without a place: its outlets, its slot, and the reason. `None` means that the token is missing.
 pub(super) type Newcomer<'a> = (Outlets, HeldSlot<'a>, Option<Refused>);
 
-/// Decides about the requests of one client.
+/// Admits or refuses the requests of one client.
 struct HttpGate<'a> {
     session: &'a ClientSession,
     /// Set until the first request is admitted, if the client came without a place.
@@ -46,7 +46,7 @@ impl Gate for HttpGate<'_> {
 }
 
 impl ClientSession {
-    /// Answers the requests of a client. Returns it once it has opened a WebSocket. A newcomer gets a place once its
+    /// Answers the requests of a client. Returns the client if it opens a WebSocket. A newcomer gets a place when its
     /// first request is admitted.
     pub(super) async fn serve_http<S>(
         &self,
@@ -68,7 +68,7 @@ impl ClientSession {
             newcomer: Cell::new(newcomer),
             place: Cell::new(place),
         };
-        // The sentence for a client whose slot is another's. Once its request is admitted, the answer tells it.
+        // The reason for an evicted client. After its request is admitted, the response has the reason instead.
         let crowded = async {
             if let Some(evicted) = evicted {
                 evicted.await;

@@ -1,12 +1,12 @@
-//! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
+//! One client: its bytes become ops for the registry. Messages and responses return through a bounded outbox.
 //!
-//! A session judges the client by its first bytes. From then on the actor has two tasks, both with access to its state.
-//! The reader hands one op at a time to the registry and waits until it has taken effect. The writer drains the outbox,
-//! which the actor's handlers fill. A client that reads slowly fills its own outbox and nothing else.
+//! A session detects the protocol from the first bytes. Then the actor has two tasks, which share its state. The
+//! reader sends one op at a time to the registry and waits until it has taken effect. The writer drains the outbox,
+//! which the actor's handlers fill. A client that reads slowly fills only its own outbox.
 //!
-//! The connection is generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
+//! The connection is generic over the stream, so that tests can use an in-memory pipe and run in virtual time.
 //!
-//! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
+//! **Invariant:** responses and statuses are never dropped. While too many wait, the client is not read.
 
 pub mod admission;
 mod computations;
@@ -51,38 +51,38 @@ use crate::protocol::catalog::Service;
 
 /// The actor of one client.
 pub struct Connection<S> {
-    /// The stream and the conditions that the client has to meet, until the session takes them.
+    /// The stream and the conditions of admission, until the session takes them.
     newcomer: Option<(S, Arc<Admission>, Ends)>,
     registry: Addr<Registry>,
-    /// Where long frames find their room.
+    /// The shared memory for long frames.
     memory: Memory,
-    /// The stream, once the client is spoken with.
+    /// The stream, after the session has ended.
     transport: Option<Transport<S>>,
     /// Its place among the clients.
     place: Option<HeldPlace>,
     outgoing: Outgoing,
     computations: Computations,
-    /// When something was last written or computed, while the reader waited for that.
+    /// Time of the last write or finished computation while the reader waited for one.
     room_since: Instant,
-    /// Set while a failed call has its reason in `values` too.
+    /// Set while the reason of a failed call is sent in `values` too.
     wants_text: Arc<AtomicBool>,
-    /// Nothing more is read; queued messages are still sent.
+    /// Set when nothing more is read. Queued messages are still sent.
     is_finishing: bool,
-    /// Tells the session so.
+    /// Notifies the session of that.
     finish: Arc<Notify>,
-    /// The client speaks another protocol, or has broken a rule. It gets the reason, and its input is discarded.
+    /// Set if the client uses another protocol or violates a rule. It gets the reason, and its input is discarded.
     is_refused: bool,
-    /// The reader has ended.
+    /// Set when the reader has ended.
     is_read_to_its_end: bool,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
+    /// Starts the actor for `stream` in the current system. It requires no token.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
         Self::start_with(Arc::default(), Ends::default(), stream, registry, gauges)
     }
 
-    /// Starts the actor for a client that has to be admitted.
+    /// Starts the actor for a client that must be admitted.
     pub fn start_with(
         admission: Arc<Admission>,
         ends: impl Into<Ends>,
@@ -95,7 +95,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         Self::start_reading(unread, admission, ends, stream, registry, gauges)
     }
 
-    /// The same for a client of which `unread` tells how much it has not read.
+    /// Starts the actor for a client whose unread bytes `unread` returns.
     pub fn start_reading(
         unread: UnreadSource,
         admission: Arc<Admission>,
@@ -128,7 +128,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
     type Context = Context<Self>;
 
-    /// Judges the client, and serves or refuses it.
+    /// Runs the session, which serves or refuses the client.
     fn started(&mut self, ctx: &mut Context<Self>) {
         let Some((stream, admission, ends)) = self.newcomer.take() else {
             return;
@@ -159,12 +159,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
     }
 }
 
-// ---- handlers: the writer is polled behind them ---------------------------------------------------------------------
+// ---- handlers: the writer is polled after them ----------------------------------------------------------------------
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connection<S> {
     type Result = ();
 
-    /// A panic ends this client and nothing else.
+    /// A panic ends only this connection.
     fn handle(&mut self, message: ToClient, ctx: &mut Context<Self>) {
         if let Err(panic) = contain(|| self.take(message)) {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
@@ -176,7 +176,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<ToClient> for Connecti
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<S> Connection<S> {
-    /// Puts what the registry sends into the outbox.
+    /// Puts a message of the registry into the outbox.
     fn take(&mut self, message: ToClient) {
         let outgoing = &mut self.outgoing;
         match message {
@@ -196,29 +196,29 @@ impl<S> Connection<S> {
         }
     }
 
-    /// Refuses the client: it gets this status, and nothing that it sends is looked at any more.
+    /// Refuses the client: it gets this status, and its further input is discarded.
     fn refuse(&mut self, status: Bytes) {
         self.is_refused = true;
         self.outgoing.push_response(status, &[]);
     }
 
-    /// Ends reading; queued messages are still sent.
+    /// Ends reading. Queued messages are still sent.
     fn finish(&mut self) {
         self.is_finishing = true;
         self.finish.notify_one();
     }
 
-    /// The client may be read: neither its responses nor its computations pile up.
+    /// Whether the client may be read: neither too many responses nor too many computations wait.
     fn may_read(&self) -> bool {
         self.may_compute() && !self.computations.are_too_many()
     }
 
-    /// Another computation may start: its response would not come on top of too many.
+    /// Whether another computation may start: not too many responses wait.
     const fn may_compute(&self) -> bool {
         self.outgoing.response_bytes() <= MAX_RESPONSES_WAITING
     }
 
-    /// This many bytes are on their way to the client. Whether it may be read now, and could not be before.
+    /// Notes that `bytes` were written. Returns whether that allows the client to be read again.
     fn note_written(&mut self, bytes: usize) -> bool {
         let may_read = self.may_read();
         self.outgoing.written(bytes);
@@ -229,13 +229,13 @@ impl<S> Connection<S> {
         !may_read && self.may_read()
     }
 
-    /// Queues a heavy call behind the connection's others.
+    /// Queues a heavy call.
     fn enqueue_computation(&mut self, request: Request, length: usize) {
         self.computations.push(request, length);
         self.start_computation();
     }
 
-    /// Starts the next computation if none runs and its response would find room.
+    /// Starts the next computation if none runs and not too many responses wait.
     fn start_computation(&mut self) {
         if self.computations.can_start()
             && self.may_compute()
@@ -250,7 +250,7 @@ impl<S> Connection<S> {
         !self.computations.is_empty()
     }
 
-    /// Gives up the computations: nobody waits for them any more.
+    /// Drops the computations: the client no longer waits for them.
     fn abandon_computations(&mut self) {
         self.computations = Computations::default();
     }

@@ -1,8 +1,8 @@
-//! The outgoing side of one client: its queue, the frames that are being written, and how long the client
-//! may take for that.
+//! The outgoing side of one client: its queue, the frames that are being written, and the deadline for the client
+//! to take them.
 //!
-//! **Invariant:** patience ends only for a client that is finishing, or for which responses or a long message have
-//! waited all the time.
+//! **Invariant:** the deadline expires only for a client that is finishing, or for which responses or a long message
+//! have waited without a break.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,23 +19,23 @@ use crate::protocol::outbox::{MAX_AGE, Outbox, Throttle};
 /// The outgoing side of one client.
 pub(super) struct Outgoing {
     outbox: Outbox,
-    /// Whether each write has one frame only. Old clients, which end their frames with no newline, take what one read
-    /// returns for one frame.
+    /// Whether each write has only one frame. Old clients, which end their frames without a newline, treat the bytes of
+    /// one read as one frame.
     singly: bool,
     flow: FlowControl,
     gauges: Arc<Gauges>,
-    /// Bytes of short responses in the outbox, for the registry to look at.
+    /// Bytes of short responses in the outbox. The registry reads it.
     backlog: Arc<AtomicUsize>,
-    /// When the frames that are being written were taken, or the client last took some of them.
+    /// Time when the frames being written left the outbox, or when the client last took bytes of them.
     progress: Instant,
-    /// The time since which responses have been waiting without a break.
+    /// Start of the time in which responses have waited without a break.
     responses_since: Option<Instant>,
-    /// Messages whose publishers wait until they have been offered to the socket.
+    /// Guards of messages that were not offered to the socket yet. Their publishers wait.
     underway: Vec<Done>,
 }
 
 impl Outgoing {
-    /// Nothing waits.
+    /// An empty outgoing side.
     pub(super) fn new(gauges: Arc<Gauges>, unread: UnreadSource) -> Self {
         let now = Instant::now();
         Self {
@@ -50,14 +50,14 @@ impl Outgoing {
         }
     }
 
-    /// Bytes of responses in the outbox, for the registry to look at.
+    /// Bytes of short responses in the outbox, shared with the registry.
     pub(super) fn backlog(&self) -> Arc<AtomicUsize> {
         Arc::clone(&self.backlog)
     }
 
     // ---- putting in -------------------------------------------------------------------------------------------------
 
-    /// Adds a topic message, or a series of them.
+    /// Adds a topic message, or a series of messages.
     pub(super) fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes, done: Option<Done>) {
         self.underway.extend(done);
         let now = Instant::now().into_std();
@@ -76,31 +76,31 @@ impl Outgoing {
         }
     }
 
-    /// Adds a response or a status. Discards held-back messages on `superseded` topics: they are older.
+    /// Adds a response or a status. Discards held-back messages on `superseded` topics, because they are older.
     pub(super) fn push_response(&mut self, frame: Bytes, superseded: &[&'static str]) {
         self.responses_since.get_or_insert_with(Instant::now);
         self.outbox.push_response(frame, superseded);
     }
 
-    /// Sets how a topic is throttled, or forgets the topic.
+    /// Sets the throttle of a topic, or removes the topic.
     pub(super) fn configure(&mut self, topic: &Arc<str>, throttle: Option<Throttle>) {
         self.outbox.configure(topic, throttle);
     }
 
-    /// Whether each frame is written by itself.
+    /// Sets whether each write has only one frame.
     pub(super) const fn set_singly(&mut self, singly: bool) {
         self.singly = singly;
     }
 
     // ---- taking out -------------------------------------------------------------------------------------------------
 
-    /// The frames that are to be written next.
+    /// The frames to write next.
     pub(super) fn frames(&self) -> impl ExactSizeIterator<Item = &Bytes> {
         self.outbox.writing()
     }
 
-    /// Takes the next frames out of the outbox, if all before have been written. Whether there is something to write.
-    /// Nothing is kept back from a client whose connection is finishing.
+    /// Takes the next frames out of the outbox, if all previous ones were written. Returns whether there are frames to
+    /// write. Nothing is held back from a client whose connection is finishing.
     pub(super) fn take(&mut self, is_finishing: bool) -> bool {
         if self.frames().len() == 0 {
             self.take_next(is_finishing);
@@ -131,7 +131,7 @@ impl Outgoing {
         self.progress = now;
     }
 
-    /// This many bytes of the frames have been written.
+    /// Notes that `bytes` of the frames were written.
     pub(super) fn written(&mut self, bytes: usize) {
         self.progress = Instant::now();
         self.flow.note_written(bytes, self.progress);
@@ -141,8 +141,8 @@ impl Outgoing {
         }
     }
 
-    /// When there may be something to write, if nothing is now: a message is held back, or the client has to read
-    /// first.
+    /// The earliest time of the next write, if nothing can be written now. Either a message is throttled, or the client
+    /// must read first.
     pub(super) fn next_release(&self) -> Option<Instant> {
         let release = self.outbox.next_release().map(Instant::from_std);
         let waits = self.outbox.has_topics() && !self.outbox.has_responses();
@@ -150,18 +150,18 @@ impl Outgoing {
         release.into_iter().chain(look).min()
     }
 
-    /// Bytes of the responses that have not been written.
+    /// Bytes of the unwritten responses.
     pub(super) const fn response_bytes(&self) -> usize {
         self.outbox.response_bytes()
     }
 
-    /// Whether the client has read nothing for too long though a long message waits.
+    /// Whether the client has read nothing for too long while a long message waits.
     pub(super) fn is_stuck(&self) -> bool {
         self.flow.age() > STALL_LIMIT && self.outbox.has_long()
     }
 
-    /// The deadline of a client that takes no byte of a write; none while neither a response nor a long
-    /// message waits and it is not finishing. `taken`: when it took some of a write that goes on.
+    /// The deadline of a client that takes no byte of a write. `None` if no response or long message waits, unless it
+    /// is finishing. `taken` is the time when it last took a byte of the current write.
     pub(super) fn patience(&self, taken: Option<Instant>, is_finishing: bool) -> Option<Instant> {
         let last_byte = taken.map_or(self.progress, |taken| taken.max(self.progress));
         match self.responses_since {
@@ -171,7 +171,7 @@ impl Outgoing {
         }
     }
 
-    /// What the handlers have put in has been offered to the socket: publishers go on.
+    /// Notes that new messages were offered to the socket. Their publishers continue.
     pub(super) fn end_turn(&mut self) {
         let waiting = self.outbox.short_bytes();
         if self.backlog.load(Ordering::Relaxed) != waiting {

@@ -1,4 +1,4 @@
-//! A stream of bytes that carries frames and nothing else.
+//! A byte stream that carries only frames.
 //!
 //! **Invariant:** one poll reads and writes a bounded number of bytes.
 
@@ -12,35 +12,35 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
-/// Bytes asked of a stream at a time. It is enough for a burst of short frames, and little enough for the turns of many
+/// Most bytes of one read. It is enough for a burst of short frames, and small enough for short turns of many
 /// clients.
 pub(super) const CHUNK: usize = 16 * 1024;
-/// The same while a long frame comes. Hundreds of clients may send one each, and another client's short frame has to
-/// wait for a turn of all of them.
+/// Most bytes of one read during a long frame. If hundreds of clients send one each, another client's short frame waits
+/// for a turn of each.
 pub(super) const LONG_CHUNK: usize = CHUNK / 2;
 
-/// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
-/// a socket with unread input resets it.
+/// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
+/// with unread input resets it.
 pub(super) const DISCARD_TIME: Duration = Duration::from_secs(1);
 pub(super) const DISCARD_BYTES: usize = 16 * 1024 * 1024;
 
-/// Why a client can't be read any more.
+/// Why a client can no longer be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ClientLost {
-    /// It is gone.
+    /// It has disconnected.
     Gone,
-    /// It has broken a rule, and gets an error at the end.
+    /// It has violated a rule, and gets an error at the end.
     #[cfg(feature = "web")]
     Refused,
 }
 
-/// Has the task polled again once other tasks and sockets have had a turn. To wake it at once would put it before them.
+/// Schedules the task behind other tasks and sockets. Waking it at once would poll it before them.
 pub(super) fn yield_turn(cx: &mut Context<'_>) {
-    // The wake-up comes though the future is dropped.
+    // The task is woken although the future is dropped.
     let _ = pin!(tokio::task::yield_now()).poll(cx);
 }
 
-/// Appends the available bytes to `chunk`, at most `most` of them; 0 at the end of the stream.
+/// Appends at most `most` available bytes to `chunk`. Returns 0 at the end of the stream.
 pub(super) fn poll_read<S: AsyncRead + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,
@@ -50,7 +50,7 @@ pub(super) fn poll_read<S: AsyncRead + Unpin>(
     pin!(read_some(stream, chunk, most)).poll(cx)
 }
 
-/// The same for a task of its own.
+/// The same as [`poll_read`], for a task of its own.
 pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream: &mut S,
     chunk: &mut BytesMut,
@@ -60,7 +60,7 @@ pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream.read_buf(&mut chunk.limit(most)).await
 }
 
-/// Writes some of `frames`, in order, and gives the number of bytes.
+/// Writes some of `frames`, in order. Returns the number of bytes.
 pub(super) fn poll_write<'a, S: AsyncWrite + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,

@@ -1,9 +1,9 @@
-//! Reading from one client: frames as they come, one op at a time. [`Performer`] makes an op of each, and the registry
-//! performs it.
+//! Reads the frames of one client, one op at a time. [`Performer`] makes an op of each frame, and the registry performs
+//! it.
 //!
-//! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted). So a
-//! client's requests happen in the order in which it sent them. A series of messages counts as one op. One poll reads a
-//! bounded number of bytes and performs a bounded number of ops. Every frame becomes one op or one complaint.
+//! **Invariant:** the next frame is parsed after the last op has taken effect, except for pure computations. So a
+//! client's requests take effect in the order sent. A series of messages counts as one op. One poll reads a bounded
+//! number of bytes and performs a bounded number of ops. Every frame becomes one op or one error.
 
 use std::collections::VecDeque;
 use std::pin::Pin;
@@ -50,37 +50,37 @@ type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 struct ClientReader {
     step: ReadStep,
     frames: FrameReader,
-    /// Bytes that have come and not been given to `frames`.
+    /// Received bytes that `frames` does not have yet.
     chunk: BytesMut,
-    /// Messages of a WebSocket that have come, with the room of long ones.
+    /// Received messages of a WebSocket. A long one has its memory permit.
     messages: VecDeque<(Bytes, Option<Permit>)>,
-    /// Whether all frames that have come have been cut off.
+    /// Whether all complete frames have been taken out of `frames`.
     is_cut: bool,
-    /// None while it performs an op.
+    /// `None` while it performs an op.
     performer: Option<Performer>,
     performing: Option<BoxFuture<(Performer, OpOutcome)>>,
-    /// The room for the long frame that comes, while it is waited for.
+    /// Waits for the memory permit of the incoming long frame.
     room: Option<BoxFuture<Permit>>,
-    /// When the frame that has begun is late: time counts while the rest of it is waited for.
+    /// Deadline of the incomplete frame. It is set only while the reader waits for the rest.
     frame_due: Option<Instant>,
-    /// Since when a client that has ended its stream has been waited for to read.
+    /// Start of the wait for a client that has ended its stream and does not read.
     waits_since: Option<Instant>,
-    /// The stream has ended; earlier bytes may still wait.
+    /// The stream has ended. Earlier bytes may still wait.
     has_ended: bool,
     /// The last op is being performed.
     is_last: bool,
     timer: Timer,
 }
 
-/// What the reader does.
+/// The states of the reader.
 enum ReadStep {
     /// It handles frames.
     Frames,
-    /// The client has stopped sending, and may still be reading: it waits for the responses that are still to come.
+    /// The client has stopped sending, but may still read. The reader waits for the pending responses.
     Retiring(Option<BoxFuture<()>>, Instant),
-    /// The registry forgets the client.
+    /// The registry removes the client.
     Leaving(BoxFuture<()>),
-    /// The client was refused: at most that many bytes of its input are discarded, until that time.
+    /// The client was refused. At most this many bytes of its input are discarded, until this time.
     Discarding(usize, Instant),
 }
 
@@ -91,7 +91,7 @@ impl ReadStep {
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Reads and writes until the client is gone or has all that is for it.
+    /// Reads and writes until the client disconnects, or has received all its messages.
     pub(super) fn converse(&mut self, opened: Opened<S>, ctx: &mut Context<Self>) {
         let takes_binary = opened.transport.has_messages();
         self.transport = Some(opened.transport);
@@ -163,7 +163,7 @@ impl ClientReader {
                 ReadStep::Frames => {
                     self.step = match ready!(self.poll_frames(connection, cx)) {
                         Ok(()) => Self::retire(connection),
-                        // A broken stream takes no answers, and nobody waits for those that don't come.
+                        // A broken stream takes no answers, so pending computations are dropped.
                         Err(lost) => {
                             connection.is_refused |= lost != ClientLost::Gone;
                             connection.abandon_computations();
@@ -210,8 +210,8 @@ impl ClientReader {
         }
     }
 
-    /// Withdraws the client's registrations, since it can no longer answer or withdraw, and waits for the responses
-    /// that are still to come.
+    /// Withdraws the client's registrations, because it can no longer answer calls. Then waits for the pending
+    /// responses.
     fn retire<S>(connection: &Connection<S>) -> ReadStep {
         let place = connection.place.as_ref();
         let retired = place.map(|place| connection.registry.send(Retire(place.id())));
@@ -225,7 +225,7 @@ impl ClientReader {
         ReadStep::Retiring(Some(Box::pin(answered)), Instant::now() + RESPONSES_TIME)
     }
 
-    /// Answers that are on their way arrive before the registry answers this, and so before the end.
+    /// Removes the client from the registry. Answers already sent arrive before the registry's reply.
     fn leave<S>(&mut self, connection: &Connection<S>) -> ReadStep {
         (self.performer, self.room) = (None, None);
         let place = connection.place.as_ref();
@@ -237,7 +237,7 @@ impl ClientReader {
         }))
     }
 
-    /// Handles frames until the stream ends or the client is refused; an error if it broke.
+    /// Handles frames until the stream ends or the client is refused. Returns an error if the stream broke.
     fn poll_frames<S: AsyncRead + AsyncWrite + Unpin + 'static>(
         &mut self,
         connection: &mut Connection<S>,
@@ -278,7 +278,7 @@ impl ClientReader {
                 }
             }
             if bytes >= CHUNK / 2 {
-                // The many chunks of a long frame may all be there.
+                // All chunks of a long frame may be available at once.
                 yield_turn(cx);
                 return Poll::Pending;
             }
@@ -299,7 +299,7 @@ impl ClientReader {
         }
     }
 
-    /// Notes what has come. Returns the bytes of a message.
+    /// Stores received data. Returns the bytes of a message.
     fn take_in(&mut self, received: ReceivedData) -> usize {
         match received {
             ReceivedData::Bytes(bytes) => {
@@ -316,7 +316,7 @@ impl ClientReader {
         }
     }
 
-    /// The op that was under way has taken effect. Whether it was the last.
+    /// Ends an op that has taken effect. Returns whether it was the last op.
     fn end_op<S>(
         &mut self,
         connection: &mut Connection<S>,
@@ -338,7 +338,7 @@ impl ClientReader {
         }
     }
 
-    /// Cuts off the next frame, if it is complete, and begins to perform it.
+    /// Takes the next frame, if it is complete, and begins to perform it.
     fn cut<S: AsyncRead + AsyncWrite + Unpin>(&mut self, connection: &mut Connection<S>) -> bool {
         let Some(mut performer) = self.performer.take() else {
             return false;
@@ -373,12 +373,12 @@ impl ClientReader {
         true
     }
 
-    /// Whether a frame has begun, and its buffer is longer than this.
+    /// Whether a frame is incomplete, and its buffer is longer than this.
     fn is_coming(&self, longer_than: usize) -> bool {
         self.frames.is_unfinished() && self.frames.buffered() > longer_than
     }
 
-    /// The end of the stream. A frame that has begun there is incomplete.
+    /// Handles the end of the stream. An incomplete frame is an error.
     fn poll_last(&mut self, cx: &mut task::Context<'_>) -> Poll<Result<(), ClientLost>> {
         let performer = self.performer.take();
         let Some((performer, error)) = performer.zip(self.frames.finish()) else {
@@ -390,8 +390,8 @@ impl ClientReader {
         Poll::Pending
     }
 
-    /// Reads on; `None` if a frame that has begun takes too long. Meanwhile, pieces of messages grow old, and are
-    /// forgotten.
+    /// Reads more data. Returns `None` if an incomplete frame takes too long. Meanwhile drops expired pieces of
+    /// messages.
     fn poll_read<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
@@ -428,9 +428,9 @@ impl ClientReader {
         }
     }
 
-    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`] or [`FRAMES_IN_A_ROW`]
-    /// messages, so that the end of the stream is seen. It is an error if the client is gone. A client that has ended
-    /// its stream counts as gone when nothing was written or computed for [`RESPONSES_TIME`].
+    /// Waits until something was written or computed. Meanwhile reads up to [`CHUNK`] bytes or [`FRAMES_IN_A_ROW`]
+    /// messages, to detect the end of the stream. Returns an error if the client has disconnected. A client that has
+    /// ended its stream counts as disconnected if nothing was written or computed for [`RESPONSES_TIME`].
     fn poll_ahead<S: AsyncRead + AsyncWrite + Unpin>(
         &mut self,
         connection: &mut Connection<S>,
@@ -458,37 +458,37 @@ impl ClientReader {
 
 // ---- from a frame to its effect -------------------------------------------------------------------------------------
 
-/// The error for a client that asks for binary frames over raw TCP.
+/// The error for a client that requests binary frames over raw TCP.
 const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; \
                          over raw TCP every frame is a line of JSON";
-const NESTED_FRAGMENT: &str = "fragment: the pieces make a fragment again";
+const NESTED_FRAGMENT: &str = "fragment: the joined pieces must not be a fragment";
 
-/// What is left to do once a part of the stream has been performed.
+/// The remaining work after a part of the stream has been performed.
 enum OpOutcome {
     /// Nothing.
     Done,
-    /// The computation runs when its turn comes. It came in a frame of that length.
+    /// The computation waits for its turn. Its frame had this length.
     Computation(Request, usize),
-    /// The client is refused, and gets this status: it broke a rule, or speaks another protocol.
+    /// The client is refused with this status. It violated a rule, or uses another protocol.
     Refused(Bytes),
 }
 
-/// Performs the ops of one client, one at a time. The future of an op owns it, and returns it at its end.
+/// Performs the ops of one client, one at a time. The future of an op owns the performer, and returns it.
 struct Performer {
     id: ConnectionId,
     registry: Addr<Registry>,
-    /// Where long frames find their room.
+    /// The shared memory for long frames.
     memory: Memory,
-    /// Set while a failed call has its reason in `values` too.
+    /// Set while the reason of a failed call is sent in `values` too.
     wants_text: Arc<AtomicBool>,
-    /// Whether frames may be binary: over raw TCP they are lines of text.
+    /// Whether frames may be binary. Over raw TCP they are lines of text.
     takes_binary: bool,
     /// Frames that come in pieces.
     fragments: Fragments,
-    /// The room of the client's long frame: while it comes, while it is performed and its answers are written, and
-    /// while pieces of one are kept.
+    /// The memory permit of the client's long frame. It is held until the frame was performed and its answers written,
+    /// and while pieces of a frame are kept.
     permit: Option<Permit>,
-    /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
+    /// Whether a JSON object has arrived. Then the client does not use HTTP, because a request has its head first.
     speaks_json: bool,
 }
 
@@ -512,21 +512,21 @@ impl Performer {
         }
     }
 
-    /// The room for a long frame, once there is some.
+    /// Waits for the memory permit of a long frame.
     fn room(&self) -> impl Future<Output = Permit> + 'static {
         let memory = self.memory.clone();
         async move { memory.long_frame().await }
     }
 
-    /// Waits for room. A client that has some does not: others might wait for that.
+    /// Takes a memory permit. A client holds at most one, so two clients cannot block each other.
     async fn take_room(&mut self) {
         if self.permit.is_none() {
             self.permit = Some(self.room().await);
         }
     }
 
-    /// The client may be read again: its room is given back, unless a long frame `is_coming` or pieces of one are
-    /// kept.
+    /// Releases the client's memory permit, unless a long frame `is_coming` or pieces of one are kept. Called before
+    /// the client is read again.
     fn give_back(&mut self, is_coming: bool) {
         if !is_coming && self.fragments.allocated() <= SHORT {
             self.permit = None;
@@ -594,7 +594,7 @@ impl Performer {
         }
     }
 
-    /// Acts on a frame that was read.
+    /// Performs the op of a parsed frame, or sends its error.
     async fn act_on(&self, incoming: Incoming, length: usize) -> OpOutcome {
         let Incoming { id, op } = incoming;
         match op {
@@ -612,7 +612,7 @@ impl Performer {
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
-                // Over WebSocket only a client that has asked for statuses is sent any.
+                // Over WebSocket, only a client that requested statuses gets this one.
                 self.complain(&why, id).await;
                 let result = messages::action_result(&action, id, &why, status as u8, false);
                 self.say(result, None).await
@@ -621,8 +621,8 @@ impl Performer {
         }
     }
 
-    /// Returns `incoming` unless it is a fragment. For a fragment, returns the whole frame once the last piece is
-    /// there. With it comes the length of the frame.
+    /// Returns `incoming` unless it is a fragment. For the last missing fragment, returns the whole frame. Also returns
+    /// the length of the frame.
     async fn assemble(
         &mut self,
         incoming: Incoming,
@@ -661,8 +661,8 @@ impl Performer {
             .await
     }
 
-    /// Sends a frame to the client by way of the registry: a response to an earlier frame may still be in its mailbox,
-    /// and must not be overtaken.
+    /// Sends a frame to the client through the registry. Its mailbox may still have a response to an earlier frame,
+    /// which must arrive first.
     async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
         let respond = Respond {
             connection: self.id,
@@ -675,7 +675,7 @@ impl Performer {
         OpOutcome::Done
     }
 
-    /// Has the registry perform an op, which came in a frame of that length.
+    /// Sends an op to the registry. Its frame had `length` bytes.
     async fn perform(&self, id: Option<Payload>, op: Op, length: usize) -> OpOutcome {
         let is_computation = matches!(&op, Op::CallService(CallService { service, .. })
             if Service::from_name(service).is_some_and(Service::is_computation));
@@ -695,12 +695,12 @@ impl Performer {
     }
 }
 
-/// The status for a client that is refused for that reason.
+/// The status for a client that is refused for this reason.
 fn refusal(why: &str) -> Bytes {
     messages::status(Level::Error, why, None)
 }
 
-/// Reads a frame of `length` bytes: a long one on another thread, while the other clients are served.
+/// Parses a frame of `length` bytes. Parses a long one on a worker thread.
 async fn read_frame(
     length: usize,
     read: impl FnOnce() -> Option<Incoming> + Send + 'static,
@@ -714,7 +714,7 @@ async fn read_frame(
     incoming.ok_or(OpOutcome::Done)
 }
 
-/// An error goes out under the id of the pieces, unless it ends a call.
+/// Gives an error the id of the pieces. An op, such as a bad answer, keeps its own id.
 fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     match incoming.op {
         Err(_) => Incoming { id, ..incoming },
@@ -722,7 +722,7 @@ fn under_id(incoming: Incoming, id: Option<Payload>) -> Incoming {
     }
 }
 
-/// Reads a frame that was cut off, or says what is wrong with it.
+/// Parses a complete frame, or returns its error.
 fn read(frame: Result<RawFrame, (FrameError, Vec<u8>)>) -> Incoming {
     match frame.and_then(RawFrame::decode) {
         Ok(frame) => op::read(&frame.text),
@@ -730,7 +730,7 @@ fn read(frame: Result<RawFrame, (FrameError, Vec<u8>)>) -> Incoming {
     }
 }
 
-/// Reads a message of a WebSocket, or a frame that came in pieces. `None` if there is nothing but white space.
+/// Parses a message of a WebSocket, or a frame that was joined from pieces. `None` if it has only white space.
 fn read_message(message: &[u8]) -> Option<Incoming> {
     RawFrame::of_message(message).map(read)
 }

@@ -1,7 +1,7 @@
-//! The session of one client: by its first bytes it is refused, served over HTTP, or spoken with.
+//! The session of one client. Its first bytes decide whether it is refused, served over HTTP, or exchanges frames.
 //!
-//! **Invariant:** nothing of what a client sends is read as JSON before its opening is decided, and what has been
-//! read by then is not lost.
+//! **Invariant:** no input is parsed as JSON before the protocol is detected. The bytes read for the detection are not
+//! lost.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,10 +33,10 @@ use crate::protocol::wire::frame::{Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::response::refusal;
 
-/// A client whose first bytes are judged.
+/// A client whose protocol is being detected.
 pub(super) struct ClientSession {
     pub(super) registry: Addr<Registry>,
-    /// Where long messages find their room.
+    /// The shared memory for long messages.
     #[cfg(feature = "web")]
     pub(super) memory: Memory,
     /// Notified when the runtime ends the connection first.
@@ -45,16 +45,16 @@ pub(super) struct ClientSession {
     pub(super) ends: Ends,
 }
 
-/// A client that is spoken with from now on.
+/// A client that exchanges frames from now on.
 pub(super) struct Opened<S> {
-    /// Its place, or why it gets none.
+    /// Its place, or the reason why it gets none.
     pub(super) place: Result<HeldPlace, String>,
     pub(super) transport: Transport<S>,
-    /// Bytes that have been read.
+    /// Bytes that were already read.
     pub(super) first: BytesMut,
 }
 
-/// The place of a client that the registry knows. Dropping it gives it back.
+/// The place of a registered client. Dropping it frees the place.
 pub(super) struct HeldPlace {
     id: ConnectionId,
     registry: Addr<Registry>,
@@ -72,23 +72,23 @@ impl Drop for HeldPlace {
     }
 }
 
-/// How a client is served, by its first bytes.
+/// The result of the detection by a client's first bytes.
 enum HowServed {
-    /// Frames are exchanged with it.
+    /// It exchanges frames.
     Json,
-    /// The same with a command of this program.
+    /// It exchanges frames, and is a command of this program.
     Command,
-    /// Its requests are answered. The head of the first has to be complete by this time.
+    /// It uses HTTP. The head of its first request must be complete by this time.
     #[cfg(feature = "web")]
     Http(Instant),
-    /// It is refused, and gets this reason.
+    /// It is refused with this reason.
     Refused(String),
-    /// There is nobody left to serve.
+    /// The runtime ends the connection.
     Gone,
 }
 
 impl ClientSession {
-    /// Judges a client. Returns it if frames are exchanged with it, or if it is to be told why not.
+    /// Runs the session. Returns the client if it exchanges frames, or if it is refused in a frame.
     pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets) -> Option<Opened<S>>
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
@@ -96,7 +96,7 @@ impl ClientSession {
         let mut first = BytesMut::with_capacity(CHUNK);
         let asks_token = self.admission.token.is_some();
         let mut place = if asks_token {
-            // The registry is asked nothing for a client that has not shown the token.
+            // A client without the token makes no request to the registry.
             Err(None)
         } else {
             self.connect(&outlets, false).await.map_err(Some)
@@ -107,7 +107,7 @@ impl ClientSession {
             Err(why) => {
                 let slot = self.admission.newcomers.take();
                 let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
-                // A client that has shown the token gets in, also where its slot is lost in the same moment.
+                // `biased`: a client that sends the token is admitted, even if it is evicted at the same time.
                 let how = tokio::select! {
                     biased;
                     how = self.qualify(&mut stream, &mut first, Instant::now() + time) => how,
@@ -149,7 +149,7 @@ impl ClientSession {
         })
     }
 
-    /// Waits until `due` for the opening of a client without a place. It has to show the token, if one is asked for.
+    /// Waits until `due` for the first frame of a client without a place. It must send the token, if one is required.
     async fn qualify<S>(&self, stream: &mut S, first: &mut BytesMut, due: Instant) -> HowServed
     where
         S: AsyncRead + Unpin,
@@ -178,7 +178,7 @@ impl ClientSession {
         }
     }
 
-    /// Takes a place, a kept one too. Where those are taken, it waits for a moment for one to become free.
+    /// Takes a place, possibly a kept one. If none is free, waits up to [`OPENING_TIME`] for one.
     pub(super) async fn wait_for_place(
         &self,
         outlets: &Outlets,
@@ -197,7 +197,7 @@ impl ClientSession {
         }
     }
 
-    /// Counts a client that gets no place. Returns the reason; `None` stands for the missing token.
+    /// Counts a client that gets no place. Returns the reason. `None` means that the token is missing.
     pub(super) fn turn_away(&self, why: Option<Refused>) -> String {
         let Some(why) = why else {
             return AuthError::Crowded.to_string();
@@ -208,14 +208,14 @@ impl ClientSession {
         why.to_string()
     }
 
-    /// Waits before a wrong token is answered. The right one is admitted at once.
+    /// Delays the answer to a wrong token. A correct token is admitted at once.
     pub(super) async fn delay_wrong_token(&self) {
         let from = self.ends.peer.ip();
-        tracing::warn!(%from, "a wrong token was shown");
+        tracing::warn!(%from, "a client sent a wrong token");
         sleep(WRONG_TOKEN_TIME).await;
     }
 
-    /// Makes the client known.
+    /// Registers the client.
     async fn connect(&self, outlets: &Outlets, may_use_kept: bool) -> Result<HeldPlace, Refused> {
         let connect = Connect {
             outlets: outlets.clone(),
@@ -228,9 +228,9 @@ impl ClientSession {
         Ok(HeldPlace { id, registry })
     }
 
-    /// Reads until the first bytes tell the client's protocol. A client that ends before that counts as one that
-    /// speaks JSON. A client with a place may stay silent; without one, it has until `due`. A client that has begun
-    /// what may become a request has to go on.
+    /// Reads until the first bytes identify the client's protocol. A client that ends before that counts as JSON. A
+    /// client with a place may stay silent. Without a place, its deadline is `due`. A client that has sent its first
+    /// bytes must complete them in time.
     async fn detect<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
@@ -264,15 +264,15 @@ impl ClientSession {
             let read = tokio::select! {
                 biased;
                 () = self.finish.notified() => return HowServed::Gone,
-                // A few bytes decide, and there is room for them.
+                // A few bytes are enough, and `first` has room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
                     return match due {
-                        None => foreign("what this connection began with did not go on"),
+                        None => foreign("the first bytes of this connection were never completed"),
                         Some(_) if self.admission.token.is_some() => {
                             foreign(&AuthError::TooLate.to_string())
                         }
-                        // It is refused like any other client without a place.
+                        // It is refused like other clients without a place.
                         Some(_) => HowServed::Json,
                     };
                 }
@@ -283,8 +283,7 @@ impl ClientSession {
         }
     }
 
-    /// Closes the client that has been without a place for longest of too many, and tells it why if it takes that at
-    /// once.
+    /// Closes an evicted client. Sends the reason if the socket accepts it without delay.
     async fn refuse_evicted<S>(&self, stream: &mut S, first: &[u8], why: Option<Refused>)
     where
         S: AsyncWrite + Unpin,

@@ -1,18 +1,18 @@
-//! A timer of an actor's task, set anew at every poll.
+//! A timer of an actor's task. Every poll sets its deadline.
 //!
-//! **Invariant:** a task that polls it is woken at the time that it has given last, or earlier.
+//! **Invariant:** a task that polls it is woken at its last deadline or earlier.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// The timer; it waits for nothing before it is polled.
+/// The timer. It has no deadline before its first poll.
 #[derive(Default)]
 pub(super) struct Timer(Option<Pin<Box<Sleep>>>);
 
 impl Timer {
-    /// Ready once `due` has come; without one it never is.
+    /// Ready once `due` has passed. Without a deadline it is never ready.
     pub(super) fn poll(&mut self, due: Option<Instant>, cx: &mut Context<'_>) -> Poll<()> {
         let Some(due) = due else {
             return Poll::Pending;

@@ -1,7 +1,7 @@
 //! The transport of a client's frames: plain bytes, or a WebSocket around them.
 //!
-//! **Invariant:** the reader gets a stream of bytes, in which every frame ends where its braces close or with its line,
-//! or whole messages. The writer hands over whole frames that end in a newline, for either.
+//! **Invariant:** the reader gets whole messages, or a byte stream. In a stream, a frame ends at its closing brace or
+//! at the end of its line. The writer passes whole frames that end in a newline, for both transports.
 
 use std::io;
 use std::pin::Pin;
@@ -17,25 +17,25 @@ use super::websocket::WebSocket;
 #[cfg(feature = "web")]
 use crate::actors::resources::memory::Permit;
 
-/// The stream of a client that is served, and the protocol on it.
+/// The stream of a served client, and its protocol.
 pub(super) enum Transport<S> {
     Plain(S),
     #[cfg(feature = "web")]
     WebSocket(Box<WebSocket<S>>),
 }
 
-/// What a client has sent.
+/// Data from a client.
 #[cfg_attr(not(feature = "web"), derive(Clone, Copy))]
 pub(super) enum ReceivedData {
-    /// This many bytes of a stream; none at its end, after which the client may still be reading.
+    /// This many bytes of a stream. 0 at its end, after which the client may still read.
     Bytes(usize),
-    /// A message, and the room that it takes if it is long.
+    /// A message, and its memory permit if it is long.
     #[cfg(feature = "web")]
     Message(Bytes, Option<Permit>),
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
-    /// Whether its frames are messages, which may be binary. Its end is answered by the other side.
+    /// Whether its frames are messages, which may be binary. The peer then answers the end of the connection.
     pub(super) const fn has_messages(&self) -> bool {
         match self {
             Self::Plain(_) => false,
@@ -44,7 +44,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Appends the available bytes of a stream, or gives the next message.
+    /// Appends the available bytes of a stream, or returns the next message.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
@@ -62,7 +62,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         })
     }
 
-    /// Whether a message has begun and not ended. The frames of a stream are the reader's.
+    /// Whether a message is incomplete. For a stream, the reader checks its frames instead.
     pub(super) fn is_unfinished(&self) -> bool {
         match self {
             Self::Plain(_) => false,
@@ -71,7 +71,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Gives up a frame that takes too long. It is an error where the transport itself tells the client `why`.
+    /// Abandons a frame that takes too long. Returns an error if the transport itself sends `why` to the client.
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
         match self {
             Self::Plain(_) => {
@@ -86,7 +86,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Reads from a client that was refused: nothing that comes is looked at.
+    /// Reads from a refused client. The input is discarded.
     pub(super) fn poll_swallow(
         &mut self,
         cx: &mut Context<'_>,
@@ -99,8 +99,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Sends some of `frames`, in order, and gives the number of bytes. The rest of a frame comes first in the next
-    /// call; until one is ready, `frames` stay the same.
+    /// Sends some of `frames`, in order. Returns the number of bytes. The next call begins with the rest of a frame.
+    /// `frames` must stay the same until a call is ready.
     pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
@@ -113,7 +113,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Sends what the transport itself has to say: the answers to pings. Called when there is nothing else to send.
+    /// Sends the transport's own frames, such as answers to pings. Called when there is nothing else to send.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self {
             Self::Plain(_) => {
@@ -125,7 +125,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// When the client last took a byte of a write that goes on. Over TCP a write is over then.
+    /// Time when the client last took a byte of the current write. `None` over TCP, where every write is short.
     pub(super) fn last_taken(&self) -> Option<Instant> {
         match self {
             Self::Plain(_) => None,
@@ -134,7 +134,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
-    /// Ends the stream in order.
+    /// Closes the stream in an orderly way.
     pub(super) fn poll_end(
         &mut self,
         cx: &mut Context<'_>,

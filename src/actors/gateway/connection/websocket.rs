@@ -1,8 +1,8 @@
-//! WebSocket clients: a message is a frame. Pings and closes of the peer are answered. A peer whose machine is gone is
-//! found by TCP, as every other client's is.
+//! WebSocket clients: a message is a frame. Pings and closes of the peer are answered. TCP keepalive detects a peer
+//! whose machine is gone, as for every other client.
 //!
-//! **Invariant:** one poll receives a bounded number of bytes, and of frames. Of a message that has no room no more is
-//! read than what needs none.
+//! **Invariant:** one poll receives a bounded number of bytes and of frames. A long message is read up to [`MEDIUM`]
+//! bytes before it gets its memory permit.
 
 use std::io;
 use std::pin::Pin;
@@ -26,34 +26,34 @@ use crate::protocol::limits::{MAX_FRAME, MEDIUM};
 
 /// Input buffer of a WebSocket. It lives as long as the connection, so it is small.
 const READ_BUFFER: usize = 8 * 1024;
-/// Bytes that are read before others have a turn. They may be ten thousand empty frames without a message.
+/// Bytes read before other connections have a turn. They may be ten thousand empty frames without a message.
 const TURN: usize = 32 * 1024;
-/// Bytes of the head of a control frame: two, and four of the mask.
+/// Bytes of a control frame's header: two, and four of the mask.
 const CONTROL_HEAD: usize = 6;
-/// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
-/// seen to take it.
+/// Bytes of payload in one WebSocket frame and in one write. A longer message is sent in fragments, so that the
+/// client's progress is measurable.
 const FRAGMENT: usize = 32 * 1024;
-/// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
-/// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
+/// Most bytes that wait to be written: one write with its headers, and pongs. If a pong does not fit, one pong answers
+/// all pings up to the latest one, as RFC 6455 allows (section 5.5.3).
 const WRITE_BUFFER: usize = 2 * FRAGMENT;
 
-/// A stream on which the handshake has been made.
+/// A stream after the handshake.
 pub(super) struct WebSocket<S> {
     socket: WebSocketStream<MonitoredStream<S>>,
-    /// A long message, kept until the library reads on: it would keep the memory of one that is gone for the next.
+    /// A long message, kept until the library reads again. Otherwise the library would keep its memory for reuse.
     spent: Option<Bytes>,
-    /// The kind of the message that the next write continues, if it does not begin one.
+    /// The kind of the message that the next write continues, if there is one.
     unfinished: Option<Data>,
-    /// Bytes of frames that the library has taken and not written.
+    /// Bytes of frames that the library has queued and not written.
     underway: usize,
-    /// The reason for the end of the connection, for the peer.
+    /// The close reason for the peer.
     close_reason: (CloseCode, &'static str),
-    /// The close frame has been put behind all else.
+    /// The close frame has been queued.
     is_closing: bool,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
-    /// Takes a stream on which the handshake has been made; `behind` came after it.
+    /// Takes a stream after the handshake. `behind` has the bytes received after it.
     pub(super) async fn open(stream: S, behind: Bytes, memory: Memory) -> Self {
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
@@ -80,7 +80,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
 
     // ---- receiving --------------------------------------------------------------------------------------------------
 
-    /// Waits for a message. With a long one comes the room that it takes.
+    /// Waits for a message. A long one has its memory permit.
     pub(super) fn poll_read(
         &mut self,
         cx: &mut Context<'_>,
@@ -97,13 +97,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             let message = match message {
                 Poll::Ready(Some(Ok(Message::Text(text)))) => text.into(),
                 Poll::Ready(Some(Ok(Message::Binary(bytes)))) => bytes,
-                // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
-                // it.
+                // The library answers pings and closes at the next read. It never returns raw frames.
                 Poll::Ready(Some(Ok(control))) => {
                     self.stream().end_control(control.len());
                     continue;
                 }
-                // The peer has closed, and takes no answers any more.
+                // The peer has closed, and accepts no more answers.
                 Poll::Ready(None) => return Poll::Ready(Err(ClientLost::Gone)),
                 Poll::Ready(Some(Err(error))) => {
                     self.close_reason = close_reason(&error);
@@ -119,17 +118,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         Poll::Pending
     }
 
-    /// Whether a message has begun and not ended.
+    /// Whether a message is incomplete.
     pub(super) fn is_unfinished(&self) -> bool {
         self.socket.get_ref().is_unfinished()
     }
 
-    /// Refuses the peer, for a message that has begun does not end: it is told `why`.
+    /// Refuses the peer because of an incomplete message. The close frame has the reason `why`.
     pub(super) const fn refuse(&mut self, why: &'static str) {
         self.close_reason = (CloseCode::Policy, why);
     }
 
-    /// Reads from a peer that was refused: nothing that comes is looked at.
+    /// Reads from a refused peer. The input is discarded.
     pub(super) fn poll_swallow(
         &mut self,
         cx: &mut Context<'_>,
@@ -141,13 +140,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
 
     // ---- sending ----------------------------------------------------------------------------------------------------
 
-    /// Sends some of `frames`, which stay the same until it is ready, and gives the number of bytes.
+    /// Sends some of `frames`, which must stay the same until a call is ready. Returns the number of bytes.
     pub(super) fn poll_write<'a>(
         &mut self,
         cx: &mut Context<'_>,
         frames: impl Iterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
-        // Waiting pongs would take the room of the message.
+        // Otherwise waiting pongs would fill the buffer for the message.
         ready!(self.poll_flush(cx))?;
         if self.underway == 0 {
             self.underway = self.put_frames(frames)?;
@@ -188,12 +187,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         Ok(written)
     }
 
-    /// Puts a message where it is flushed from.
+    /// Queues a message for the next flush.
     fn put(&mut self, message: Message) -> io::Result<()> {
         self.socket.start_send_unpin(message).map_err(gone)
     }
 
-    /// Sends what was put, and the answers to pings and closes.
+    /// Sends queued messages, and the answers to pings and closes.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         self.socket
             .poll_flush_unpin(cx)
@@ -204,8 +203,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         Some(self.socket.get_ref().taken)
     }
 
-    /// Closes in order. Of a peer that was refused nothing is looked at any more, not even a close frame: the end of
-    /// the stream is enough.
+    /// Closes in an orderly way. The input of a refused peer is discarded, including its close frame. The end of the
+    /// stream is enough.
     pub(super) fn poll_end(
         &mut self,
         cx: &mut Context<'_>,
@@ -230,14 +229,14 @@ fn gone(_: Error) -> io::Error {
     io::ErrorKind::ConnectionAborted.into()
 }
 
-/// The reason given where a peer has broken a rule.
+/// The close reason for a peer that has violated a rule.
 fn close_reason(error: &Error) -> (CloseCode, &'static str) {
     match error {
         Error::Capacity(CapacityError::MessageTooLong { .. }) => {
-            (CloseCode::Size, "a message has at most 4 MiB")
+            (CloseCode::Size, "a message may have at most 4 MiB")
         }
-        Error::Utf8(_) => (CloseCode::Invalid, "a text message is UTF-8"),
-        _ => (CloseCode::Protocol, "not as RFC 6455 has it"),
+        Error::Utf8(_) => (CloseCode::Invalid, "a text message must be UTF-8"),
+        _ => (CloseCode::Protocol, "violates RFC 6455"),
     }
 }
 
@@ -250,7 +249,7 @@ fn kind_of(frame: &Bytes) -> Data {
     }
 }
 
-/// The part of a frame that one WebSocket frame has room for, and whether a message ends there. A text may be several
+/// The part of a frame that fits into one WebSocket frame, and whether a message ends there. A text may be several
 /// messages, one per line.
 fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
     let offered = frame.slice(..frame.len().min(room));
@@ -264,28 +263,28 @@ fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
     }
 }
 
-// ---- the stream, watched: for bytes that the peer takes, for a message that has begun or is long --------------------
+// ---- the monitored stream: bytes that the peer takes, incomplete messages, and long messages ------------------------
 
-/// The room for a long message, while it is waited for.
+/// Waits for the memory permit of a long message.
 type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 
-/// A stream that notes when its other side last took a byte, and how much it has sent of an unfinished message.
+/// A stream that records when the peer last took a byte, and the bytes that the peer has sent of an incomplete message.
 struct MonitoredStream<S> {
     stream: S,
-    /// When the other side last took a byte.
+    /// Time when the peer last took a byte.
     taken: Instant,
-    /// Bytes that were read since the last message was complete, without control frames: the message that comes.
+    /// Bytes of the incoming message: those read since the last complete message, without control frames.
     coming: usize,
-    /// Bytes that may still be read before others have a turn.
+    /// Bytes that may be read before other connections have a turn.
     left: usize,
     memory: Memory,
-    /// The room for the message that comes, if it is long.
+    /// The memory permit of the incoming message, if it is long.
     permit: Option<Permit>,
     waiting: Option<ComingPermit>,
 }
 
 impl<S> MonitoredStream<S> {
-    /// A stream of which no byte counts yet.
+    /// A stream without counted bytes.
     fn new(stream: S, memory: Memory) -> Self {
         Self {
             stream,
@@ -298,23 +297,23 @@ impl<S> MonitoredStream<S> {
         }
     }
 
-    /// A message is complete. Returns the room that it has taken, if it is long.
+    /// Notes a complete message. Returns its memory permit, if it is long.
     fn end_message(&mut self) -> Option<Permit> {
         self.coming = 0;
         self.permit.take()
     }
 
-    /// A control frame with that many bytes has come. It may lie between the parts of a message.
+    /// Notes a control frame with `payload` bytes. It may arrive between the parts of a message.
     fn end_control(&mut self, payload: usize) {
         self.coming = self.coming.saturating_sub(CONTROL_HEAD + payload);
     }
 
-    /// Whether a message has begun and not ended.
+    /// Whether a message is incomplete.
     const fn is_unfinished(&self) -> bool {
         self.coming > 0
     }
 
-    /// Waits until there is room for the message that comes, if it is long.
+    /// Waits for the memory permit of the incoming message, if it is long.
     fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         if self.coming <= MEDIUM || self.permit.is_some() {
             return Poll::Ready(());

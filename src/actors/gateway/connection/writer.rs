@@ -1,11 +1,11 @@
-//! Writing to one client: drains the outbox, several frames at a time. Nothing else writes to the socket of a client
-//! that is served.
+//! The writer of one client drains the outbox, several frames at a time. Only the writer writes to the socket of a
+//! served client.
 //!
 //! The writer is polled after each message that the actor has handled, so the contents of the outbox are offered to the
 //! socket in the same turn.
 //!
-//! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever. One
-//! poll writes a bounded number of bytes.
+//! **Invariant:** a write that the client does not take blocks only this connection, and only until a timeout. One poll
+//! writes a bounded number of bytes.
 
 use std::pin::Pin;
 use std::task::{self, Poll, ready};
@@ -21,15 +21,15 @@ use super::transport::Transport;
 use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
 use crate::actors::panics::contain;
 
-/// The writing half of a connection: it ends the connection.
+/// The writing half of a connection. It ends the connection.
 #[derive(Default)]
 pub(super) struct ClientWriter {
     timer: Timer,
-    /// By when the end of the stream has to be out.
+    /// Deadline of the end of the stream.
     end_due: Option<Instant>,
-    /// All has been written; the reader may go on.
+    /// All messages were written. The reader may continue.
     is_all_written: bool,
-    /// Until when it may, if the other side answers the end.
+    /// Deadline of the reader, if the peer answers the end.
     answer_due: Option<Instant>,
 }
 
@@ -80,7 +80,7 @@ impl ClientWriter {
         self.timer.poll(self.answer_due, cx)
     }
 
-    /// Writes what there is. Ready at the end: whether all that was queued has been written.
+    /// Writes the queued messages. Ready at the end of the connection, with whether all of them were written.
     fn poll_write<S: AsyncRead + AsyncWrite + Unpin + 'static>(
         &mut self,
         connection: &mut Connection<S>,
@@ -95,7 +95,7 @@ impl ClientWriter {
             let (patience, release) = if connection.outgoing.take(is_finishing) {
                 match transport.poll_write(cx, connection.outgoing.frames()) {
                     Poll::Ready(Ok(bytes)) => {
-                        // The reader may go on, and where much was written other connections have a turn.
+                        // After many bytes, other connections have a turn. The reader may continue.
                         let may_read = connection.note_written(bytes);
                         written += bytes;
                         if written >= WRITE_BYTES / 2 {

@@ -1,7 +1,7 @@
-//! The names that clients serve to others: services and actions. They are kept in order, and so are the topics, so that
-//! telling them costs no search.
+//! The names that clients serve to others: services and actions. They and the topics are sorted, so that listing them
+//! needs no search.
 //!
-//! **Invariant:** a name is here exactly as long as a client has it registered.
+//! **Invariant:** the directory has a name exactly as long as a client has registered it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::actors::ConnectionId;
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
 
-/// What a client may serve to others.
+/// The kinds of names that a client can serve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Served {
     Service,
@@ -25,7 +25,7 @@ impl Served {
         }
     }
 
-    /// What its provider does.
+    /// The verb for its provider.
     pub(crate) const fn verb(self) -> &'static str {
         match self {
             Self::Service => "provide",
@@ -33,7 +33,7 @@ impl Served {
         }
     }
 
-    /// What comes to its provider.
+    /// The word for a request to its provider.
     pub(crate) const fn request(self) -> &'static str {
         match self {
             Self::Service => "call",
@@ -42,7 +42,7 @@ impl Served {
     }
 }
 
-/// The services and actions by their absolute names, each with all that is known of it.
+/// The services and actions by their absolute names, each with its provider.
 #[derive(Default)]
 pub(crate) struct Directory {
     services: BTreeMap<Arc<str>, Provider>,
@@ -53,7 +53,7 @@ pub(crate) struct Directory {
 #[derive(Clone)]
 pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,
-    /// The name as the provider spells it: it is called by that.
+    /// The provider's spelling of the name. Requests to it have this spelling.
     pub(crate) spelling: Box<str>,
     type_name: Option<Arc<str>>,
 }
@@ -66,7 +66,7 @@ impl Directory {
         }
     }
 
-    /// Makes a client the provider of `name`; the newest registration wins. Returns the provider before it.
+    /// Makes a client the provider of `name`. The newest registration wins. Returns the previous provider.
     pub(crate) fn provide(
         &mut self,
         kind: Served,
@@ -90,7 +90,7 @@ impl Directory {
         }
     }
 
-    /// Withdraws a name if `connection` is its provider; true if it was.
+    /// Withdraws a name if `connection` is its provider. Returns whether it was.
     pub(crate) fn withdraw(&mut self, kind: Served, name: &str, connection: ConnectionId) -> bool {
         let is_ours = |one: &Provider| one.connection == connection;
         let is_served = self.provider(kind, name).is_some_and(is_ours);
@@ -100,7 +100,7 @@ impl Directory {
         is_served
     }
 
-    /// These and the topics, up to the limit of a list.
+    /// Lists the topics, services and actions, up to the limit of each list.
     pub(crate) fn census(&self, topics: impl Iterator<Item = ListedTopic>) -> Census {
         let listed = |all: &BTreeMap<Arc<str>, Provider>| {
             let all = all.iter().take(MAX_LISTED);

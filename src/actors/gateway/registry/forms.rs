@@ -1,7 +1,7 @@
-//! Topic messages in the forms that some of their subscribers have asked for.
+//! Topic messages in the forms that subscribers requested.
 //!
-//! **Invariant:** a form is made once for all clients. A form that takes long is made on another thread, and
-//! its publisher waits.
+//! **Invariant:** a form is made once for all clients. A long message is encoded on a worker thread, and its publisher
+//! waits.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,7 +17,7 @@ use crate::protocol::ros::tree::MessageTree;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
-/// Longest message, or series of them, whose forms are made on the registry's thread. Each takes about a tenth of a
+/// Longest message, or series of messages, that is encoded on the registry's thread. Each form takes about a tenth of a
 /// millisecond.
 const ENCODED_HERE: usize = 16 * 1024;
 
@@ -25,11 +25,11 @@ const ENCODED_HERE: usize = 16 * 1024;
 #[derive(Default)]
 pub(super) struct Made {
     pub(super) messages: Vec<Bytes>,
-    /// How many could not be made: they are longer than any outbox takes, or do not fit their type.
+    /// Number of messages that could not be made: too long for every outbox, or not of their type.
     pub(super) lost: u64,
 }
 
-/// A message, or a series of them, that is to be made in another form.
+/// A message, or a series of messages, to encode in another form.
 pub(super) struct ToEncode {
     /// The topic, as the subscribers spell it.
     pub(super) spelling: Box<str>,
@@ -38,14 +38,14 @@ pub(super) struct ToEncode {
     pub(super) encoding: Encoding,
     /// The type of the topic's messages, if it is known.
     pub(super) type_name: Option<&'static str>,
-    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    /// Number of messages sent in fragments. It is part of the fragments' ids.
     pub(super) fragmented: Arc<AtomicU64>,
-    /// The room that a long message takes, in any form.
+    /// The memory permit of a long message. All its forms share it.
     pub(super) permit: Option<Permit>,
 }
 
 impl ToEncode {
-    /// Whether it is so long that another thread has to do it.
+    /// Whether it is so long that a worker thread must encode it.
     pub(super) fn is_long(&self) -> bool {
         self.plain.len() > ENCODED_HERE
     }
@@ -59,7 +59,7 @@ impl ToEncode {
             let message = match self.encode(&message) {
                 Some(Some(encoded)) => cover_message(self.permit.as_ref(), encoded),
                 Some(None) if is_alone => message,
-                // Each message lies by itself, so that to keep one keeps no other in memory.
+                // A copy, because a slice would keep the whole series in memory.
                 Some(None) => Bytes::copy_from_slice(&message),
                 None => {
                     made.lost += 1;
@@ -71,7 +71,7 @@ impl ToEncode {
         made
     }
 
-    /// One message: `None` where it can't be written so, `Some(None)` where it stays as it is.
+    /// Encodes one message. Returns `None` if that is impossible, and `Some(None)` if the message is unchanged.
     #[allow(clippy::option_option, reason = "one is dropped, the other is not")]
     fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
         let (encoding, spelling, type_name) = (self.encoding, &*self.spelling, self.type_name);

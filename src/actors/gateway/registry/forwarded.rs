@@ -1,7 +1,7 @@
-//! Calls and goals that were forwarded to the clients that serve them, and have not ended.
+//! Calls and goals that were forwarded to their providers and have not ended.
 //!
-//! **Invariant:** each ends once: by the answer of its own provider, by its deadline, or with that client. A goal
-//! outlives its sender, but then its progress is not sent.
+//! **Invariant:** each ends once: by its provider's answer, by its deadline, or when the provider disconnects. A goal
+//! outlives its sender, but then its feedback is not sent.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,34 +13,34 @@ use crate::actors::ConnectionId;
 use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::wire::json::Payload;
 
-/// Longest spelling of such an id in JSON: the prefix, twenty digits, quotes, every character escaped as `\u0070`.
+/// Longest spelling of a request's id in JSON: prefix, twenty digits, quotes, each character escaped as `\u0070`.
 const LONGEST_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
 
 /// A call or a goal.
 pub(crate) struct Forwarded {
     pub(crate) caller: ConnectionId,
-    /// The caller's id for it.
+    /// The caller's id of the request.
     pub(crate) id: Option<Payload>,
     pub(crate) provider: ConnectionId,
     /// The name of the service or action, as the caller spells it.
     pub(crate) name: Box<str>,
     pub(crate) terms: RequestTerms,
-    /// The part of its caller's room that it takes.
+    /// Its part of the caller's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
     pub(crate) _entry: KeptEntry,
 }
 
-/// What sets calls and goals apart.
+/// The differences between calls and goals.
 pub(crate) enum RequestTerms {
-    /// A call ends when its caller's patience does. The registry may look later, if the process has stood still.
+    /// A call ends at its deadline. The registry may notice that later if the process was suspended.
     Call { deadline: Instant },
-    /// A goal continues, and may be cancelled under its name at the server.
+    /// A goal has no deadline. It can be cancelled under its name at the server.
     Goal {
         spelling: Box<str>,
         wants_feedback: bool,
     },
 }
 
-/// What a request is found by. Deadlines come first, the next one before all else.
+/// A key of the index. Deadlines sort first, so the first entry is the next deadline.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum RequestKey {
     Deadline(Instant),
@@ -111,7 +111,7 @@ impl Requests {
         self.numbers_between(key, key)
     }
 
-    /// The same under the keys from `first` to `last`.
+    /// The numbers of the requests under the keys from `first` to `last`, oldest first under each key.
     fn numbers_between(
         &self,
         first: RequestKey,
@@ -127,8 +127,8 @@ impl Requests {
         self.numbers(key).next().is_some()
     }
 
-    /// The number of the request that `provider` means by `id`, if it is that provider's. Without an id, it is the only
-    /// one that waits for `provider`, if it is of `name`.
+    /// The number of the request with this `id`, if `provider` serves it. Without an id, it is the only request that
+    /// waits for `provider`, if its name is `name`.
     pub(crate) fn meant(
         &self,
         kind: Served,
@@ -152,7 +152,7 @@ impl Requests {
         (is_theirs && is_meant && !is_late).then_some(number)
     }
 
-    /// The newest goal of `caller` under `id`, and its id at the provider.
+    /// The newest goal of `caller` with this `id`, and its id at the provider.
     pub(crate) fn goal_made_under(
         &self,
         id: Option<&Payload>,
@@ -171,7 +171,7 @@ impl Requests {
         self.outstanding.get(&number)
     }
 
-    /// Takes a request that ends.
+    /// Removes and returns a request.
     pub(crate) fn take(&mut self, number: u64) -> Option<Forwarded> {
         let request = self.outstanding.remove(&number)?;
         for key in request.keys() {
@@ -180,14 +180,14 @@ impl Requests {
         Some(request)
     }
 
-    /// Takes every request, oldest first.
+    /// Removes and returns every request, oldest first.
     pub(crate) fn take_all(&mut self) -> Vec<Forwarded> {
         let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
         let requests = numbers.into_iter().map(|number| self.take(number));
         requests.flatten().collect()
     }
 
-    /// When the first request's time will be over.
+    /// The earliest deadline.
     pub(crate) fn next_deadline(&self) -> Option<Instant> {
         match self.index.first()? {
             (RequestKey::Deadline(deadline), _) => Some(*deadline),
@@ -195,7 +195,7 @@ impl Requests {
         }
     }
 
-    /// Takes the request whose time has been over for longest, if there is one.
+    /// Removes and returns the request with the earliest deadline, if that has passed.
     pub(crate) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
         self.next_deadline().filter(|due| *due <= now)?;
         let (_, number) = *self.index.first()?;
@@ -209,7 +209,7 @@ impl Requests {
         waiting.next()
     }
 
-    /// Forgets the requests that `caller` has made.
+    /// Removes the requests of `caller`.
     pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
         let of = |kind| RequestKey::Caller(caller, kind);
         let made = self.numbers_between(of(Served::Service), of(Served::Action));

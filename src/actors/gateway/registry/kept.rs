@@ -1,6 +1,6 @@
 //! The registry's entries of one client: registrations, and calls and goals that wait for other clients.
 //!
-//! **Invariant:** it is at most [`MAX_KEPT`] bytes, and given back when it is dropped.
+//! **Invariant:** their sum is at most [`MAX_KEPT`] bytes. A dropped entry is subtracted.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -8,7 +8,7 @@ use std::rc::Rc;
 use super::refusal::Refusal;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_KEPT};
 
-/// The sum of one client's entries \[bytes\]; clones share it.
+/// The sum of one client's entries \[bytes\]. Clones share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kept(Rc<Cell<usize>>);
 
@@ -20,8 +20,8 @@ pub(crate) struct KeptEntry {
 }
 
 impl Kept {
-    /// Makes room for an entry whose names have so many bytes; `instead` of another one that is dropped next, if there
-    /// is one.
+    /// Adds an entry whose names have `names` bytes. The caller drops `instead` next, so its bytes do not count towards
+    /// the limit.
     pub(crate) fn enter(
         &self,
         names: usize,

@@ -1,10 +1,10 @@
-//! The registry: it knows every client, topic and service, fans messages out to subscribers, and routes calls.
+//! The registry has every client, topic and service. It fans messages out to subscribers, and routes calls.
 //!
-//! Here are its state and its handlers. `publish.rs`, `subscriptions.rs` and `requests.rs` have the rosbridge ops, and
-//! the other files its tables, which send nothing.
+//! This file has its state and handlers. `publish.rs`, `subscriptions.rs` and `requests.rs` have the rosbridge ops. The
+//! other files have its tables, which send nothing.
 //!
-//! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any. A
-//! refused op changes nothing. It is answered by an error status or by the call's one response.
+//! **Invariant:** a message is encoded once for any number of subscribers, and not at all without subscribers. A
+//! refused op changes nothing. It gets an error status, or the call's one response.
 
 mod directory;
 mod forms;
@@ -49,7 +49,7 @@ use crate::protocol::names;
 use crate::protocol::op::{ActionServerOp, Op, Verbosity};
 use crate::protocol::wire::json::Payload;
 
-/// Calls and goals that are ended in a row, which takes a third of a millisecond.
+/// Calls and goals ended per cleanup, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -66,23 +66,23 @@ pub struct Registry {
     directory: Directory,
     /// Calls and goals that wait for the clients that serve them.
     requests: Requests,
-    /// Clients that have gone while calls or goals waited for them.
+    /// Providers that have disconnected while calls or goals waited for them.
     gone: VecDeque<ConnectionId>,
-    /// When the next cleanup is, and the task that waits for it.
+    /// Time of the next cleanup, and the task that waits for it.
     next_cleanup: Option<(Instant, SpawnHandle)>,
     nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     latched: HashMap<Topic, Bytes>,
-    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    /// Number of messages sent in fragments. It is part of the fragments' ids.
     fragmented: Arc<AtomicU64>,
     gauges: Arc<Gauges>,
     places: Places,
     connections_made: u64,
-    /// Copies what passes to the recorder, while it records.
+    /// Passes messages and calls to the recorder, while it records.
     tap: Option<Tap>,
-    /// Why no call is taken any more, once the runtime is ending.
+    /// The reason why calls are rejected, once the runtime is ending.
     closed: Option<&'static str>,
-    /// The room that the frame takes whose op is being performed, if it is a long one.
+    /// The memory permit of the frame whose op is being performed, if that frame is long.
     permit: Option<Permit>,
 }
 
@@ -91,27 +91,27 @@ struct Client {
     outlets: Outlets,
     /// Its address.
     from: IpAddr,
-    /// The room of all that it has registered, and of calls and goals that wait for other clients.
+    /// The sum of its registrations, and of its calls and goals that wait for other clients.
     kept: Kept,
     registered: Registrations,
-    /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
+    /// Topics of the runtime's subscriptions that this client has explicitly unadvertised. Its messages there are
     /// dropped until it advertises again.
     withdrawn: HashSet<Topic>,
-    /// The least level of its statuses.
+    /// The lowest level of statuses that it gets.
     verbosity: Verbosity,
-    /// Ends with the client.
+    /// Dropped when the client disconnects.
     present: Arc<()>,
-    /// Ends with the client, and when it unsubscribes from the feedback of goals that it has published.
+    /// Replaced when the client unsubscribes from the feedback of its goals, and dropped with the client.
     listening: Arc<()>,
-    /// A guard that is dropped once no call of this client waits, if it has stopped sending.
+    /// Dropped once no call of this client waits. Set after the client has stopped sending.
     answered: Option<oneshot::Sender<()>>,
 }
 
-/// All registrations of one client, in order of the names. They are withdrawn in that order.
+/// The registrations of one client, sorted by name. They are withdrawn in that order.
 #[derive(Default)]
 struct Registrations {
     advertised: BTreeMap<Box<str>, KeptEntry>,
-    /// Topics that it subscribes to, as it spells them.
+    /// Topics of its subscriptions, in its own spelling.
     subscribed: BTreeSet<Arc<str>>,
     services: BTreeMap<Box<str>, KeptEntry>,
     actions: BTreeMap<Box<str>, KeptEntry>,
@@ -124,7 +124,7 @@ struct FrameOrigin {
 }
 
 impl Registry {
-    /// A registry without nodes; they come with [`Attach`].
+    /// A registry without nodes. [`Attach`] adds them.
     #[must_use]
     pub fn new(gauges: Arc<Gauges>) -> Self {
         Self {
@@ -174,13 +174,13 @@ impl Client {
         self.respond(frame, None);
     }
 
-    /// Sends a response, of one of the runtime's own services if there is one given.
+    /// Sends a response. `service` is the responding service, if it is the runtime's own.
     fn respond(&self, frame: Bytes, service: Option<Service>) {
         let response = ToClient::Respond { frame, service };
         self.outlets.mailbox.do_send(response);
     }
 
-    /// Sends progress of a goal, which may be lost.
+    /// Sends feedback of a goal. It may be dropped.
     fn deliver_feedback(&self, frame: Bytes) {
         self.outlets.mailbox.do_send(ToClient::Deliver {
             topic: None,
@@ -189,7 +189,7 @@ impl Client {
         });
     }
 
-    /// Sets the form in which the client gets the reason of a failed call, if one is given.
+    /// Sets the form in which the client gets the reason of a failed call, if `form` is given.
     fn set_error_form(&self, form: Option<ErrorForm>) {
         if let Some(form) = form {
             let wants_text = form == ErrorForm::Text;
@@ -197,7 +197,7 @@ impl Client {
         }
     }
 
-    /// Bytes of responses that it has not taken yet.
+    /// Bytes of responses that wait to be written to it.
     fn backlog(&self) -> usize {
         self.outlets.backlog.load(Ordering::Relaxed)
     }
@@ -391,7 +391,7 @@ impl Handler<FinishAll> for Registry {
     type Result = ();
 
     fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        // The oldest go first, so that the order is the same in every run.
+        // Sorted, so that the order is the same in every run.
         let mut clients: Vec<_> = self.clients.iter().collect();
         clients.sort_unstable_by_key(|(id, _)| **id);
         for (_, client) in clients {
@@ -403,7 +403,7 @@ impl Handler<FinishAll> for Registry {
 // ---- ops ------------------------------------------------------------------------------------------------------------
 
 impl Registry {
-    /// Performs one op of a client that is known.
+    /// Performs one op of a registered client.
     fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
         let Request { from, id, op, .. } = request;
         let origin = FrameOrigin { from, id };
@@ -442,7 +442,7 @@ impl Registry {
         Handled::at_once()
     }
 
-    /// Performs an op of a client that serves others: it advertises a service or an action, or answers.
+    /// Performs an op of a provider: it advertises a service or an action, or answers a request.
     fn perform_as_provider(&mut self, origin: &FrameOrigin, op: Op) -> Result<(), Refusal> {
         match op {
             Op::AdvertiseService { service, type_name } => {
@@ -488,13 +488,13 @@ impl Registry {
                 };
                 self.fail_answered(origin, kind, name.as_deref(), problem)
             }
-            // Pieces have been put together before, and so has a token been checked; where none is asked for, any token
-            // will do.
+            // The connection has already joined the pieces and checked the token. If no token is required, any token is
+            // accepted.
             _ => Ok(()),
         }
     }
 
-    /// Tells the sender of a frame by an error status why nothing came of it.
+    /// Sends an error status with the reason to the sender of a refused frame.
     fn refuse(&self, origin: &FrameOrigin, why: &Refusal) {
         self.send_status(
             origin.from,
@@ -515,17 +515,17 @@ impl Registry {
         }
     }
 
-    /// The frame, with the room that the long frame takes which it has come of.
+    /// The frame with the memory permit of the long frame from which it was made.
     fn covered(&self, frame: Bytes) -> Bytes {
         cover(self.permit.as_ref(), frame)
     }
 
-    /// Whether messages on the topic of that absolute name are to be made.
+    /// Whether the topic has a subscriber or a tap. `topic` is an absolute name.
     fn is_wanted(&self, topic: &str) -> bool {
         self.tap.is_some() || !self.topics.subscribers(topic).is_empty()
     }
 
-    /// Notes that the topic has no subscriber any more.
+    /// Notes that the topic's last subscriber has gone.
     fn note_unwanted(&mut self, topic: &str) {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);
@@ -542,11 +542,11 @@ impl Registry {
     }
 }
 
-// ---- cleanup: however many end at one instant, all others have a turn after every few of them -----------------------
+// ---- cleanup: calls and goals end in batches, and other messages are handled in between -----------------------------
 
 impl Registry {
-    /// Withdraws all that a client has registered, and leaves the calls and goals that wait for its answer to the
-    /// cleanup: they may be those of all other clients.
+    /// Withdraws a client's registrations. The cleanup ends the calls and goals that wait for its answer, because there
+    /// may be many.
     fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
@@ -569,7 +569,7 @@ impl Registry {
         }
     }
 
-    /// Schedules the next cleanup: at once if a provider has gone, else when the first call's time is over.
+    /// Schedules the next cleanup: at once if a provider has disconnected, else at the earliest deadline.
     fn schedule_cleanup(&mut self, ctx: &mut Context<Self>) {
         let left = (!self.gone.is_empty()).then(Instant::now);
         let Some(due) = left.or_else(|| self.requests.next_deadline()) else {
@@ -593,7 +593,7 @@ impl Registry {
         self.next_cleanup = Some((due, waiting));
     }
 
-    /// Ends some of what is to be ended: calls whose time is over first.
+    /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
     fn clean_up_some(&mut self) {
         let now = Instant::now();
         for _ in 0..ENDED_IN_A_ROW {
@@ -613,7 +613,7 @@ impl Registry {
         }
     }
 
-    /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
+    /// Removes a subscriber from a topic, and notifies the topic's owner if it was the last one.
     fn drop_subscriber(&mut self, topic: &str, connection: ConnectionId) {
         let name = names::absolute(topic);
         self.topics.remove_subscriber(&name, topic, connection);

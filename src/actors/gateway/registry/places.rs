@@ -1,6 +1,6 @@
-//! The places of the clients: how many there are, which are kept, and how often somebody is warned that none is free.
+//! The places of the clients: their number, the kept ones, and the rate of warnings that none is free.
 //!
-//! **Invariant:** a client that has a place keeps it until it leaves.
+//! **Invariant:** a client with a place keeps it until it disconnects.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use tokio::time::Instant;
 use crate::actors::gateway::limits::KEPT_PLACES;
 use crate::actors::gateway::messages::Refused;
 
-/// Least time between two warnings.
+/// Shortest time between two warnings.
 const WARNING_INTERVAL: Duration = Duration::from_secs(60);
 
 /// The places, and the refusals since the last warning.
@@ -33,18 +33,18 @@ impl Places {
         }
     }
 
-    /// How many there are.
+    /// The number of places.
     pub(crate) const fn clients(&self) -> usize {
         self.clients
     }
 
-    /// Whether there is a place for one more client beside those that have one.
+    /// Whether there is a place for one more client when `taken` places are in use.
     pub(crate) const fn has_room(&self, taken: usize, may_use_kept: bool) -> bool {
         let kept = if may_use_kept { 0 } else { self.kept };
         taken + kept < self.clients
     }
 
-    /// The answer to a client for which there is none.
+    /// The refusal of a client without a place.
     pub(crate) const fn refusal(&self) -> Refused {
         Refused::Full {
             clients: self.clients,

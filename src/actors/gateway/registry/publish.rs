@@ -1,8 +1,8 @@
-//! Published messages: who may publish, and the fan-out. A message is encoded once for each spelling of its topic and
-//! each encoding asked for, and goes to every subscriber.
+//! Published messages: the right to publish, and the fan-out. A message is encoded once for each spelling of its topic
+//! and each requested encoding, and is delivered to every subscriber.
 //!
-//! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
-//! bytes. A message that takes long to encode holds up its publisher alone.
+//! **Invariant:** without subscribers nothing is encoded. Subscribers that requested the same encoding share the same
+//! bytes. A long message delays only its publisher.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series::Series;
 
 impl Registry {
-    /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own subscriber if there is one.
     pub(super) fn publish(
         &mut self,
         origin: FrameOrigin,
@@ -70,7 +70,7 @@ impl Registry {
         Handled::with(ended)
     }
 
-    /// Delivers messages of a client as they are, if it advertises the topic.
+    /// Delivers messages of a client unchanged, if it advertises the topic.
     pub(super) fn publish_lines(
         &self,
         from: ConnectionId,
@@ -87,8 +87,8 @@ impl Registry {
         Handled::with(ended)
     }
 
-    /// Delivers a message, or a series of them, to every subscriber of `topic`, an absolute name, whatever its
-    /// spelling. `encode` makes the JSON for a spelling. `done` is of a publisher that can wait; a live arm can't.
+    /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
+    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait.
     fn fan_out(
         &self,
         topic: &str,
@@ -118,9 +118,9 @@ impl Registry {
         }
     }
 
-    /// Delivers a message in another form, where it takes long once another thread has made that.
+    /// Delivers a message in another form. A worker thread encodes a long one first.
     fn deliver_encoded(&self, message: ToEncode, done: Option<&Done>, ctx: &mut Context<Self>) {
-        // A node does not wait, and none of its messages is long.
+        // A node cannot wait, and its messages are short.
         if done.is_none() || !message.is_long() {
             return self.deliver_made(&message, &message.make(), done);
         }
@@ -134,7 +134,7 @@ impl Registry {
         }));
     }
 
-    /// Delivers a message in one form to the subscribers that asked for that form.
+    /// Delivers a message in one form to the subscribers that requested that form.
     fn deliver_made(&self, message: &ToEncode, made: &Made, done: Option<&Done>) {
         let topic = names::absolute(&message.spelling);
         for subscriber in self.subscribers_as(&topic, &message.spelling) {
@@ -144,13 +144,13 @@ impl Registry {
         }
     }
 
-    /// The subscribers to `topic`, an absolute name, that spell it so.
+    /// The subscribers to `topic`, an absolute name, under this spelling.
     fn subscribers_as(&self, topic: &str, spelling: &str) -> impl Iterator<Item = &Subscriber> {
         let subscribers = self.topics.subscribers(topic).iter();
         subscribers.filter(move |one| *one.spelling == *spelling)
     }
 
-    /// Delivers the messages that could be made in a form. The others count as dropped.
+    /// Delivers the messages of a form. Those that could not be made count as dropped.
     fn deliver_form(&self, subscriber: &Subscriber, made: &Made, done: Option<&Done>) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
@@ -158,7 +158,7 @@ impl Registry {
         }
     }
 
-    /// Delivers a latched topic's last message for a subscription that came after it.
+    /// Delivers a latched topic's last message to a new subscription.
     pub(super) fn deliver_latched(&self, spelling: &str, to: ConnectionId) {
         let latched = Topic::from_name(spelling).map(|topic| (topic, self.latched.get(&topic)));
         let Some((topic, Some(frame))) = latched else {
@@ -175,7 +175,7 @@ impl Registry {
         }
     }
 
-    /// The type of a topic's messages, if a client has given one that the runtime knows.
+    /// The type of a topic's messages: the runtime's own, or a known type that a client has given.
     pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),
@@ -183,7 +183,7 @@ impl Registry {
         }
     }
 
-    /// A JSON frame, or a series of them, that is to be made in another form.
+    /// A JSON frame, or a series of frames, to encode in another form.
     fn to_encode(&self, spelling: &str, plain: Bytes, encoding: Encoding) -> ToEncode {
         ToEncode {
             spelling: spelling.into(),
@@ -199,7 +199,7 @@ impl Registry {
 impl Handler<Publish> for Registry {
     type Result = ();
 
-    /// Delivers a message of a node, and keeps it if its topic is latched.
+    /// Delivers a message of a node. Stores it if its topic is latched.
     fn handle(&mut self, Publish { topic, frame }: Publish, ctx: &mut Context<Self>) {
         let name = topic.name();
         if !self.is_wanted(name) {
@@ -217,7 +217,7 @@ impl Handler<Publish> for Registry {
     }
 }
 
-/// Whether frames of `length` bytes are sent as they are to a subscriber that has asked for `encoding`.
+/// Whether frames of `length` bytes are sent unchanged to a subscriber that requested `encoding`.
 fn is_sent_plain(encoding: Encoding, length: usize) -> bool {
     let is_short = encoding.fragment_size.is_none_or(|size| length <= size);
     encoding.compression == Compression::None && is_short && !encoding.ros1_stamps

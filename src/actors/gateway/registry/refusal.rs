@@ -1,6 +1,6 @@
-//! Why the registry refuses an op or a call: the sentences that clients read.
+//! The reasons for which the registry refuses an op or a call, as clients read them.
 //!
-//! **Invariant:** every sentence begins with the field it is about, or names the service.
+//! **Invariant:** every sentence begins with its field, or names the service.
 
 use super::directory::Served;
 use crate::actors::gateway::limits::{ENTRY_BYTES, MAX_BACKLOG, MAX_KEPT};
@@ -13,8 +13,8 @@ pub(crate) enum Refusal {
     #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
     RuntimeTopic(String),
     #[error(
-        "this connection keeps too much: its subscriptions, advertisements and services, and its calls and goals that \
-         wait for other clients, may take {MAX_KEPT} bytes, each {ENTRY_BYTES} and three times its names"
+        "this connection keeps too much: its subscriptions, advertisements, services, and waiting calls and goals may \
+         take {MAX_KEPT} bytes. Each takes {ENTRY_BYTES} bytes and three times its names"
     )]
     TooMuchKept,
     #[error(
@@ -27,11 +27,11 @@ pub(crate) enum Refusal {
     OfRuntime(Served, String),
     #[error("{noun}: this connection does not {verb} {1}", noun = .0.noun(), verb = .0.verb())]
     NotServed(Served, String),
-    #[error("{noun}: the {request} with this id is of {1}", noun = .0.noun(), request = .0.request())]
+    #[error("{noun}: the {request} with this id belongs to {1}", noun = .0.noun(), request = .0.request())]
     OfAnother(Served, String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
-    #[error("id: this connection carries out no goal of {0} with this id")]
+    #[error("id: this connection executes no goal of {0} with this id")]
     StaleGoal(String),
     #[error("{0}")]
     Unreadable(Problem),

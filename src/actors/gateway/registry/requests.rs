@@ -1,4 +1,4 @@
-//! Calls and goals: to the node or the client that serves them, and the answers of clients back to those who asked.
+//! Routes calls and goals to the node or client that serves them, and clients' answers back to the callers.
 //!
 //! **Invariant:** every call has one response. Every goal has one `action_result`, unless its sender disconnects first.
 
@@ -162,7 +162,7 @@ impl Registry {
         }
     }
 
-    /// Ends a goal of the same client.
+    /// Cancels a goal of the same client.
     pub(super) fn cancel_action_goal(
         &mut self,
         origin: FrameOrigin,
@@ -239,7 +239,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Calls and goals that are on their way stay with the client.
+    /// Withdraws a name. The client still answers its pending calls and goals.
     pub(super) fn stop_serving(
         &mut self,
         origin: &FrameOrigin,
@@ -256,8 +256,8 @@ impl Registry {
         Ok(())
     }
 
-    /// Passes a call or a goal on to the client that serves it. `encode` makes the frame, with the name as that client
-    /// spells it and an id of the runtime's own.
+    /// Forwards a call or a goal to its provider. `encode` makes the frame, with the provider's spelling of the name
+    /// and an id of the runtime's own.
     fn forward(
         &mut self,
         origin: &FrameOrigin,
@@ -304,7 +304,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Asks the action server of a goal of this client to end it.
+    /// Forwards the cancellation of a goal to its action server.
     fn forward_cancellation(&self, origin: &FrameOrigin, action: &str) -> Result<(), Refusal> {
         let requests = &self.requests;
         let goal = requests.goal_made_under(origin.id.as_ref(), action, origin.from);
@@ -326,7 +326,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Sends progress to the sender of the goal, if it asked for that. A slow client may miss some.
+    /// Sends feedback to the sender of the goal, if it requested feedback. A slow client may miss some.
     pub(super) fn pass_feedback(
         &self,
         origin: &FrameOrigin,
@@ -349,7 +349,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Returns the provider's answer to a call or a goal under the caller's own id.
+    /// Sends the provider's answer to the caller, under the caller's own id.
     pub(super) fn complete(
         &mut self,
         origin: &FrameOrigin,
@@ -377,7 +377,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Ends the call or goal that a bad answer is for, if there is one.
+    /// Ends the call or goal that got a bad answer, if there is one.
     pub(super) fn fail_answered(
         &mut self,
         origin: &FrameOrigin,
@@ -403,14 +403,14 @@ impl Registry {
         requests.take(number)
     }
 
-    /// Both the caller and the provider get the reason why the answer is discarded.
+    /// Discards an answer. The caller and the provider get the reason.
     fn discard(&mut self, request: &Forwarded, why: Refusal) -> Result<(), Refusal> {
         let name = request.name.to_string();
         self.fail(request, &Refusal::BadAnswer(name, Box::new(why.clone())));
         Err(why)
     }
 
-    /// Tells who made a request why it has ended without an answer.
+    /// Ends a request without an answer. The caller gets the reason.
     pub(super) fn fail(&mut self, request: &Forwarded, why: &Refusal) {
         let Forwarded {
             caller, id, name, ..
@@ -434,7 +434,7 @@ impl Registry {
         self.note_answered(request);
     }
 
-    /// If this was the last call that its caller waited for, a client that has stopped sending may go.
+    /// After the caller's last call, a caller that has stopped sending may be disconnected.
     fn note_answered(&mut self, request: &Forwarded) {
         if !self.requests.has_waiting(request.caller)
             && let Some(client) = self.clients.get_mut(&request.caller)
@@ -443,7 +443,7 @@ impl Registry {
         }
     }
 
-    /// Answers a call with `result: false`, and why.
+    /// Answers a call with `result: false` and the reason.
     fn refuse_call(&self, origin: &FrameOrigin, service: &str, why: &Refusal) {
         if let Some(client) = self.clients.get(&origin.from) {
             let (id, form) = (origin.id.as_ref(), client.outlets.error_form());

@@ -1,4 +1,4 @@
-//! Advertisements and subscriptions of clients: how one is taken, changed and ended.
+//! Advertisements and subscriptions of clients: how one begins, changes and ends.
 //!
 //! **Invariant:** a refused op changes nothing.
 
@@ -101,12 +101,12 @@ impl Registry {
         }
         if let Some(subscriber) = self.topics.subscriber(&absolute, topic, origin.from) {
             if is_new && Topic::from_name(topic).is_some_and(Topic::is_latched) {
-                // The throttle of an earlier subscription must not hold back the latched message of this one.
+                // The throttle of an earlier subscription must not delay this one's latched message.
                 subscriber.configure(Some(Throttle::NONE));
             }
             subscriber.configure(subscriber.throttle());
         }
-        // The status leaves before the first message: the topic's owner gets the news of the subscriber after it.
+        // Sent first, so that the client gets the status before the first message.
         let msg = format!("subscribed to {topic}");
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
         if first {
@@ -150,8 +150,8 @@ impl Registry {
     }
 }
 
-/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
-/// is asked for by its type of ROS 1. CDR has no names.
+/// The encoding that a subscription requests. If it names the ROS 1 type of a topic of the runtime, stamps also have
+/// the names of ROS 1. CDR has no names.
 fn encoding_for(subscribe: &Subscribe) -> Encoding {
     let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
     let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
@@ -162,7 +162,7 @@ fn encoding_for(subscribe: &Subscribe) -> Encoding {
     }
 }
 
-/// Topics that the runtime alone publishes are not for clients.
+/// Refuses the topics that only the runtime may publish.
 pub(super) fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     match Topic::from_name(topic) {
         Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),

@@ -1,7 +1,7 @@
-//! The registry's table of topics: who advertises and who subscribes to each, and its type.
+//! The registry's table of topics: the publishers, subscribers and type of each.
 //!
-//! **Invariant:** a topic is here exactly as long as a client uses it. A connection stands at most once under each
-//! spelling of a topic, however often it subscribed.
+//! **Invariant:** the table has a topic exactly as long as a client uses it. Each spelling of a topic has a connection
+//! at most once, for any number of subscriptions.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use crate::protocol::op::Encoding;
 use crate::protocol::outbox::Throttle;
 use crate::protocol::ros::rosapi::ListedTopic;
 
-/// One `subscribe` of a connection to a topic; `id` tells several of them apart.
+/// One `subscribe` of a connection to a topic. `id` distinguishes several of them.
 #[derive(Debug)]
 pub(crate) struct Subscription {
     pub(crate) id: Option<Box<str>>,
     pub(crate) throttle: Duration,
     pub(crate) queue_length: usize,
     pub(crate) encoding: Encoding,
-    /// The part of its client's room that it takes.
+    /// Its part of the client's limit [`MAX_KEPT`](crate::actors::gateway::limits::MAX_KEPT).
     pub(crate) entry: KeptEntry,
 }
 
@@ -39,19 +39,19 @@ pub(crate) struct Topics {
 struct TopicUsers {
     publishers: usize,
     subscribers: Vec<Subscriber>,
-    /// The first type that was named.
+    /// The first type that a client named.
     type_name: Option<Arc<str>>,
-    /// The first type that was named and is known: messages are encoded by it.
+    /// The first known type that a client named. Messages are encoded by it.
     known: Option<Type>,
 }
 
-/// A connection under a topic.
+/// A connection that subscribes to a topic under one spelling.
 pub(crate) struct Subscriber {
     pub(crate) connection: ConnectionId,
-    /// The topic as it spells it: its messages come under that name.
+    /// Its spelling of the topic. Its messages have this name.
     pub(crate) spelling: Arc<str>,
     pub(crate) mailbox: Recipient<ToClient>,
-    /// The encoding that its subscriptions come to.
+    /// The merged encoding of its subscriptions.
     pub(crate) encoding: Encoding,
     subscriptions: Vec<Subscription>,
 }
@@ -72,13 +72,13 @@ impl Subscriber {
         }
     }
 
-    /// The subscription under that `id`.
+    /// The subscription with this `id`.
     pub(crate) fn subscription(&self, id: Option<&str>) -> Option<&Subscription> {
         let mut all = self.subscriptions.iter();
         all.find(|one| one.id.as_deref() == id)
     }
 
-    /// Ends the subscriptions that `stays` does not keep, and begins `new`, if there is one.
+    /// Ends the subscriptions that `stays` rejects, and adds `new`, if there is one.
     pub(crate) fn change(
         &mut self,
         stays: impl FnMut(&Subscription) -> bool,
@@ -90,7 +90,7 @@ impl Subscriber {
         self.encoding = all.reduce(Encoding::merged).unwrap_or_default();
     }
 
-    /// The smallest of each value over its subscriptions; `None` if there are none.
+    /// The smallest of each value over its subscriptions. `None` if there are none.
     pub(crate) fn throttle(&self) -> Option<Throttle> {
         let all = &self.subscriptions;
         let queue_lengths = || all.iter().map(|one| one.queue_length);
@@ -101,7 +101,7 @@ impl Subscriber {
         })
     }
 
-    /// Tells the connection how the topic is throttled.
+    /// Sends the topic's throttle to the connection.
     pub(crate) fn configure(&self, throttle: Option<Throttle>) {
         self.mailbox.do_send(ToClient::Configure {
             topic: Arc::clone(&self.spelling),
@@ -122,7 +122,7 @@ impl Topics {
         users.subscribers.push(subscriber);
     }
 
-    /// A client that uses a topic has named its type; true if that stays with the topic.
+    /// A client that uses a topic has named its type. Returns whether it is the topic's first type.
     pub(crate) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
         let Some(users) = self.by_name.get_mut(topic) else {
             return false;
@@ -135,14 +135,14 @@ impl Topics {
         is_first
     }
 
-    /// A client does not advertise a topic any more.
+    /// A client has stopped advertising a topic.
     pub(crate) fn remove_publisher(&mut self, topic: &str) {
         self.remove(topic, |users| {
             users.publishers = users.publishers.saturating_sub(1);
         });
     }
 
-    /// A client does not subscribe to a topic under that spelling any more.
+    /// A client has stopped subscribing to a topic under this spelling.
     pub(crate) fn remove_subscriber(&mut self, topic: &str, spelling: &str, client: ConnectionId) {
         self.remove(topic, |users| {
             users
@@ -168,7 +168,7 @@ impl Topics {
         users.map_or(&[], |users| &users.subscribers)
     }
 
-    /// The client that subscribes to a topic under that spelling.
+    /// The client that subscribes to a topic under this spelling.
     pub(crate) fn subscriber(
         &mut self,
         topic: &str,
@@ -179,12 +179,12 @@ impl Topics {
         all.find(|one| one.connection == client && *one.spelling == *spelling)
     }
 
-    /// The type of a topic that clients use, if one has named it and it is known.
+    /// The type of a topic, if a client has named a known type.
     pub(crate) fn known_type(&self, topic: &str) -> Option<Type> {
         self.by_name.get(topic)?.known
     }
 
-    /// The topics as rosapi lists them.
+    /// The topics in the form of rosapi.
     pub(crate) fn listed(&self) -> impl Iterator<Item = ListedTopic> {
         self.by_name.iter().map(|(name, users)| ListedTopic {
             name: Arc::clone(name),
