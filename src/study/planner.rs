@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): the hold is an error |
-//! | the same with a control period that is given | the loop whose law runs once a period: the hold is none |
+//! | the same with a control period that is given | the loop whose law runs once a period: the hold is no error |
 //!
 //! The truth is refined with smaller steps until two truths agree to a part of the allowed error. For a free arm the
 //! tolerance is reduced instead. Then each method is simulated like the live arm and compared with the truth. A search
