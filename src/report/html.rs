@@ -8,19 +8,19 @@ use super::svg::{STYLE, escape};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 
-/// The section that only a maintainer asks for; it comes last.
+/// The section for maintainers; it comes last.
 const LAST: &str = "work";
 
 /// The sections whose first claims make the abstract, in this order.
 const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
-const METHOD: &str = "Sections are made side by side on the cores there are, those that measure times one after the \
-     other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the quartiles. While \
-     the clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. \
-     References are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no \
-     formula with the arm's own kernel. Their uncertainty is the distance to a second series of other order and \
-     tolerance. The 1-DOF service has its closed form instead. The stiff arms have Rodas3 with 32768 steps, beside \
-     implicit midpoint with as many. Nothing is tuned per method.";
+const METHOD: &str = "Sections run in parallel on all cores; sections that measure times run one after the other. \
+     Times are the minimum of repeats after one untimed run, on one thread; whiskers are the quartiles. While the \
+     clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. References \
+     are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no formula \
+     with the arm's own kernel. Their uncertainty is the distance to a second series of other order and tolerance. The \
+     reference of the 1-DOF service is its closed form. That of the stiff arms is Rodas3 with 32768 steps, checked \
+     against implicit midpoint with as many. Nothing is tuned per method.";
 
 /// The whole page.
 pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
@@ -84,7 +84,7 @@ fn verdicts(sections: &[Section]) -> String {
     let heading = match (all.len(), short) {
         (count, 0) => format!("Verdicts: all {count} hold"),
         (count, short) => format!(
-            "Verdicts: {} of {count} hold, {short} fall short",
+            "Verdicts: {} of {count} hold, {short} do not",
             count - short
         ),
     };
@@ -128,7 +128,7 @@ fn making(sections: &[Section], machine: &Machine) -> String {
     )
 }
 
-/// Escaped, with `**words**` set off.
+/// Escaped, with `**words**` as `<strong>`.
 fn emphasised(text: &str) -> String {
     let escaped = escape(text);
     let parts = escaped.split("**").enumerate();

@@ -1,6 +1,6 @@
-//! The machine that the numbers were made on: processor, load, flags, and the version of the program.
+//! The machine of the measurements: processor, load, flags, and the version of the program.
 //!
-//! **Invariant:** what cannot be found out is called unknown, never guessed.
+//! **Invariant:** a value that cannot be determined is reported as unknown, never guessed.
 
 use std::fs;
 
@@ -27,7 +27,7 @@ impl Machine {
         };
         let cores = std::thread::available_parallelism().ok();
         let load = load().map(|load| {
-            format!("{load} (1, 5 and 15 minutes); above 0 other programs were at work too")
+            format!("{load} (1, 5 and 15 minutes); above 0 other programs were running")
         });
         let facts = [
             ("Version", Some(format!("pendularm {VERSION}"))),

@@ -1,9 +1,9 @@
-//! The study as a page to look at: `pendularm report --out report/`.
+//! The study as a web page: `pendularm report --out report/`.
 //!
 //! Runs the sections in `figures` side by side, keeps each in a file of its own, and writes `index.html`,
-//! `report.json`, and one `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others
-//! are taken from their files. Measurements are in [`experiments`], on `math` and `study`; this is where the clock,
-//! the files and the drawing are.
+//! `report.json`, and one `.csv` and `.svg` per figure. With `--only` the named sections are recomputed and the others
+//! are read from their files. Measurements are in [`experiments`], on `math` and `study`. This module has the clock,
+//! the files and the drawing.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
@@ -33,14 +33,14 @@ use serde_json::{Value, json};
 /// Measure error against run time and stability, and write a page about it
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct ReportOptions {
-    /// Where to write it; made if it does not exist
+    /// Where to write it; created if missing
     #[arg(long, value_name = "DIRECTORY", default_value = "report")]
     pub out: PathBuf,
-    /// Sections to make anew, with commas between; all unless given
+    /// Sections to recompute, separated by commas; all by default
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     #[arg(value_parser = PossibleValuesParser::new(sections()))]
     pub only: Vec<String>,
-    /// Coarser and shorter: a look in seconds
+    /// A coarse report in seconds
     #[arg(long)]
     pub quick: bool,
 }
@@ -48,20 +48,20 @@ pub struct ReportOptions {
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// A section that is kept, and whose file cannot be read.
-    #[error("cannot read {}: {error}; --only with its name makes it anew", path.display())]
+    /// The file of a kept section cannot be read.
+    #[error("cannot read {}: {error}; recompute it with --only NAME", path.display())]
     Read {
         /// The file.
         path: PathBuf,
         /// The fault.
         error: io::Error,
     },
-    /// A file or directory that cannot be written.
+    /// A file or directory cannot be written.
     #[error("cannot write {}: {error}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// The system's word for it.
+        /// The system's error.
         error: io::Error,
     },
 }
@@ -71,7 +71,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
     SECTIONS.iter().map(|section| section.name)
 }
 
-/// Makes the report and answers the page's path.
+/// Makes the report and returns the page's path.
 ///
 /// # Errors
 /// A section that is kept and cannot be read, or a file that cannot be written.
@@ -110,13 +110,13 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     let verdicts = sections.iter().flat_map(|section| &section.verdicts);
     let short = verdicts.filter(|verdict| !verdict.holds).count();
     say(&format!(
-        "report: {} ({short} verdicts fall short)",
+        "report: {} ({short} verdicts do not hold)",
         page.display()
     ));
     Ok(page)
 }
 
-/// Makes sections on all cores. Sections that measure times are made one after the other.
+/// Makes sections on all cores. Sections that measure times run one after the other.
 fn side_by_side(
     makers: Vec<&'static Maker>,
     make: impl Fn(&'static Maker) -> Result<Section, ReportError> + Sync,
@@ -145,12 +145,12 @@ fn side_by_side(
     made.into_iter().collect()
 }
 
-/// Takes the lock: the work of a section that panicked is as good as before.
+/// Takes the lock, also after a panic in a section: the shared data is still valid.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line on standard error. One that is closed or full hinders nothing.
+/// Writes a line to standard error. Errors are ignored, so that a closed stream does not stop the report.
 fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
@@ -184,7 +184,7 @@ fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
     summary
 }
 
-/// The section in that file; none if it has not been made yet.
+/// The section in that file; `None` if there is no such file yet.
 fn read(path: &Path) -> Result<Option<Section>, ReportError> {
     match fs::read_to_string(path).and_then(|text| Ok(serde_json::from_str(&text)?)) {
         Ok(section) => Ok(Some(section)),
@@ -196,7 +196,7 @@ fn read(path: &Path) -> Result<Option<Section>, ReportError> {
     }
 }
 
-/// Writes beside the file first, so that there is always a whole one.
+/// Writes to a temporary file first and renames it, so that the file is always complete.
 fn write(path: &Path, text: &str) -> Result<(), ReportError> {
     let beside = path.with_extension("part");
     fs::write(&beside, text)

@@ -1,10 +1,10 @@
-//! The live arms that show the scenes: settings, a start, and how long to watch. The page has the same rows, in
+//! The live arms that show the scenes: settings, initial state and duration. The rows are those of the page, in
 //! `page/scenes.js`.
 //!
-//! A scene runs many arms and checks numbers. Its live arm is one of them, for a picture, and for a link that opens it
-//! on the page.
+//! A scene simulates many arms and checks numbers. Its live arm is one of them. The report shows it as a picture, with
+//! a link that opens it on the page.
 //!
-//! **Invariant:** every scene has a row; one that no live arm can show says why.
+//! **Invariant:** every scene has a row. A scene that no live arm can show has the reason.
 
 #![allow(
     clippy::indexing_slicing,
@@ -35,9 +35,9 @@ pub struct LiveScene {
     start: Value,
     #[serde(default)]
     velocity: Value,
-    /// The settings as the page has them; the defaults are the runtime's.
+    /// The settings in the page's form; the defaults are the runtime's.
     settings: Value,
-    /// The picture: its length, and where it differs from the page.
+    /// The picture: its duration, and the settings that differ from the page.
     #[serde(default)]
     watch: Value,
     hidden: Option<String>,
@@ -48,7 +48,7 @@ pub struct LiveScene {
 pub struct LiveRun {
     /// Time \[s\], and the angle of each joint from its start \[rad\].
     pub samples: Vec<(f64, Vec<f64>)>,
-    /// Whether the next step would have left the finite numbers.
+    /// Whether the run diverged at the next step.
     pub diverged: bool,
     /// The settings as the page reads them behind the `#` of its address.
     pub fragment: String,
@@ -65,7 +65,7 @@ pub fn live_scenes() -> Vec<LiveScene> {
 }
 
 impl LiveScene {
-    /// How long to watch \[s\]; 0 for a scene without a picture.
+    /// Duration of the picture \[s\]; 0 for a scene without one.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         number(&self.watch["seconds"], 0.0)
@@ -74,7 +74,7 @@ impl LiveScene {
     /// Runs the arm.
     ///
     /// # Errors
-    /// Why the scene has no picture.
+    /// The reason why the scene has no picture.
     pub fn watch(&self) -> Result<LiveRun, String> {
         match (&self.hidden, self.links) {
             (Some(why), _) => Err(why.clone()),
@@ -188,7 +188,7 @@ fn number(value: &Value, standard: f64) -> f64 {
     value.as_f64().unwrap_or(standard)
 }
 
-/// The numbers of a list, with zeros where it is too short.
+/// The numbers of a list, padded with zeros.
 fn list<const N: usize>(value: &Value, standard: [f64; N]) -> [f64; N] {
     value.as_array().map_or(standard, |values| {
         std::array::from_fn(|i| values.get(i).map_or(0.0, |value| number(value, 0.0)))

@@ -17,18 +17,18 @@ use crate::math::integrator::Method;
 pub(crate) struct Section {
     pub(crate) name: String,
     pub(crate) title: String,
-    /// Sentences that open the report.
+    /// Sentences for the head of the report.
     pub(crate) findings: Vec<String>,
     pub(crate) verdicts: Vec<Verdict>,
     pub(super) tables: Vec<TableText>,
-    /// Seconds it took, and the version that made it.
+    /// Run time \[s\], and the program's version.
     pub(crate) seconds: f64,
     pub(crate) version: String,
     /// Whether it was made with `--quick`.
     pub(crate) quick: bool,
     /// Figures and tables, in order.
     pub(crate) html: String,
-    /// Folder of the report, where counts from outside are looked for.
+    /// Folder of the report, which may contain external counts.
     #[serde(skip)]
     pub(super) out: PathBuf,
     /// Names and contents of files beside the page.
@@ -36,12 +36,12 @@ pub(crate) struct Section {
     pub(super) files: Vec<(String, String)>,
 }
 
-/// Something that the section was to show, and whether it did.
+/// A claim of the section, and whether it holds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Verdict {
     /// The claim that should hold.
     pub(crate) claim: String,
-    /// The numbers that were seen.
+    /// The measured numbers.
     pub(crate) seen: String,
     pub(crate) holds: bool,
 }
@@ -55,11 +55,11 @@ pub(super) struct TableText {
     rows: Vec<Vec<String>>,
 }
 
-/// The number of a figure, which the page knows.
+/// Placeholder of a figure's number, which the page inserts.
 pub(super) const NUMBER: &str = "Figure #.";
 
 impl Section {
-    /// One of two values: for the report, and for a quick look.
+    /// One of two values: for the full report, or for a quick one.
     pub(crate) fn choose<T>(&self, full: T, quick: T) -> T {
         if self.quick { quick } else { full }
     }
@@ -84,7 +84,7 @@ impl Section {
         });
     }
 
-    /// A grid of panels with its files: a title that says what was found, a caption that says how to read it.
+    /// A grid of panels with its files. The title states the result, and the caption explains the figure.
     pub(crate) fn figure(&mut self, name: &str, title: &str, caption: &str, panels: &[Plot]) {
         let mut legend: Vec<&Key> = Vec::new();
         for key in panels.iter().flat_map(Plot::keys) {
@@ -209,7 +209,7 @@ impl Cell {
         if holds {
             Self::new("holds").class("good")
         } else {
-            Self::new("falls short").class("bad")
+            Self::new("does not hold").class("bad")
         }
     }
 
@@ -233,7 +233,7 @@ impl Cell {
     }
 }
 
-/// Columns of a sheet with so many panels, the class of the grid on the page, and the size of a panel.
+/// For a number of panels: the columns of the sheet, the class of the grid on the page, and the scale of a panel.
 fn grid(panels: usize) -> (usize, &'static str, f64) {
     match panels {
         0..=2 => (panels.max(1), " few", 1.0),
@@ -243,7 +243,7 @@ fn grid(panels: usize) -> (usize, &'static str, f64) {
     }
 }
 
-/// A figure as one file, with its style inside. Heading and legend take as many lines as they need.
+/// A figure as one file, with its style inside. Heading and legend are wrapped.
 fn sheet(title: &str, legend: &[&Key], panels: &[Plot]) -> String {
     /// Between the edge and the text in pixels.
     const MARGIN: f64 = 14.0;
@@ -288,5 +288,5 @@ fn sheet(title: &str, legend: &[&Key], panels: &[Plot]) -> String {
     )
 }
 
-/// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
+/// Upper bound of the average width of a heading's letter in the usual fonts, in pixels.
 const LETTER: f64 = 10.4;

@@ -1,15 +1,15 @@
-//! The only clock of the study: how long a computation takes, as the minimum of repeats with their spread.
+//! The only clock of the study: the time of a computation, as the minimum of repeats with their quartiles.
 //!
 //! Other work of the machine can only make a run longer, so the minimum is the best estimate of the computation itself.
 //! The quartiles show how noisy the machine was. Source: Chen and Revels, *Robust benchmarking in noisy environments*
 //! (2016), arXiv:1608.04295.
 //!
-//! **Invariant:** one untimed run comes first, nothing is compared, counted or written while the clock runs.
+//! **Invariant:** one untimed run comes first. Nothing is compared, counted or written while the clock runs.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// How often at least and at most, and for how long altogether \[s\].
+/// The least and the largest number of repeats, and their total time \[s\].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     pub(crate) least: usize,
@@ -35,7 +35,7 @@ pub(crate) struct Timing {
     pub(crate) quartiles: (f64, f64),
 }
 
-/// Times `work`, again and again.
+/// Times repeats of `work`.
 pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
     let started = Instant::now();
     black_box(work());

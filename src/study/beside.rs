@@ -1,7 +1,7 @@
-//! Two runs of one motion beside each other: how far their end effectors come apart.
+//! The largest distance between the end effectors of two runs of one motion.
 //!
-//! They are compared after every step of the first run. A comparison in even intervals would miss what happens in
-//! between: the first milliseconds of a stiff loop, or a whole turn of a fast link.
+//! They are compared after every step of the first run. A comparison at even intervals would miss the first
+//! milliseconds of a stiff loop, or a whole turn of a fast link.
 //!
 //! **Invariant:** a piece of a comparison takes a millisecond at most (optimised build).
 
@@ -12,10 +12,10 @@ use crate::math::arm::{Arm, State};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 
-/// Most coefficients of a followed arm: some seconds of one core.
+/// Most Taylor coefficients of a free motion: a few seconds of one core.
 const MAX_COEFFICIENTS: u64 = 40_000_000;
 
-/// A run that can be stepped and seen.
+/// A run that can be stepped, and whose state can be read.
 pub(crate) trait Steppable<const N: usize>: Send {
     /// Takes up to `steps` steps. Returns how many it took before the run diverged.
     fn advance(&mut self, steps: u64) -> u64;
@@ -52,7 +52,7 @@ impl<const N: usize> Steppable<N> for ContinuousLoop<N> {
     }
 }
 
-/// An arm left to itself, followed within a tolerance.
+/// The motion of a free arm, computed within a tolerance.
 pub(super) struct FreeMotion<const N: usize> {
     pub(super) arm: Arm<N>,
     pub(super) taylor: TaylorReference<N>,
@@ -82,8 +82,9 @@ impl<const N: usize> Steppable<N> for FreeMotion<N> {
     }
 }
 
-/// The largest distance \[m\] of two end effectors after any of the run's `steps`, each as long as `truth_steps` of the
-/// truth. Infinite if one of them diverges; the comparison ends once they are further than `allowed` \[m\] apart.
+/// The largest distance \[m\] between the two end effectors after any of the run's `steps`. One step of the run takes
+/// as long as `truth_steps` steps of the truth. Infinite if either diverges. The comparison ends once the distance
+/// exceeds `allowed` \[m\].
 pub(super) async fn largest_distance<const N: usize>(
     arm: &Arm<N>,
     (mut run, steps): (Box<dyn Steppable<N>>, u64),

@@ -1,4 +1,4 @@
-//! A control loop whose law acts at every instant: the ideal that holding the effort for a step falls short of.
+//! A control loop with a continuous-time law: the ideal that a held effort approximates.
 //!
 //! **Invariant:** a step whose result is not finite changes nothing.
 
@@ -14,8 +14,8 @@ use crate::math::integrator::increment;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::simulation::add_carried;
 
-/// An arm whose control law is evaluated in every stage, integral and all. The method steps `(q, s)`: the
-/// integral `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
+/// An arm whose control law, with its integral, is evaluated in every stage. The method steps `(q, s)`: the integral
+/// `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContinuousLoop<const N: usize> {
     /// Arm, gains, setpoint, method and timestep.
@@ -24,7 +24,7 @@ pub struct ContinuousLoop<const N: usize> {
     pub state: State<N>,
     /// Integral of the position error \[rad s\].
     pub integral: [f64; N],
-    /// The rounding error of the state, carried into the next step as the live arm does it.
+    /// The rounding error of the state. It is carried into the next step, as in the live arm.
     carry: State<N>,
     steps: u64,
 }
@@ -70,7 +70,7 @@ impl<const N: usize> ContinuousLoop<N> {
         forward_dynamics(&self.control.arm, q, v, &effort)
     }
 
-    /// `M` is twice `N`, which the language can't say yet.
+    /// `M` is twice `N`; stable Rust cannot express this bound.
     fn step_all<const M: usize>(&mut self) -> bool {
         debug_assert_eq!(M, 2 * N, "a position and an integral for every joint");
         let State { position, velocity } = self.state;

@@ -1,7 +1,7 @@
 //! A control loop: the arm, its gains and setpoint, and how it is stepped.
 //!
-//! Predictions, offline runs and measurements all take this one type, and step it through
-//! [`ControlLoop::simulation`], the live arm's own stepper.
+//! Predictions, offline runs and measurements all use this type. They step it through [`ControlLoop::simulation`], the
+//! live arm's own stepper.
 //!
 //! **Invariant:** gains that are all zero and a controller that is off are the same loop.
 
@@ -10,12 +10,12 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP, Simulation};
 
-/// An arm under its control law, and how it is stepped.
+/// An arm with its control law, method, timestep and control period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlLoop<const N: usize> {
     /// The arm.
     pub arm: Arm<N>,
-    /// Gains of the controller; all zero: the arm is left to itself.
+    /// Gains of the controller; if all are zero, the arm is free.
     pub gains: Gains<N>,
     /// The setpoint at which the controller holds it.
     pub setpoint: Setpoint<N>,
@@ -44,13 +44,13 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// An arm that is left to itself.
+    /// A free arm.
     #[must_use]
     pub fn free(arm: Arm<N>) -> Self {
         Self::new(arm, no_control(), Setpoint::default())
     }
 
-    /// The loop of a simulation, with the gains as they are set, whether the controller is on or off.
+    /// The loop of a simulation with its gains, even if the controller is off.
     #[must_use]
     pub fn of(simulation: &Simulation<N>) -> Self {
         let pid = simulation.pid();
@@ -64,7 +64,7 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// The loop that the next step of a simulation obeys.
+    /// The loop that is active in the next step of a simulation.
     #[must_use]
     pub fn in_force(simulation: &Simulation<N>) -> Self {
         let set = Self::of(simulation);
@@ -97,11 +97,11 @@ impl<const N: usize> ControlLoop<N> {
         Self { period, ..self }
     }
 
-    /// Whether the gains are all zero, so that the controller does nothing even when it is on.
+    /// Whether all gains are zero. The controller then has no effect even if it is enabled.
     #[must_use]
     #[allow(
         clippy::float_cmp,
-        reason = "a gain that is exactly zero is a gain that is not there"
+        reason = "only a gain of exactly zero has no effect"
     )]
     pub fn is_free(&self) -> bool {
         let Gains { kp, ki, kd } = &self.gains;
@@ -114,7 +114,7 @@ impl<const N: usize> ControlLoop<N> {
         self.gains.ki.map(|ki| ki > 0.0)
     }
 
-    /// The live loop in `start`, with its integral at zero.
+    /// The live simulation in the state `start`, with an integral of zero.
     #[must_use]
     pub fn simulation(&self, start: State<N>) -> Simulation<N> {
         let mut simulation = Simulation::new(self.arm, self.gains);
@@ -128,7 +128,7 @@ impl<const N: usize> ControlLoop<N> {
     }
 }
 
-/// Gains that are all zero: an arm left to itself.
+/// Gains that are all zero: a free arm.
 #[must_use]
 pub const fn no_control<const N: usize>() -> Gains<N> {
     Gains {

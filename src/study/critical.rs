@@ -1,7 +1,7 @@
-//! The motion that a loop loses first: the eigenvalue that leaves the unit circle at the limit, and the joint that
-//! moves with it.
+//! The first unstable mode: the eigenvalue that leaves the unit circle at the limit, and the joint that moves most in
+//! it.
 //!
-//! **Invariant:** the work is bounded, and there is no answer where something is not finite.
+//! **Invariant:** the work is bounded, and the result is `None` if a value is not finite.
 
 use std::f64::consts::TAU;
 
@@ -11,25 +11,26 @@ use super::stability::{Modes, Sampling, Stepping};
 use crate::math::elementary::{atan2, hypot};
 use crate::math::integrator::Method;
 
-/// The factor beyond its limit at which a loop is looked at: nothing grows at the limit itself.
+/// The loop is analysed at this multiple of its limit, since nothing grows at the limit itself.
 pub const BEYOND: f64 = 1.1;
 
-/// Steps of the inverse iteration; each brings the vector nearer by the ratio of two distances between eigenvalues.
+/// Steps of the inverse iteration. Each reduces the error by the ratio of the distances from the shift to the nearest
+/// and to the second nearest eigenvalue.
 const ITERATIONS: u32 = 6;
 
-/// The motion that grows first.
+/// The first unstable mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Critical {
     /// Factor by which it grows in a step of [`BEYOND`] times the limit.
     pub growth_per_step: f64,
-    /// How often it swings \[Hz\]; half of the steps per second where it flips at every step.
+    /// Its frequency \[Hz\]. If it changes sign at every step, this is half of the steps per second.
     pub frequency: f64,
-    /// The joint that it moves furthest, from 0.
+    /// The joint with the largest amplitude, counted from 0.
     pub joint: usize,
 }
 
-/// The fastest growing motion of a loop with held control, beyond `limit` \[s\] (at a tiny timestep where that is
-/// zero).
+/// The fastest growing mode of a loop with held control, beyond `limit` \[s\]. If the limit is zero, the timestep is
+/// tiny.
 pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Critical> {
     let period = if limit > 0.0 {
         BEYOND * limit
@@ -51,13 +52,14 @@ pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Cr
     (found.growth_per_step.is_finite() && found.frequency.is_finite()).then_some(found)
 }
 
-/// The largest of the first `joints` entries of an eigenvector. In real numbers: the plane in which an eigenvalue `a +
-/// i b` turns is what `(E - a)² + b²` takes to zero, and with x in it, `x - i (E - a) x / b` is the eigenvector.
+/// The index of the largest of the first `joints` entries of an eigenvector, in real arithmetic. For the eigenvalue
+/// `a + i b`, the invariant plane is the null space of `(E - a)² + b²`. If x lies in it, `x - i (E - a) x / b` is the
+/// eigenvector.
 ///
 /// Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.6, on inverse iteration.
 fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
     let n = generator.size();
-    // The shift lies a hair beside the eigenvalue, where the matrix would be singular.
+    // The shift is slightly off the eigenvalue, where the matrix would be singular.
     let shift = mu.re + 1e-6 * mu.modulus();
     let shifted = Matrix::from_fn(n, |i, j| {
         generator[(i, j)] - if i == j { shift } else { 0.0 }

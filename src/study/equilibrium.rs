@@ -1,10 +1,10 @@
 //! Resting poses of an arm under its control law.
 //!
-//! Joints that integrate stay at the setpoint. The others go downhill on the potential of the arm and of its springs,
-//! `V = U + ½ kp (q - q*)² - c q`, and come to rest in one of its minima. A saddle, which has no slope either but
-//! curves down in some direction, is left, as a real arm leaves it.
+//! Joints that integrate stay at the setpoint. The others descend the potential of the arm and its springs,
+//! `V = U + ½ kp (q - q*)² - c q`, to one of its minima. The search leaves a saddle, as a real arm does: its gradient
+//! is zero, but the potential curves down in some direction.
 //!
-//! **Invariant:** whatever the arm and the gains, a pose is found in bounded time.
+//! **Invariant:** for every arm and all gains the search ends in bounded time.
 
 #![allow(
     clippy::indexing_slicing,
@@ -19,25 +19,25 @@ use crate::math::arm::Arm;
 use crate::math::dynamics::{gravity_load, potential_energy};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 
-/// Newton steps before an equilibrium is given up. From a setpoint nearby five do.
+/// Most Newton steps of a search. From a nearby setpoint five are enough.
 const MAX_NEWTON: usize = 200;
 
-/// Saddles that are left before the search is given up; an arm has no more of them on one way down.
+/// Most saddles in one search; a descent passes no more of them.
 const MAX_SADDLES: usize = 8;
 
-/// First length of a step that is trusted \[rad\]: within half a radian an arm's potential is not far from a parabola.
+/// Initial trust radius \[rad\]: within half a radian the potential is close to a parabola.
 const TRUSTED: f64 = 0.5;
 
 /// A step shorter than this changes no angle \[rad\].
 const SMALLEST_TRUSTED: f64 = 1e-18;
 
-/// How far a saddle is left before going downhill again \[rad\]: a fall that stands out from rounding.
+/// Distance of the first step away from a saddle \[rad\]: large enough that the descent exceeds rounding.
 const LEAVING: f64 = 1e-3;
 
-/// A sag that counts as none \[rad\]: some units of rounding of an angle of many turns.
+/// A sag within rounding error \[rad\]: a few units in the last place of an angle of many turns.
 const BALANCED: f64 = 1e-9;
 
-/// Curvature, in parts of the largest, that rounding can feign.
+/// Negative curvature within rounding error, relative to the largest curvature.
 const FLAT: f64 = 1e-12;
 
 /// A pose at which an arm rests under control.
@@ -47,21 +47,21 @@ pub struct Equilibrium<const N: usize> {
     pub position: [f64; N],
     /// Integral of the position error \[rad s\]; zero where there is no integral gain.
     pub integral: [f64; N],
-    /// Joints whose integral still moves: an integral gain, and a load that the integral can carry within its limit.
+    /// Joints with an integral gain whose integral can carry the load within its limit.
     pub integrating: [bool; N],
-    /// Largest effort that is left unbalanced \[N m\]: some units of rounding, or more where no equilibrium exists.
+    /// Largest unbalanced effort \[N m\]: a few units of rounding, or more if no equilibrium exists.
     pub residual: f64,
-    /// Whether the setpoint itself is an exact balance that the arm leaves, upright with soft gains, say: it may as
-    /// well fall to the other side.
+    /// Whether the setpoint itself is an unstable equilibrium, for example upright with low gains. The arm may then
+    /// fall to either side.
     pub balanced: bool,
 }
 
-/// The equilibrium that the arm settles at from the setpoint. It is the setpoint itself where every joint has an
-/// integral, the sagging pose otherwise, and the hanging one for an arm left to itself.
+/// The equilibrium that the arm reaches from the setpoint. It is the setpoint itself if every joint has an integral,
+/// and the sagging pose otherwise. A free arm hangs.
 ///
-/// Joints that integrate stay at the setpoint. The others go downhill on the potential `V = U + ½ kp (q - q*)² - c q`
-/// by Newton steps, and down from every saddle. So the result is a pose that the arm would rest in. An integral that
-/// would have to exceed its limit is taken as a constant effort at the limit.
+/// Joints that integrate stay at the setpoint. The others descend the potential `V = U + ½ kp (q - q*)² - c q` by
+/// Newton steps, and leave every saddle. The result is therefore a pose in which the arm would rest. An integral that
+/// would have to exceed its limit counts as a constant effort at the limit.
 #[must_use]
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let ControlLoop {
@@ -94,7 +94,7 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     };
     let mut integral = [0.0; N];
     let mut balanced = false;
-    // Every pass but the last takes an integral that saturates out of the joints that still integrate.
+    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones.
     for _ in 0..=N {
         let (sag, leaves) = descent.settle();
         balanced |= leaves;
@@ -132,7 +132,7 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     }
 }
 
-/// The potential that an arm goes downhill on, in the sag `y = q - q*` of its joints.
+/// The potential of the descent, as a function of the sag `y = q - q*` of the joints.
 struct Descent<'a, const N: usize> {
     arm: &'a Arm<N>,
     gains: &'a Gains<N>,
@@ -168,8 +168,8 @@ impl<const N: usize> Descent<'_, N> {
             .fold(0.0, |max: f64, i| max.max(gradient[i].abs()))
     }
 
-    /// Goes downhill from no sag to a pose in which the arm rests. Also says whether no sag was an exact balance, from
-    /// which an arm falls to either side.
+    /// Descends from zero sag to a pose in which the arm rests. Also returns whether zero sag is an unstable
+    /// equilibrium, from which an arm falls to either side.
     fn settle(&self) -> ([f64; N], bool) {
         let mut sag = self.descend([0.0; N]);
         let mut balanced = false;
@@ -186,8 +186,8 @@ impl<const N: usize> Descent<'_, N> {
         (sag, balanced)
     }
 
-    /// Goes downhill to where the slope ends, by Newton steps within a trusted radius. Where the potential curves down,
-    /// the step is turned about, so that it leads down there too.
+    /// Descends to a point of zero gradient, by Newton steps within a trust radius. Along directions of negative
+    /// curvature the step is reversed, so that it descends there too.
     ///
     /// Source: Nocedal and Wright, *Numerical Optimization* (2006), ch. 3.4 and 4.
     fn descend(&self, mut sag: [f64; N]) -> [f64; N] {
@@ -203,7 +203,7 @@ impl<const N: usize> Descent<'_, N> {
             let part = (radius / length).min(1.0);
             let next = moved(&sag, &step, part);
             let height = self.potential(&sag);
-            // Near the bottom the potential is flat to rounding, and the slope alone shows progress.
+            // Near the minimum the potential is constant within rounding, and only the gradient shows progress.
             let rounding = 1e-13 * (height.abs() + size(&stiffness));
             let drop = height - self.potential(&next);
             if drop > rounding || (drop >= -rounding && self.slope(&next) < slope) {
@@ -212,14 +212,14 @@ impl<const N: usize> Descent<'_, N> {
             } else if radius > SMALLEST_TRUSTED {
                 radius = 0.25 * radius.min(length);
             } else {
-                // This is as near as rounding lets it come, or there is no place to rest.
+                // Rounding prevents further progress, or no equilibrium exists.
                 break;
             }
         }
         sag
     }
 
-    /// The direction in which the potential curves down most, if it does in any.
+    /// The direction of the largest negative curvature, if there is one.
     fn way_down(&self, sag: &[f64; N]) -> Option<[f64; N]> {
         let stiffness = self.stiffness(sag);
         let (curvature, way) = eigen(&stiffness)
@@ -228,7 +228,7 @@ impl<const N: usize> Descent<'_, N> {
         (curvature < -FLAT * size(&stiffness)).then_some(way)
     }
 
-    /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are tied to nothing but themselves.
+    /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are decoupled, with 1 on the diagonal.
     fn stiffness(&self, sag: &[f64; N]) -> Symmetric<N> {
         let gradient = gravity_gradient(self.arm, &self.position(sag));
         std::array::from_fn(|i| {
@@ -248,7 +248,7 @@ impl<const N: usize> Descent<'_, N> {
         for (curvature, along) in eigen(stiffness) {
             let moving = (0..N).filter(|&i| !self.integrating[i]);
             let slope: f64 = moving.map(|i| gradient[i] * along[i]).sum();
-            // Where it is flat the radius alone ends the step.
+            // Without curvature only the trust radius limits the step.
             let length = slope / curvature.abs().max(1e-15 * size(stiffness));
             if length.is_finite() {
                 step = moved(&step, &along, -length);
@@ -262,13 +262,13 @@ fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; 
     std::array::from_fn(|i| from[i] + length * way[i])
 }
 
-/// The largest entry of a symmetric matrix on its diagonal.
+/// The largest magnitude on the diagonal of a symmetric matrix.
 fn size<const N: usize>(matrix: &Symmetric<N>) -> f64 {
     (0..N).fold(0.0, |max: f64, i| max.max(matrix[i][i].abs()))
 }
 
-/// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` alike,
-/// and turning the whole arm by a quarter makes that derivative out of the load itself.
+/// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` by the
+/// same angle. The derivative is therefore the load of the arm turned by a quarter of a turn.
 pub(crate) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
     let mut turned = *q;
     if let Some(first) = turned.first_mut() {

@@ -1,14 +1,14 @@
 //! The local error of a step of `h`, against two steps of `h/2` of Runge-Kutta 4 from the same state.
 //!
-//! For a method of lower order these are the truth. Two half steps of its own would not be. Where an arm is let go at
-//! rest the leading term vanishes, and the rest does not shrink by the power that step doubling assumes. Runge-Kutta 4
-//! itself is off by `C h⁵`, its two half steps by `2 C (h/2)⁵`; their difference is 15/16 of the whole. The effort is
-//! the one that the control law holds for the step, frozen in both: the error is the method's own, not that of the
-//! sampled law.
+//! For a method of lower order the two half steps serve as the truth. Two half steps of the method itself would not do.
+//! When an arm starts at rest, the leading error term vanishes, and the rest does not scale with the power that step
+//! doubling assumes. The error of Runge-Kutta 4 is `C h⁵`, and that of its two half steps `2 C (h/2)⁵`. Their
+//! difference is 15/16 of the error. Both use the effort that the control law holds for the step. The result is
+//! therefore the method's own error, without that of the sampled law.
 //!
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.4.
 //!
-//! **Invariant:** the simulation looked at is not changed. An estimate costs a step and two of Runge-Kutta 4.
+//! **Invariant:** the simulation is not changed. An estimate costs one step of the method and two of Runge-Kutta 4.
 
 #![allow(
     clippy::indexing_slicing,
@@ -27,12 +27,12 @@ pub struct ErrorEstimate {
     pub local_error: f64,
     /// Largest error of a joint velocity after the step \[rad/s\].
     pub velocity_error: f64,
-    /// `local_error` per timestep \[rad/s\]: how fast the error grows where the motion neither mends nor amplifies it.
+    /// `local_error` per timestep \[rad/s\]: the growth rate of the error if the motion neither reduces nor amplifies
+    /// it.
     pub error_per_second: f64,
 }
 
-/// The error of the step that a simulation is about to take; `None` if that step is not finite, or if the simulation
-/// has diverged before.
+/// The error of the next step of a simulation; `None` if that step is not finite, or if the simulation has diverged.
 #[must_use]
 pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstimate> {
     if simulation.divergence().is_some() {
@@ -70,7 +70,7 @@ pub fn estimate_step<const N: usize>(
     } else {
         1.0
     };
-    // Increments are compared, not states: in those of a wound joint the difference would drown.
+    // Increments are compared, not states: at a large angle the difference of two states would be lost in rounding.
     let off = |whole: &[f64; N], first: &[f64; N], second: &[f64; N]| {
         largest((0..N).map(|i| (whole[i] - (first[i] + second[i])).abs() * whole_of))
     };

@@ -1,37 +1,37 @@
-//! The fewest steps with which a run is good enough.
+//! Search for the fewest steps with which a run is accurate enough.
 //!
-//! An error need not fall with every step more: where it changes its sign a longer step may be better than a shorter
-//! one. So the search does not trust bisection alone:
+//! The error is not monotonic in the number of steps. Near a change of its sign a longer step may be better than a
+//! shorter one. The search therefore combines bisection with further trials:
 //!
 //! | steps | tried |
 //! | --- | --- |
 //! | the first `ALL` | every number |
 //! | more | doubled until one is enough, then bisected |
-//! | between half of what was found and it | `NEIGHBOURS` numbers, evenly spaced; a better one is bisected again |
+//! | from half of the best number to it | `NEIGHBOURS` numbers, evenly spaced; a better one is bisected again |
 //!
-//! **Invariant:** the number that is returned has been run and was enough, and the number of runs is bounded.
+//! **Invariant:** the returned number of steps was run and was enough, and the number of runs is bounded.
 
-/// Numbers of steps that are all tried.
+/// Up to this number of steps every number is tried.
 const ALL: u64 = 256;
 
-/// Runs between half of what was found and it.
+/// Trials between half of the best number so far and that number.
 const NEIGHBOURS: u64 = 16;
 
 /// A run with any number of steps.
 pub trait StepTrial {
-    /// Whether the run with this number of steps is good enough.
+    /// Whether the run with this number of steps is accurate enough.
     fn is_enough(&mut self, steps: u64) -> impl Future<Output = bool> + Send;
 }
 
-/// A run that is made at once.
+/// A trial without pauses.
 impl<F: FnMut(u64) -> bool> StepTrial for F {
     fn is_enough(&mut self, steps: u64) -> impl Future<Output = bool> + Send {
         std::future::ready(self(steps))
     }
 }
 
-/// The fewest steps between `first` and `most`, both included, whose run is good enough. Bisection ends once two
-/// numbers are as near as a part of the larger one: 64 means to a 64th, `u64::MAX` to the last step.
+/// The fewest steps between `first` and `most`, both included, whose run is accurate enough. `part` is the resolution
+/// of the bisection: 64 means to a 64th of the number, `u64::MAX` to a single step.
 pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial) -> Option<u64> {
     let first = first.max(1);
     if first > most {
@@ -56,7 +56,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
             (too_few, next) = (next, next.saturating_mul(2));
         }
     }
-    // Where the last one fails its neighbours may do.
+    // If the largest number fails, a smaller one may still pass.
     let mut end = most.saturating_add(1);
     loop {
         if let Some(mut enough) = best {

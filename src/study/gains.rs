@@ -1,14 +1,15 @@
-//! Gains for an arm and a timestep: stable in every pose with a margin, and settled in time.
+//! Gains for an arm and a timestep: stable in every pose with a margin, and with a bounded settling time.
 //!
-//! The default gains are scaled to the arm. A joint's gains go with the inertia that it moves, and with the pace `σ` of
-//! the loop, for which time runs `σ` times as fast: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The inertia of a joint is
-//! that of all links beyond it. Where a heavy outer link turns a light inner one along, it is the inertia that the
-//! joint feels while the others are free. Means of the two are tried in turn (`SHAPES`).
+//! The default gains are scaled to the arm. A joint's gains scale with the inertia `J` that it moves, and with the
+//! speed factor `σ` of the loop: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The loop's motion is then `σ` times as fast. The
+//! inertia of a joint is that of all links beyond it. If a heavy outer link drags a light inner one, it is the
+//! effective inertia at the joint while the others are free. Weighted means of the two are tried in turn (`SHAPES`).
 //!
-//! A pace is taken if the smallest timestep limit over all poses leaves the margin. The arm itself, stepped as the
-//! live arm is, also has to settle in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
+//! A speed factor is accepted if the smallest timestep limit over all poses leaves the margin. The simulated arm,
+//! stepped like the live one, must also settle in time in each of [`MOVES`] moves. The result is the smallest accepted
+//! factor that is found.
 //!
-//! **Invariant:** the work is bounded, and gains that are answered have been tried.
+//! **Invariant:** the work is bounded, and returned gains were simulated.
 
 #![allow(
     clippy::indexing_slicing,
@@ -29,7 +30,7 @@ use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::Simulation;
 
-/// How near each joint has to come, and stay, to be settled \[rad\].
+/// The largest position error of a settled joint \[rad\].
 pub const SETTLED: f64 = 0.02;
 
 /// Moves that are tried: from rest in the starting pose, and from swings, to setpoints within ±2π.
@@ -38,13 +39,14 @@ pub const MOVES: u32 = 10;
 /// Most steps of one move.
 pub const MAX_STEPS: f64 = 1e6;
 
-/// How long a move is watched, in settling times: an arm that has settled must stay.
+/// Duration of a move, in settling times: a settled arm must stay settled.
 const WATCHED: f64 = 1.5;
 
 /// Two weights: for springs and integrals, and for damping.
 type Shape = (f64, f64);
 
-/// Weights of the inertia that a joint feels while the others are free, beside that of all links beyond it.
+/// Weights of the effective inertia at a joint while the others are free. The rest of the weight is on the inertia of
+/// all links beyond it.
 const SHAPES: [Shape; 6] = [
     (0.0, 0.0),
     (0.5, 0.5),
@@ -54,40 +56,40 @@ const SHAPES: [Shape; 6] = [
     (1.0, 1.0),
 ];
 
-/// A pace that fails is raised by this factor.
+/// A speed factor that fails is multiplied by this.
 const FASTER: f64 = 1.25;
 
-/// First paces of a shape at which springs may be too soft for the margin.
+/// The first speed factors of a shape, at which springs may be too soft for the margin.
 const SOFT_PACES: u32 = 4;
 
-/// Paces tried with one shape.
+/// Speed factors tried with one shape.
 const MAX_PACES: u32 = 24;
 
-/// The search begins with springs so many times stiffer than what gravity takes from them.
+/// Initial ratio of the springs' stiffness to the stiffness that gravity removes.
 const ABOVE_GRAVITY: f64 = 2.0;
 
-/// How long the default arms take to settle with the default gains, with some reserve \[s\].
+/// Settling time of the default arms with the default gains, with a reserve \[s\].
 const DEFAULT_SETTLING: f64 = 3.0;
 
 /// The demands on gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainsRequirements {
-    /// Time in which every move is to settle \[s\].
+    /// Time in which every move must settle \[s\].
     pub settling_time: f64,
-    /// How many timesteps the smallest timestep limit over all poses is to be.
+    /// Required ratio of the smallest timestep limit over all poses to the timestep.
     pub margin: f64,
 }
 
-/// Gains that do.
+/// Gains that meet the demands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SuggestedGains<const N: usize> {
     /// The gains.
     pub gains: Gains<N>,
-    /// The smallest timestep limit over all poses \[s\]; `None` where nothing limits.
+    /// The smallest timestep limit over all poses \[s\]; `None` if there is no limit.
     pub limit: Option<f64>,
-    /// Whether a lower bound comes within 1 % of it.
+    /// Whether a lower bound is within 1 % of it.
     pub certified: bool,
-    /// How long the slowest of the moves took to settle \[s\].
+    /// The longest settling time of the moves \[s\].
     pub settled_after: f64,
 }
 
@@ -100,16 +102,16 @@ pub enum GainsError {
         /// The given number of steps.
         steps: f64,
     },
-    /// Slow enough for the timestep, no loop settles in time; fast enough to settle, none has the margin.
+    /// No gains meet both demands: slow loops settle too late, and fast loops lack the stability margin.
     #[error(
-        "settling_time: no gains found that settle within {} s and leave a margin of {} at the timestep {} s; ask for \
+        "settling_time: no gains found that settle within {} s and leave a margin of {} at the timestep {} s; allow \
          more time or set a shorter timestep",
         Shown(*.settling_time), Shown(*.margin), Shown(*.timestep)
     )]
     NotFound {
-        /// The time that was asked for \[s\].
+        /// The requested time \[s\].
         settling_time: f64,
-        /// The margin that was asked for.
+        /// The requested margin.
         margin: f64,
         /// The loop's timestep \[s\].
         timestep: f64,
@@ -122,7 +124,7 @@ pub const fn most_bytes<const N: usize>() -> usize {
     limits::most_bytes::<N>()
 }
 
-/// Looks for gains for the arm, method and timestep of `control`, in pieces; its gains and setpoint do not matter.
+/// Searches gains for the arm, method and timestep of `control`, in pieces. Its gains and setpoint are ignored.
 ///
 /// # Errors
 /// A settling time of too many steps, or demands that no gains meet.
@@ -148,7 +150,7 @@ pub async fn search_gains<const N: usize>(
             let limit = limits.trusted();
             let is_unstable = limit == Some(0.0);
             let is_short = limit.is_some_and(|limit| limit < margin * timestep);
-            // The loop is too fast, or its springs hardly hold the load: some faster paces tell.
+            // The loop is too fast, or its springs hardly hold the load. Some faster loops decide which.
             if is_short && !is_unstable && paces >= SOFT_PACES {
                 break;
             }
@@ -173,7 +175,7 @@ pub async fn search_gains<const N: usize>(
     })
 }
 
-/// The default gains, scaled to an arm's inertia and to a pace.
+/// The default gains, scaled to an arm's inertia and to a speed factor.
 fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) -> Gains<N> {
     let Gains { kp, ki, kd } = template::<N>();
     let scaled = |gains: [f64; N], weight: f64, power: i32| {
@@ -188,8 +190,8 @@ fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) ->
     }
 }
 
-/// The pace that settles in time if the arm is like the default one, or, if that is more, at which springs hold the
-/// load and integrals carry it.
+/// The first speed factor to try: the larger of two values. With one an arm like the default one settles in time. With
+/// the other the springs hold the load and the integrals carry it.
 fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: Shape, settling_time: f64) -> f64 {
     let Gains { kp, ki, .. } = scaled(arm, shape, 1.0);
     let load = gravity_load(arm, &[0.0; N]);
@@ -201,14 +203,14 @@ fn slowest_pace<const N: usize>(arm: &Arm<N>, shape: Shape, settling_time: f64) 
     largest(carries).max(DEFAULT_SETTLING / settling_time)
 }
 
-/// Makes the moves one by one, since where gains fail the first ones tell. Returns how long the slowest one took \[s\],
-/// or none as soon as one does not settle in time.
+/// Simulates the moves one by one, since gains that fail usually fail in one of the first moves. Returns the longest
+/// settling time \[s\], or `None` as soon as a move does not settle in time.
 async fn settle<const N: usize>(control: &ControlLoop<N>, settling_time: f64) -> Option<f64> {
     let (mut slowest, mut piece) = (0.0_f64, PieceWork::default());
     for index in 0..MOVES {
         let mut run = start_of_move(control, index);
         let setpoint = run.pid().setpoint().position;
-        // When a joint was last seen off the setpoint.
+        // The last time at which a joint was off the setpoint.
         let mut off_at = 0.0;
         while run.time() < WATCHED * settling_time {
             piece.spend(control.method.evaluations().into()).await;
@@ -226,9 +228,9 @@ async fn settle<const N: usize>(control: &ControlLoop<N>, settling_time: f64) ->
     Some(slowest)
 }
 
-/// A move about to begin: every other one out of a swing as fast as a fall makes it.
+/// A move at its start. Every other one starts in a swing, as fast as a fall.
 fn start_of_move<const N: usize>(control: &ControlLoop<N>, index: u32) -> Simulation<N> {
-    // Additive recurrences of irrational steps: evenly spread over all setpoints within ±2π, and each time the same.
+    // Additive recurrences with irrational steps: evenly spread over all setpoints within ±2π, and reproducible.
     const STEPS: [f64; 3] = [0.754_877_666_2, 0.569_840_290_9, 0.430_159_709_1];
     let part = |i: usize| (0.5 + in_f64(u64::from(index)) * STEPS[i % STEPS.len()]).fract();
     let position = match index {
@@ -265,8 +267,8 @@ fn template<const N: usize>() -> Gains<N> {
     }
 }
 
-/// The inertia that each joint moves \[kg m²\]: with all joints beyond it stretched and the others held. With its
-/// weight as an exponent, the least that it feels in any pose while the others are free enters too.
+/// The inertia that each joint moves \[kg m²\], with all joints beyond it stretched and the others held. It is averaged
+/// geometrically with the smallest effective inertia in any pose while the others are free.
 fn inertia<const N: usize>(arm: &Arm<N>, weight: f64) -> [f64; N] {
     let mass = mass_matrix(arm, &[0.0; N]);
     let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);

@@ -1,4 +1,5 @@
-//! All limits of a control loop: at its setpoint, and the smallest over all poses, bounded from below where it can be.
+//! All timestep limits of a control loop: at its setpoint, and the smallest over all poses, with a lower bound if there
+//! is one.
 //!
 //! **Invariant:** the work is bounded, and no piece of it takes longer than about a millisecond (optimised build).
 
@@ -12,34 +13,35 @@ use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
 
-/// Part of the smallest limit over all poses that is advised, to allow for effects outside the linearisation. A
-/// start of 0.3 rad off costs up to a third of a stiff limit, and poses on the way have limits of their own.
+/// Advised part of the smallest limit over all poses, a margin for effects outside the linearisation. A start 0.3 rad
+/// off the setpoint reduces the limit of a stiff loop by up to a third. Poses on the way have limits of their own.
 pub const ADVISED_PART: f64 = 0.8;
 
-/// How near to the bound the smallest limit found must be to count as certified.
+/// Largest relative distance from the bound at which the smallest limit found counts as certified.
 const AGREEMENT: f64 = 0.01;
 
-/// The part of the smallest limit found below which a bound is no advice any more.
+/// A bound below this part of the smallest limit found is too low to be used as advice.
 const USEFUL: f64 = 0.5;
 
-/// Boxes that a proof cuts in one piece: half a millisecond (optimised build).
+/// Boxes that a proof splits in one piece: half a millisecond (optimised build).
 const BOXES: u32 = 200;
 
-/// How far from the setpoint an arm may rest that is said to be at it \[rad\].
+/// Largest distance from the setpoint at which an arm counts as at it \[rad\].
 const AT_SETPOINT: f64 = 1e-6;
 
-/// How a loop rests in the pose that its limits belong to.
+/// The kind of equilibrium to which the limits belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Rest {
     /// At the setpoint.
     Setpoint,
-    /// Elsewhere: the springs give under the load.
+    /// Off the setpoint: the springs yield to the load.
     Sagging,
-    /// Left to itself.
+    /// A free arm.
     Hanging,
-    /// The setpoint is an exact balance, from which the arm falls to either side; the pose is that of one of them.
+    /// The setpoint is an unstable equilibrium, from which the arm falls to either side. The pose is on one of the
+    /// sides.
     Saddle,
-    /// Not at all: even in continuous time the loop runs away from the pose.
+    /// No rest: the loop is unstable at the pose even in continuous time.
     Unstable,
 }
 
@@ -57,28 +59,28 @@ impl Rest {
     }
 }
 
-/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep found unstable, as for
-/// a free arm without gravity, which linear methods carry at any pace.
+/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep was found unstable. An
+/// example is a free arm without gravity, whose linearised motion every method reproduces at any timestep.
 ///
-/// Gains that are all zero mean an arm left to itself, and its hanging pose.
+/// If all gains are zero, the arm is free, and the pose is the hanging one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits<const N: usize> {
     /// The pose that `held` and `continuous` belong to \[rad\].
     pub equilibrium: [f64; N],
-    /// How the loop rests there.
+    /// The kind of equilibrium there.
     pub rest: Rest,
     /// At the setpoint's equilibrium, effort held over the step.
     pub held: Option<f64>,
     /// At the setpoint's equilibrium, control in every stage.
     pub continuous: Option<f64>,
-    /// The smallest over all poses, effort held over the step. Zero where a joint integrates and the loop runs away in
-    /// some pose: the arm can be sent there.
+    /// The smallest over all poses, effort held over the step. Zero if a joint integrates and the loop is unstable in
+    /// some pose, since the arm can be sent there.
     pub minimum_held: Option<f64>,
-    /// The smallest over all poses, control in every stage: found by a search.
+    /// The smallest over all poses, control in every stage, found by a search.
     pub minimum_continuous: Option<f64>,
-    /// A timestep up to which every pose is stable, effort held over the step; `None` where nothing useful is known.
+    /// A timestep up to which every pose is stable, effort held over the step; `None` if no useful bound is known.
     pub bound: Option<f64>,
-    /// Whether no estimate is inside `bound`: with Euler, and without gravity.
+    /// Whether `bound` is proven without an estimate: with Euler, and without gravity.
     pub bound_is_proven: bool,
     /// Whether `minimum_held` and `bound` agree to 1 %.
     pub certified: bool,
@@ -86,15 +88,15 @@ pub struct Limits<const N: usize> {
     pub worst_pose: Option<[f64; N]>,
     /// The motion that grows there first.
     pub critical: Option<Critical>,
-    /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` where that is certified,
-    /// of the bound where that is less and still of use. Where the loop runs away in some pose that can't be. Then it
-    /// is of the smaller of `held` and the smallest of all poses without gravity, which is for this setpoint alone.
+    /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` if that is certified, or
+    /// of the bound if that is less and still useful. If the loop is unstable in some pose, neither applies. Then it is
+    /// of the smaller of `held` and the smallest of all poses without gravity, and holds for this setpoint alone.
     pub advised: Option<f64>,
 }
 
 impl<const N: usize> Limits<N> {
-    /// The timestep that is advised for a motion \[s\]: [`ADVISED_PART`] of what poses and motion allow; `None` where
-    /// nothing limits.
+    /// The advised timestep for a motion \[s\]: [`ADVISED_PART`] of the limit of poses and motion; `None` if there is
+    /// no limit.
     #[must_use]
     pub fn advised_for(&self, motion: &Motion) -> Option<f64> {
         let carried = ADVISED_PART * motion.timestep;
@@ -105,15 +107,15 @@ impl<const N: usize> Limits<N> {
             .reduce(f64::min)
     }
 
-    /// The smallest over all poses that can be relied on, effort held over the step \[s\]: `minimum_held` where it is
-    /// certified or there is no bound, else the bound.
+    /// A reliable value of the smallest limit over all poses, effort held over the step \[s\]. It is `minimum_held` if
+    /// that is certified or there is no bound, else the bound.
     #[must_use]
     pub fn trusted(&self) -> Option<f64> {
         self.bound.filter(|_| !self.certified).or(self.minimum_held)
     }
 }
 
-/// All limits of a loop. Some 15 ms of one core for two links, 0.3 s for three (optimised build).
+/// All limits of a loop. Takes some 15 ms of one core for two links, 0.3 s for three (optimised build).
 #[must_use]
 pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
     at_once(search_limits(*control))
@@ -131,7 +133,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let (equilibrium, kind, linear) = settle(&control);
     pause().await;
     let mut held = largest_timestep(&linear, method, Sampling::Held);
-    // A joint that nothing draws back drifts, but a loop that is stable at some timestep does not run away.
+    // A joint without a restoring force drifts, but a loop that is stable at some timestep is not unstable in
+    // continuous time.
     let mut runs_away = held == Some(0.0) && Modes::of(&linear).run_away();
     pause().await;
     let continuous = largest_timestep(&linear, method, Sampling::Continuous);
@@ -141,15 +144,15 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let (mut bound, mut runaway) = (None, None);
     if let Some(Proven { timestep, pose }) = prove(&control).await {
         bound = Some(timestep);
-        // The pose where the bound comes nearest to fail.
+        // The pose at which the bound is tightest.
         let nearest = PoseCandidate::as_it_is(pose);
         let there = largest_timestep(&nearest.linear(&control), method, Sampling::Held);
         if there.is_some_and(|there| there > 0.0 && least.is_none_or(|least| there < least)) {
             (least, worst) = (there, nearest);
         }
         if held == Some(0.0) {
-            // Rounding alone can make slow modes seem to grow beside rates a trillion times their own. A proof does not
-            // round.
+            // When rates differ by a factor of a trillion, rounding alone can make slow modes seem to grow. The proof
+            // is not affected by this rounding.
             (held, least, runs_away) = (bound, bound, false);
         }
     } else if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
@@ -159,7 +162,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     }
     let mut agrees = is_near(bound, least);
     if !agrees {
-        // All poses, or those without gravity where some pose with it runs away.
+        // All poses, or only those without gravity if some pose with gravity is unstable.
         let sought = match runaway {
             Some(_) => Sought::WeightlessLimit,
             None => Sought::Limit(Sampling::Held),
@@ -202,7 +205,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     limits
 }
 
-/// The bound for all poses, if there is something to prove it with.
+/// The bound for all poses, if the proof applies.
 async fn prove<const N: usize>(control: &ControlLoop<N>) -> Option<Proven<N>> {
     let mut proof = Proof::new(control)?;
     loop {
@@ -213,7 +216,7 @@ async fn prove<const N: usize>(control: &ControlLoop<N>) -> Option<Proven<N>> {
     }
 }
 
-/// The pose in which the loop rests, how it does so, and the loop there.
+/// The equilibrium, its kind, and the linearised loop there.
 fn settle<const N: usize>(control: &ControlLoop<N>) -> ([f64; N], Rest, Linear) {
     let rest = equilibrium(control);
     let linear = Linear::at(control, &rest.position, &rest.integrating);
@@ -230,20 +233,20 @@ fn settle<const N: usize>(control: &ControlLoop<N>) -> ([f64; N], Rest, Linear) 
     (rest.position, kind, linear)
 }
 
-/// Whether there are a bound and a smallest limit, and they agree. The limit may fall short of the bound a little,
-/// since growth counts only from some size on.
+/// Whether a bound and a smallest limit exist and agree. The limit may be slightly below the bound, since only growth
+/// above a threshold counts.
 fn is_near(bound: Option<f64>, least: Option<f64>) -> bool {
     let both = bound.zip(least);
     both.is_some_and(|(bound, least)| (least / bound - 1.0).abs() <= AGREEMENT)
 }
 
-/// The limit [`Limits::held`] alone, for the live arm at its present setpoint. Half a millisecond of one core for two
-/// links, one for three (optimised build).
+/// The limit [`Limits::held`] alone, for the live arm at its present setpoint. Takes 0.5 ms of one core for two links,
+/// 1 ms for three (optimised build).
 #[must_use]
 pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
     let linear = Linear::at_setpoint(control);
     match largest_timestep(&linear, control.method, Sampling::Held) {
-        // This is as in the search for all limits.
+        // The same rule as in the search for all limits.
         Some(0.0) => Proof::new(control)
             .and_then(|mut proof| proof.advance(BOXES))
             .map_or(Some(0.0), |proven| Some(proven.timestep)),

@@ -1,20 +1,20 @@
 //! The closed loop near its equilibrium, as a linear system.
 //!
-//! The arm under the control law rests where `kp (q* - q) + kd q̇* + ki I = G(q)` holds at every joint. Of a small
-//! deviation `(x, v)` from there, velocity products are of second order, and what remains is
+//! The arm under the control law rests where `kp (q* - q) + kd q̇* + ki I = G(q)` holds at every joint. For a small
+//! deviation `(x, v)` from the equilibrium, velocity products are of second order. The linear part is
 //!
 //! `v̇ = -S x + M⁻¹ u`,  `S = M⁻¹ ∂G/∂q`,  `u = -kp x - kd v + ki s`,  `ṡ = -x`
 //!
 //! | symbol | name | unit |
 //! | --- | --- | --- |
-//! | S | what gravity gives back per angle | 1/s² |
+//! | S | restoring acceleration of gravity per angle | 1/s² |
 //! | M⁻¹ | inverse of the mass matrix | 1/(kg m²) |
 //! | s | deviation of the integral, of the joints that have one | rad s |
 //!
-//! M⁻¹ and S are columns of forward dynamics without gravity, so they are as exact as the arm's own kernel. A dense
-//! inverse of M would lose ten digits to a heavy outer link.
+//! M⁻¹ and S are columns of forward dynamics without gravity, so they are as accurate as the arm's own kernel. A dense
+//! inverse of M would lose ten digits if the outer link is heavy.
 //!
-//! **Invariant:** whatever the arm and the gains, a linearisation is made in bounded time.
+//! **Invariant:** for every arm and all gains the linearisation takes bounded time.
 
 #![allow(
     clippy::indexing_slicing,
@@ -45,7 +45,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// The loop at `position`, as if it were an equilibrium in which `integrating` says whose integral moves.
+    /// The loop at `position`, as if it were an equilibrium. `integrating` marks the joints whose integral is active.
     #[must_use]
     pub fn at<const N: usize>(
         control: &ControlLoop<N>,
@@ -85,7 +85,7 @@ impl Linear {
         Self::at(control, &rest.position, &rest.integrating)
     }
 
-    /// The loop at any pose, with every integral moving.
+    /// The loop at any pose, with every integral active.
     #[must_use]
     pub fn at_pose<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Self {
         Self::at(control, position, &control.integrating())
@@ -116,20 +116,19 @@ impl Linear {
         self.gravity.size()
     }
 
-    /// Number of states: positions, velocities, integrals that move.
+    /// Number of states: positions, velocities, active integrals.
     #[must_use]
     pub fn states(&self) -> usize {
         2 * self.joints() + self.integrals.len()
     }
 
-    /// The matrix `A` of `ẋ = A x` with control that follows the state at every instant; `x` holds positions,
-    /// velocities, integrals.
+    /// The matrix `A` of `ẋ = A x` with the law in continuous time; `x` holds positions, velocities, integrals.
     #[must_use]
     pub fn flow(&self) -> Matrix {
         self.closed(&self.plant(), 0.0)
     }
 
-    /// The loop that the law closes about an arm under constant efforts. The law runs once in a period `T` \[s\]:
+    /// The closed loop of the sampled law and an arm under constant efforts. The law runs once per period `T` \[s\]:
     /// `s ↦ s - T x`, then `u = -kp x - kd v + ki s`. States are as in [`Linear::flow`].
     pub(super) fn closed(&self, arm: &Matrix, period: f64) -> Matrix {
         let n = self.joints();

@@ -1,29 +1,29 @@
-//! The largest timestep of a motion, which linearisation about a pose at rest can't tell.
+//! The largest timestep of a motion, which a linearisation about a pose at rest cannot predict.
 //!
-//! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
-//! until the run diverges. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
-//! fastest link. [`max_rotation_per_step`] is what every method was seen to carry.
+//! If a link turns too far within a step, the method adds energy, the arm turns faster still, and the run finally
+//! diverges. The onset depends only on the rotation per step, `h Ω`, with Ω the speed of the fastest link.
+//! [`max_rotation_per_step`] is the measured limit of each method.
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
 //! | of an arm without springs | all energy in one link: `Ω² = 2 (E - U_min) max (M⁻¹)_ii`, arm stretched |
 //! | to a setpoint | the joints' peaks and the present speed: `Σ F / (√(kp I) + kd)` and `max φ̇`, or the former |
 //!
-//! `(M⁻¹)_ii` says how easily link i is turned while the others are free, `I` is the inertia that a joint then moves.
-//! `F = kp e + ki s` is the effort that speeds a joint up:
+//! `(M⁻¹)_ii` is the mobility of link i while the others are free, and `I` is the effective inertia of a joint then.
+//! `F = kp e + ki s` is the effort that accelerates a joint:
 //!
-//! - `e` is the way to where the joint may come to rest: that to the setpoint and the sag of its spring, which is the
-//!   largest load over `kp`.
-//! - `s = e (√(kp I) + kd) / kp` is the integral that gathers on that way, [`INTEGRAL_LIMIT`] at most.
+//! - `e` is the distance to the possible rest position: the distance to the setpoint plus the sag of the spring, which
+//!   is the largest load over `kp`.
+//! - `s = e (√(kp I) + kd) / kp` is the integral accumulated over that distance, [`INTEGRAL_LIMIT`] at most.
 //!
-//! The peak of one joint that is let go at rest is `e √(kp/I)` without damping and `kp e / kd` with much of it. In
-//! between the formula is off by a tenth at most.
+//! The peak speed of a single joint released at rest is `e √(kp/I)` without damping and `kp e / kd` with strong
+//! damping. In between the error of the formula is at most a tenth.
 //!
-//! Seen on 2,100 random arms of 2 and 3 links, spun or falling for 4 s. Two of a hundred were lost a little before
-//! these angles, and half of them were stable at two and a half times as much. On moves of up to 25 rad a joint with
-//! gains of all dampings the speed assumed was 0.5 to 2.9 times the true one.
+//! The limits were measured on 2,100 random arms of 2 and 3 links, spun or falling for 4 s. Two in a hundred diverged
+//! slightly below these angles, and half of them were stable at 2.5 times as much. On moves of up to 25 rad per joint,
+//! with all degrees of damping, the assumed speed was 0.5 to 2.9 times the true one.
 //!
-//! **Invariant:** pure and cheap, some 3 µs, since every published tick asks for it.
+//! **Invariant:** pure and cheap, some 3 µs, since it is computed for every published tick.
 //!
 //! [`max_rotation_per_step`]: crate::math::integrator::Method::max_rotation_per_step
 
@@ -40,21 +40,21 @@ use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics, gravity_load, potential_energy};
 use crate::math::pid::INTEGRAL_LIMIT;
 
-/// How long a free arm was watched \[s\]. Within 0.8 of its largest stable timestep its energy above that of the
-/// hanging arm kept to a factor of two for so long, in 98 of 100 runs. Under control damping takes over.
+/// Duration of the measurements on a free arm \[s\]. At up to 0.8 of the limit, in 98 of 100 runs, the energy above
+/// that of the hanging arm stayed within a factor of two over this duration. Under control, damping bounds the energy.
 pub const FREE_SECONDS: f64 = 4.0;
 
 /// A speed, and the timestep that it allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Speed of the fastest link that is assumed \[rad/s\]; zero where nothing moves.
+    /// Assumed speed of the fastest link \[rad/s\]; zero if nothing moves.
     pub speed: f64,
-    /// The largest timestep \[s\] at which the method carries it; infinite where nothing moves.
+    /// The largest timestep \[s\] of the method at this speed; infinite if nothing moves.
     pub timestep: f64,
 }
 
 impl Motion {
-    /// The motion that is ahead of an arm in this state, under this loop.
+    /// The coming motion of an arm in this state, under this loop.
     #[must_use]
     pub fn ahead<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> Self {
         let ControlLoop {
@@ -65,7 +65,7 @@ impl Motion {
             ..
         } = control;
         let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
-        // The stretched arm on the horizontal is the heaviest to hold, for every joint.
+        // The load of every joint is largest for the arm stretched along the horizontal.
         let load = gravity_load(arm, &[0.0; N]);
         let (mut peaks, mut stored, mut driven) = (0.0, 0.0, 0.0);
         for (j, load) in load.iter().enumerate() {
@@ -92,7 +92,7 @@ impl Motion {
         } else {
             by_energy
         };
-        // An arm too extreme to compute with gives NaN, which limits nothing.
+        // An arm with extreme parameters gives NaN, which counts as no limit.
         let timestep = method.max_rotation_per_step() / speed;
         if speed > 0.0 && timestep > 0.0 {
             Self { speed, timestep }
@@ -114,7 +114,7 @@ fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
     potential_energy(arm, &hanging)
 }
 
-/// `max (M⁻¹)_ii` in the angles of the links \[1/(kg m²)\]. All joints before link i pass its effort on, and its
+/// `max (M⁻¹)_ii` in the angles of the links \[1/(kg m²)\]. All joints before link i transmit its effort, and its
 /// acceleration is the sum of theirs.
 fn agility<const N: usize>(weightless: &Arm<N>) -> f64 {
     (0..N)

@@ -1,15 +1,15 @@
-//! Computations that take long, each written as one async function and done a piece at a time.
+//! Long computations, each written as one async function and done a piece at a time.
 //!
-//! A worker, and the page, do a piece of one computation and then of another. A piece ends where the function awaits
-//! `pause`. Nothing is waited for, so that no executor is needed: a poll is a piece.
+//! A worker, or the page, does a piece of one computation and then of another. A piece ends where the function awaits
+//! `pause`. It waits for no event, so no executor is needed: one poll is one piece.
 //!
-//! **Invariant:** a computation gives the same bits in pieces as at once.
+//! **Invariant:** the result of a computation in pieces is bit-identical to that without pauses.
 
 use std::future::poll_fn;
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, Waker};
 
-/// A computation on its way to a `T`.
+/// A computation in progress, with the result `T`.
 pub struct Paused<T>(Option<Pin<Box<dyn Future<Output = T> + Send>>>);
 
 impl<T> Paused<T> {
@@ -18,8 +18,8 @@ impl<T> Paused<T> {
         Self(Some(Box::pin(computation)))
     }
 
-    /// Goes on by one piece, which takes a millisecond or so of one core at most (optimised build). Returns the answer
-    /// with the last one, and nothing after that.
+    /// Does the next piece, which takes about 1 ms of one core at most (optimised build). Returns the result after the
+    /// last piece, and `None` after that.
     pub fn advance(&mut self) -> Option<T> {
         let answer = poll(self.0.as_mut()?.as_mut());
         if answer.is_some() {
@@ -59,15 +59,15 @@ pub(super) async fn pause() {
     .await;
 }
 
-/// Evaluations of the dynamics in a piece, which may exceed them by one step: some hundred microseconds.
+/// Evaluations of the dynamics per piece: some hundred microseconds. A piece may exceed it by one step.
 const WORK_PER_PIECE: u64 = 2000;
 
-/// The evaluations of the dynamics in the present piece, of a computation that consists of little else.
+/// The evaluations of the dynamics in the present piece. It serves computations that do little else.
 #[derive(Debug, Default)]
 pub(super) struct PieceWork(u64);
 
 impl PieceWork {
-    /// Counts `evaluations`, and ends the piece once there are enough.
+    /// Counts `evaluations`, and ends the piece at [`WORK_PER_PIECE`].
     pub(super) async fn spend(&mut self, evaluations: u64) {
         self.0 += evaluations;
         if self.0 >= WORK_PER_PIECE {

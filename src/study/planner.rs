@@ -3,20 +3,20 @@
 //! | question | the truth that errors are measured from |
 //! | --- | --- |
 //! | an arm left to itself | its motion |
-//! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
-//! | the same with a control period that is given | the loop whose law runs once a period: holding is none |
+//! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): the hold is an error |
+//! | the same with a control period that is given | the loop whose law runs once a period: the hold is no error |
 //!
-//! The truth is computed with smaller and smaller steps, until two truths agree to a part of the allowed error. For a
-//! free arm the tolerance becomes smaller instead. Then each method is run beside the truth, as the live arm runs it.
-//! The fewest steps are searched ([`fewest`]) with which it stays within the rest of the error after each of them.
-//! The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A run that
-//! could only be dearer than another is not made.
+//! The truth is refined with smaller steps until two truths agree to a part of the allowed error. For a free arm the
+//! tolerance is reduced instead. Then each method is simulated like the live arm and compared with the truth. A search
+//! ([`fewest`]) finds the fewest steps with which it stays within the rest of the error after every step. The plan is
+//! the cheapest run, in evaluations of the dynamics, and its error is measured. Runs that cannot be cheaper are
+//! skipped.
 //!
-//! Where no control period is given both are planned. The law then runs in every step, since a longer period at the
-//! same timestep costs as much and is further from the truth. Under control no timestep is planned beyond what is
-//! advised for every pose, since the error of one move says nothing about the next.
+//! If no control period is given, it is planned too. The law then runs in every step: a longer period at the same
+//! timestep costs as much and has a larger error. Under control the timestep never exceeds the advice for all poses,
+//! since the error of one move does not bound that of the next.
 //!
-//! **Invariant:** the work is bounded when a plan is asked for, and every candidate that is answered has been run.
+//! **Invariant:** the work is bounded by the request, and every returned candidate was simulated.
 
 use std::f64::consts::PI;
 
@@ -33,7 +33,7 @@ use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
 use crate::math::shown::{Shown, shown_against};
 
-/// Longest time between two comparisons of truths \[s\], and how many there are at least.
+/// Longest time between two comparisons of truths \[s\], and the fewest intervals between comparisons.
 const LONGEST_SPAN: f64 = 0.05;
 const FEWEST_SPANS: f64 = 16.0;
 
@@ -43,45 +43,46 @@ pub const MAX_DURATION: f64 = 1000.0;
 /// Most steps of the truth, and of one run.
 const MAX_STEPS: u64 = 4_000_000;
 
-/// The part of the allowed error that the truth itself may be off by.
+/// Largest uncertainty of the truth, relative to the allowed error.
 const PART_OF_TRUTH: f64 = 0.05;
 
-/// A tolerance that was too large is multiplied by this: two digits more cost less than half as much work again.
+/// A tolerance that was too large is multiplied by this. Two more digits increase the work by less than half.
 const FINER: f64 = 0.01;
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task<const N: usize> {
-    /// The loop; its method and timestep are looked for, and its control period where that is 0. Gains of zero mean an
-    /// arm left to itself.
+    /// The loop. Its method and timestep are planned, and its control period if that is 0. With gains of zero the arm
+    /// is free.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
-    /// How long \[s\].
+    /// Duration of the motion \[s\].
     pub duration: f64,
-    /// Largest distance of the end effector from where it ought to be \[m\].
+    /// Largest allowed error of the end effector's position \[m\].
     pub error: f64,
 }
 
-/// A run that keeps within the allowed error.
+/// A run within the allowed error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// Its method.
     pub method: Method,
     /// Its timestep \[s\].
     pub timestep: f64,
-    /// Evaluations of the dynamics that it made.
+    /// Its evaluations of the dynamics.
     pub evaluations: u64,
-    /// How far the end effector was off at most, after any of its steps \[m\].
+    /// Largest error of the end effector after any of its steps \[m\].
     pub error: f64,
 }
 
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
-    /// The runs that were within the error, the cheapest last; the others are dearer, or cannot be had.
+    /// The runs that were within the error, the cheapest last. Methods without a candidate are more expensive, or
+    /// exceed the error.
     pub candidates: Vec<Candidate>,
-    /// How far the truth itself may be off \[m\].
+    /// Uncertainty of the truth \[m\].
     pub uncertainty: f64,
 }
 
@@ -102,10 +103,10 @@ pub enum PlanError {
         /// The given duration \[s\].
         duration: f64,
     },
-    /// The motion amplifies rounding beyond the allowed error, or is too wild to be followed.
+    /// The motion amplifies rounding beyond the allowed error, or changes too fast to be computed.
     #[error("error must be larger or duration shorter: {}", known(*.uncertainty))]
     Unknown {
-        /// By how much two of the truths differ \[m\]; infinite where there are no two.
+        /// Distance between two truths \[m\]; infinite if there are no two.
         uncertainty: f64,
     },
     /// No method stays within the error.
@@ -114,16 +115,16 @@ pub enum PlanError {
         /// The given error \[m\].
         error: f64,
     },
-    /// Nothing was run, since the loop is stable at no timestep.
+    /// Nothing was simulated, since the loop is unstable at every timestep.
     #[error(
-        "gains or control_period must be others: the loop is unstable at every timestep, at the setpoint or in a pose \
-         on the way (/study/stability says where), so nothing was run"
+        "gains or control_period must be changed: the loop is unstable at every timestep, at the setpoint or in a pose \
+         on the way (/study/stability returns the pose), so nothing was simulated"
     )]
     Unstable,
-    /// Nothing was run, since the longest stable timestep is too short.
+    /// Nothing was simulated, since the largest stable timestep is too small.
     #[error(
-        "duration must be shorter: at the longest stable timestep, {} s, it takes more than {MAX_STEPS} steps, so \
-         nothing was run",
+        "duration must be shorter: at the largest stable timestep, {} s, it takes more than {MAX_STEPS} steps, so \
+         nothing was simulated",
         Shown(*.timestep)
     )]
     TooManySteps {
@@ -132,10 +133,10 @@ pub enum PlanError {
     },
 }
 
-/// How finely a truth is followed.
+/// The resolution of a truth.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
-    /// Each whole is cut into so many steps.
+    /// The number of steps per whole.
     Steps(u64),
     /// Within a tolerance.
     Tolerance(f64),
@@ -150,16 +151,16 @@ impl Fineness {
     }
 }
 
-/// The most memory that [`plan`] takes, in bytes: a run and its truth, and a search for limits.
+/// The most memory of [`plan`], in bytes: a run, its truth, and a search for limits.
 #[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
 }
 
-/// Looks for a plan, in pieces.
+/// Searches a plan, in pieces.
 ///
 /// # Errors
-/// Why there is none.
+/// The reason why there is no plan.
 pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     let Task {
         control,
@@ -180,7 +181,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);
         let least = ceiling(truth.whole / most * (1.0 - count::ROUNDING));
-        // As many as cost less than the best run so far.
+        // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
         let affordable = cheapest.map_or(u64::MAX, |least| {
             least.saturating_sub(1) / u64::from(method.evaluations())
@@ -217,7 +218,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
 struct MethodTrials<'a, const N: usize> {
     truth: &'a Truth<N>,
     control: ControlLoop<N>,
-    /// The last one that was good enough.
+    /// The last run that was accurate enough.
     best: Option<Candidate>,
     has_run: bool,
 }
@@ -244,12 +245,12 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
     }
 }
 
-/// The longest timestep at which a loop is stable \[s\], or is advised for every pose; infinite where nothing limits.
+/// The largest stable timestep of a loop \[s\], or the one advised for all poses; infinite if there is no limit.
 async fn longest_timestep<const N: usize>(control: &ControlLoop<N>) -> f64 {
     let most = if control.is_free() {
         None
     } else if is_sampled(control) {
-        // It is a whole part of the period, but for rounding.
+        // It divides the period, up to rounding.
         let limit = clock_limits(control).timestep;
         limit.map(|limit| limit * (1.0 + count::ROUNDING))
     } else {
@@ -258,20 +259,20 @@ async fn longest_timestep<const N: usize>(control: &ControlLoop<N>) -> f64 {
     most.unwrap_or(f64::INFINITY)
 }
 
-/// The motion that runs are measured from.
+/// The motion from which the errors of runs are measured.
 struct Truth<const N: usize> {
     task: Task<N>,
-    /// The duration, or the control period \[s\]: timesteps are whole parts of it.
+    /// The duration, or the control period \[s\]: a timestep divides it.
     whole: f64,
-    /// How many of it there are.
+    /// The number of wholes in the duration.
     count: u64,
     fineness: Fineness,
-    /// How far the motion itself may be off \[m\].
+    /// Uncertainty of the motion \[m\].
     uncertainty: f64,
 }
 
 impl<const N: usize> Truth<N> {
-    /// The motion of a task, followed ever more finely until it is known to `enough` \[m\].
+    /// The motion of a task, refined until its uncertainty is at most `enough` \[m\].
     async fn known_to(enough: f64, task: Task<N>) -> Result<Self, PlanError> {
         let Task {
             control, duration, ..
@@ -283,9 +284,10 @@ impl<const N: usize> Truth<N> {
             (1, duration)
         };
         let fineness = if control.is_free() {
-            // This part of half a turn moves the end effector of the stretched arm by as much.
+            // The tolerance is relative to a rotation. For half a turn of the stretched arm it moves the end effector
+            // by `enough`.
             let tolerance = enough / (PI * control.arm.reach());
-            // The truth that it is first compared with must be finer.
+            // The truth of the first comparison must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4 * spans(whole, count))
@@ -322,13 +324,13 @@ impl<const N: usize> Truth<N> {
         }
     }
 
-    /// How far a run of `steps` steps in the whole is off at most \[m\]; more than `allowed` ends it.
+    /// Largest error of a run of `steps` steps per whole \[m\]. The run ends once the error exceeds `allowed`.
     async fn off_by(&self, run: Box<dyn Steppable<N>>, steps: u64, allowed: f64) -> f64 {
         let arm = &self.task.control.arm;
         largest_distance(arm, (run, steps * self.count), self.motion(steps), allowed).await
     }
 
-    /// The motion from its start, and how many of its steps make one of a run that takes `steps` steps in the whole.
+    /// The motion from its start, and the number of its steps per step of a run with `steps` steps per whole.
     fn motion(&self, steps: u64) -> (Box<dyn Steppable<N>>, u64) {
         let Task { control, start, .. } = self.task;
         match self.fineness {
@@ -354,26 +356,26 @@ impl<const N: usize> Truth<N> {
     }
 }
 
-/// Parts of a whole \[s\], of which there are `count`, after which truths are compared.
+/// Number of comparisons of truths per whole \[s\], for `count` wholes.
 fn spans(whole: f64, count: u64) -> u64 {
     ceiling((whole / LONGEST_SPAN).max(FEWEST_SPANS / in_f64(count)))
 }
 
-/// Whether the law runs at a period that is given.
+/// Whether the control period is given.
 fn is_sampled<const N: usize>(control: &ControlLoop<N>) -> bool {
     control.period.period > 0.0 && !control.is_free()
 }
 
-/// Says how well a motion is known if two truths differ by so much.
+/// The message for truths that differ by `uncertainty` \[m\].
 fn known(uncertainty: f64) -> String {
     if uncertainty.is_finite() {
-        format!("the motion itself can only be known to {uncertainty:.1e} m for so long")
+        format!("the motion itself is known only to {uncertainty:.1e} m over this duration")
     } else {
-        "the motion itself can not be known so well for so long".to_owned()
+        "the motion itself cannot be computed this accurately over this duration".to_owned()
     }
 }
 
-/// The least whole number that is not below `x`.
+/// The smallest integer that is at least `x`.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,17 +1,18 @@
-//! The smallest timestep limit over all poses: how far a limit at one setpoint can be trusted on the way to another.
+//! The smallest timestep limit over all poses. It holds on the way from one setpoint to another, where other limits may
+//! not.
 //!
-//! Inertia depends on every joint but the first, the pull of gravity on all of them. At every pose of a grid over the
-//! outer joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it.
-//! Then the poses in between are searched: a climb from every cell that stands out among its neighbours goes uphill on
-//! the growth at the smallest limit so far. Wherever something grows, that pose has a smaller limit. Poses that gravity
-//! makes run away even in continuous time say nothing about timesteps and are left out. Without gravity they count,
-//! since then the gains run away.
+//! Inertia depends on every joint but the first, the gravity load on all of them. The loop is analysed at every pose of
+//! a grid over the outer joints: without gravity, and, if there is gravity, with it for a ring of first joint angles.
+//! Then the poses in between are searched. A climb starts from every local maximum of the grid and ascends the growth
+//! at the smallest limit so far. If a mode grows at a pose, its limit is smaller. Poses that are unstable in continuous
+//! time because of gravity are left out, since no timestep stabilises them. Without gravity they count, since the gains
+//! are then the cause.
 //!
-//! An arm whose joints integrate can be held in every pose, and where it runs away it does so for good. Towards the
-//! border of such poses the limit falls to zero. So these are searched first ([`Sought::Runaway`]): uphill on
-//! the largest real part of any mode in continuous time.
+//! An arm whose joints integrate can be sent to every pose, also to unstable ones. Towards the border of unstable poses
+//! the limit falls to zero. They are therefore searched first ([`Sought::Runaway`]), by ascending the largest real part
+//! of any mode in continuous time.
 //!
-//! **Invariant:** the work is bounded: [`cells`] poses, and one climb from each at most.
+//! **Invariant:** the work is bounded: [`cells`] poses, and at most one climb from each.
 
 #![allow(
     clippy::indexing_slicing,
@@ -26,19 +27,19 @@ use super::linear::Linear;
 use super::paused::pause;
 use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 
-/// Directions of the first joint for the pull of gravity; among them hanging and upright.
+/// Angles of the first joint for the gravity load, among them hanging and upright.
 const DIRECTIONS: usize = 8;
 
 /// Most poses of the outer joints, whatever the number of links.
 const MAX_POSES: usize = 1024;
 
-/// Parts of the smallest limit so far at which a pose must be stable to pass without a search of its own.
+/// Parts of the smallest limit so far. A pose that is stable at all of them needs no search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
 
-/// Stride at which a climb ends \[rad\]: near its top a limit then changes by a millionth.
+/// Smallest stride of a climb \[rad\]: near a maximum the limit then changes by a millionth.
 const SMALLEST_STRIDE: f64 = 1e-3;
 
-/// Moves of one climb at most.
+/// Most moves of one climb.
 const MAX_MOVES: u32 = 400;
 
 /// Poses around the circle of each outer joint; even, so that stretched and folded are among them.
@@ -46,7 +47,7 @@ const fn grid<const N: usize>() -> usize {
     if N > 2 { 16 } else { 64 }
 }
 
-/// A pose to be judged, with gravity or without.
+/// A pose to be analysed, with gravity or without.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseCandidate<const N: usize> {
     pub(super) pose: [f64; N],
@@ -54,7 +55,7 @@ pub(super) struct PoseCandidate<const N: usize> {
 }
 
 impl<const N: usize> PoseCandidate<N> {
-    /// A pose as it is, with the gravity that there is.
+    /// A pose with the arm's gravity.
     pub(super) const fn as_it_is(pose: [f64; N]) -> Self {
         Self {
             pose,
@@ -62,7 +63,7 @@ impl<const N: usize> PoseCandidate<N> {
         }
     }
 
-    /// The loop that was judged.
+    /// The loop that was analysed.
     pub(super) fn linear(&self, control: &ControlLoop<N>) -> Linear {
         let linear = Linear::at_pose(control, &self.pose);
         if self.has_gravity {
@@ -80,12 +81,12 @@ pub(super) enum Sought {
     Limit(Sampling),
     /// The smallest limit of poses without gravity, effort held.
     WeightlessLimit,
-    /// A pose that runs away in continuous time: its limit is zero.
+    /// A pose that is unstable in continuous time: its limit is zero.
     Runaway,
 }
 
-/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if nothing limits. A pose that runs
-/// away has a limit of zero. There is a pause after every pose.
+/// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if there is no limit. A pose that is
+/// unstable in continuous time has a limit of zero. The search pauses after every pose.
 pub(super) async fn smallest_of_all_poses<const N: usize>(
     control: ControlLoop<N>,
     sought: Sought,
@@ -102,7 +103,7 @@ pub(super) async fn smallest_of_all_poses<const N: usize>(
     (search.smallest, search.worst)
 }
 
-/// Memory that a search takes at most \[bytes\]: the cells, and the list of cells from which the climbs start.
+/// The most memory of a search \[bytes\]: the cells, and the list of cells from which the climbs start.
 pub(super) const fn most_bytes<const N: usize>() -> usize {
     2 * MAX_POSES * size_of::<(PoseCandidate<N>, f64)>()
 }
@@ -110,7 +111,7 @@ pub(super) const fn most_bytes<const N: usize>() -> usize {
 struct PoseSearch<const N: usize> {
     control: ControlLoop<N>,
     sought: Sought,
-    /// The smallest so far \[s\]; `None` while nothing limits.
+    /// The smallest so far \[s\]; `None` while there is no limit.
     smallest: Option<f64>,
     /// The pose of that value.
     worst: PoseCandidate<N>,
@@ -149,12 +150,12 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// Whether the object of the search is a pose that runs away, and there is one.
+    /// Whether an unstable pose is sought and was found.
     fn is_found(&self) -> bool {
         self.sought == Sought::Runaway && self.smallest.is_some()
     }
 
-    /// When the law whose limit is sought runs; none if a pose is sought that runs away.
+    /// The sampling of the sought limit; `None` if an unstable pose is sought.
     fn sampling(&self) -> Option<Sampling> {
         match self.sought {
             Sought::Limit(sampling) => Some(sampling),
@@ -163,8 +164,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// Judgements at one pose of the outer joints. Without gravity the direction of the first joint makes no
-    /// difference.
+    /// Analyses per pose of the outer joints. Without gravity the angle of the first joint has no effect.
     fn turns(&self) -> usize {
         if self.control.arm.gravity() == 0.0 || self.sought == Sought::WeightlessLimit {
             1
@@ -199,7 +199,7 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// Growth at the smallest limit so far, or in continuous time if a pose is sought that runs away.
+    /// Growth at the smallest limit so far, or in continuous time if an unstable pose is sought.
     fn growth(&mut self, judged: &PoseCandidate<N>) -> f64 {
         let linear = judged.linear(&self.control);
         let Some(sampling) = self.sampling() else {
@@ -219,14 +219,14 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// Goes uphill on the growth, one judgement a move, as far as it goes.
+    /// Ascends the growth to a local maximum, with one analysis per move.
     async fn climb(&mut self, mut at: PoseCandidate<N>) {
         let mut growth = self.growth(&at);
         let mut stride = 0.5 * TAU / ratio(grid::<N>(), 1);
-        // The first joint counts only where there is gravity.
+        // The first joint has an effect only with gravity.
         let first = usize::from(!at.has_gravity);
         let directions = 2 * N.saturating_sub(first);
-        // The direction that is tried next, and how many have failed in turn.
+        // The next direction to try, and the number of consecutive failures.
         let (mut direction, mut failed) = (0, 0);
         for _ in 0..MAX_MOVES {
             if stride < SMALLEST_STRIDE || directions == 0 || self.is_found() {
@@ -271,7 +271,7 @@ fn grid_poses<const N: usize>(turns: usize) -> impl Iterator<Item = (usize, Pose
     })
 }
 
-/// Cells that grow no less than all of their neighbours.
+/// Local maxima: cells whose growth is at least that of all neighbours.
 fn summits<const N: usize>(cells: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandidate<N>> {
     let (half, whole) = (grid::<N>() / 2 + 1, grid::<N>());
     let stands_out = |index: usize| {
@@ -280,7 +280,7 @@ fn summits<const N: usize>(cells: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandida
             let length = if joint == 1 { half } else { whole };
             let (stride, digit) = (apart, index / apart % length);
             apart *= length;
-            // The second joint's half circle has ends.
+            // The second joint covers a half circle, whose ends have one neighbour.
             let beside = if joint == 1 {
                 [digit.saturating_sub(1), (digit + 1).min(length - 1)]
             } else {
@@ -310,8 +310,8 @@ fn cells<const N: usize>() -> (usize, usize) {
     (all, all.min(MAX_POSES))
 }
 
-/// One of the poses of the outer joints, the first joint at zero; none beyond the last. Mirrored about the vertical an
-/// arm is the same arm, so the second joint needs half of its circle only.
+/// One of the poses of the outer joints, the first joint at zero; `None` beyond the last. By mirror symmetry about the
+/// vertical the second joint needs only half of its circle.
 fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
     let (all, taken) = cells::<N>();
     let half = grid::<N>() / 2 + 1;

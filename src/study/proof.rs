@@ -1,9 +1,10 @@
-//! A bound: a timestep up to which a loop is stable in every pose. With Euler, and without gravity, it is proven.
+//! A lower bound of the timestep limit: a timestep up to which a loop is stable in every pose. It is proven for Euler,
+//! and without gravity.
 //!
 //! For a step with held effort, `z x = …` for an eigenvector x with eigenvalue z, put `z = (1 + w h/2) / (1 - w h/2)`:
-//! the unit circle becomes the left half plane of `w`. The arm under a constant effort moves on a parabola, which every
-//! method but Euler takes exactly, and the velocity becomes `w x`. The rest of the law is a polynomial of symmetric
-//! matrices
+//! the unit circle becomes the left half plane of `w`. Under a constant effort the arm moves on a parabola, which every
+//! method but Euler integrates exactly. The velocity becomes `w x`. The remaining equation is a polynomial with
+//! symmetric matrices
 //!
 //! `P₃ w³ + P₂ w² + P₁ w + P₀`
 //!
@@ -15,24 +16,25 @@
 //! | P₀ | `Ki` | `Ki` |
 //!
 //! with `Γ = ∂G/∂q`. Multiplied by x from both sides it is a cubic with real coefficients. By Hurwitz' rule all its
-//! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`. This holds for every x, so for every pose, if the
-//! matrices are so. Only `M` and `Γ` know the pose. `Γ` is bounded by its largest entries. The pose in which `P₃`
-//! first ceases to be positive is found by branch and bound. Over a box of joint angles `M` is at least its value in
-//! the middle, less the loss of its cosines.
+//! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`. This holds for every x, and so for every pose, if the
+//! matrices satisfy these inequalities. Only `M` and `Γ` depend on the pose. `Γ` is bounded by its largest entries. The
+//! pose in which `P₃` first ceases to be positive is found by branch and bound. Over a box of joint angles `M` is at
+//! least its value at the centre minus the largest change of its cosines.
 //!
-//! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no
-//! longer symmetric. Where `P₃, P₂ > 0` that is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`; every coefficient
-//! must be good by twice that, and `ε` at most 0.01, or there is no bound. For these methods under gravity the bound so
-//! rests on an estimate of the part that is not symmetric. Without gravity, and for Euler, no estimate is inside.
+//! Three methods evaluate gravity in several stages. For them the spring term changes by up to `h²/4 Kp M⁻¹ Γ`, which
+//! is not symmetric. If `P₃, P₂ > 0`, this is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`. Every coefficient
+//! must have a margin of twice that, and `ε` must be at most 0.01, or there is no bound. With gravity the bound of
+//! these methods therefore depends on an estimate of the part that is not symmetric. Without gravity, and for Euler, it
+//! needs no estimate.
 //!
-//! The bound is sharp where an arm is limited by its damping, as stiff controllers are. Where damping is weak the
-//! matrices mix (`P₂` loses its sign for one joint before the loop is unstable), and it is only safe.
+//! The bound is sharp if damping limits the timestep, as with stiff controllers. With weak damping it is only safe:
+//! `P₂` becomes indefinite for one joint before the loop is unstable.
 //!
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 7, on quadratic forms of a pencil; Lawler and
 //! Wood, *Branch-and-bound methods* (1966), on the search. Their combination is our own.
 //!
-//! **Invariant:** whenever the search ends, its bound holds, under gravity as far as the estimate does; the number of
-//! boxes is bounded.
+//! **Invariant:** the bound holds whenever the search ends, under gravity if the estimate holds. The number of boxes is
+//! bounded.
 
 #![allow(
     clippy::indexing_slicing,
@@ -51,25 +53,26 @@ use crate::math::elementary::sin_cos;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 
-/// How near the bound comes to the limit of the worst pose: half of the 1 % that is promised.
+/// Relative distance of the bound from the limit of the worst pose: half of the promised 1 %.
 const SHARPNESS: f64 = 0.004;
 
-/// Boxes that are cut before the search ends with the bound so far: some 50 ms of one core (optimised build).
+/// Most boxes that are split. The search then ends with the bound so far, after some 50 ms of one core (optimised
+/// build).
 const MAX_BOXES: u32 = 20_000;
 
 /// Halvings of an interval of timesteps.
 const HALVINGS: u32 = 60;
 
-/// There is no bound if gravity's part in a stage is larger than this.
+/// Largest `ε`, the effect of gravity within the stages, for which there is a bound.
 const LARGEST_STAGE: f64 = 0.01;
 
-/// Parts of the timesteps in which two factors that both fall are bounded apart.
+/// Intervals of timesteps in each of which two decreasing factors are bounded separately.
 const PARTS: u32 = 64;
 
-/// A bound, and the pose in which it comes nearest to fail.
+/// A bound, and the pose at which it is tightest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Proven<const N: usize> {
-    /// Held control is stable in every pose up to this timestep \[s\]; infinite where nothing limits.
+    /// Held control is stable in every pose up to this timestep \[s\]; infinite if there is no limit.
     pub(super) timestep: f64,
     /// The pose, first joint at zero.
     pub(super) pose: [f64; N],
@@ -81,11 +84,11 @@ pub(super) struct Proof<const N: usize> {
     arm: Arm<N>,
     gains: Gains<N>,
     is_euler: bool,
-    /// The most that gravity adds to a spring \[N m/rad\].
+    /// The most that gravity adds to a spring's stiffness \[N m/rad\].
     weight: [f64; N],
-    /// The largest timestep that all but the poses allow \[s\].
+    /// The largest timestep by the conditions that do not depend on the pose \[s\].
     cap: f64,
-    /// The least timestep that any pose so far allows \[s\], and that pose.
+    /// The smallest limit of the poses so far \[s\], and its pose.
     least: Proven<N>,
     boxes: BinaryHeap<Angles<N>>,
     cut: u32,
@@ -102,7 +105,7 @@ struct Angles<const N: usize> {
 
 impl<const N: usize> Eq for Angles<N> {}
 
-/// Least bound first, which is what [`BinaryHeap`] calls the greatest.
+/// Smallest bound first: the order is reversed, since [`BinaryHeap`] returns the greatest item.
 impl<const N: usize> Ord for Angles<N> {
     fn cmp(&self, other: &Self) -> Ordering {
         other.bound.total_cmp(&self.bound)
@@ -120,7 +123,7 @@ impl<const N: usize> Proof<N> {
     pub(super) const MOST_BYTES: usize =
         size_of::<Self>() + (MAX_BOXES + 2).next_power_of_two() as usize * size_of::<Angles<N>>();
 
-    /// A proof of held control, not begun; none where there is nothing to prove with.
+    /// A proof of held control, not begun; `None` if the proof does not apply.
     pub(super) fn new(control: &ControlLoop<N>) -> Option<Self> {
         let ControlLoop {
             arm, gains, method, ..
@@ -141,7 +144,7 @@ impl<const N: usize> Proof<N> {
         proof.cap = proof.largest_for_gains()?;
         let half = std::array::from_fn(|joint| match joint {
             0 => 0.0,
-            // Mirrored about the vertical an arm is the same arm.
+            // The arm is symmetric about the vertical.
             1 => FRAC_PI_2,
             _ => PI,
         });
@@ -150,7 +153,7 @@ impl<const N: usize> Proof<N> {
         Some(proof)
     }
 
-    /// Cuts up to `boxes` boxes. Returns the bound once it is as sharp as it can be.
+    /// Splits up to `boxes` boxes. Returns the bound once it cannot be sharpened further.
     pub(super) fn advance(&mut self, boxes: u32) -> Option<Proven<N>> {
         for _ in 0..boxes {
             let Some(first) = self.boxes.peek().copied() else {
@@ -201,9 +204,8 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// A matrix that the mass matrix of no pose of a box falls below. In the angles of the links it is
-    /// `μ_ij l_i l_j cos(φ_i - φ_j)`, and the loss of a cosine costs `2 y_i y_j ≤ t y_i² + y_j²/t` at
-    /// most.
+    /// A lower bound of the mass matrix over all poses of a box. In link angles the mass matrix is
+    /// `μ_ij l_i l_j cos(φ_i - φ_j)`. A smaller cosine changes it by at most `2 y_i y_j ≤ t y_i² + y_j²/t`.
     fn least_mass(&self, middle: &[f64; N], half: &[f64; N]) -> Symmetric<N> {
         let mut links: Symmetric<N> = [[0.0; N]; N];
         for i in 0..N {
@@ -244,7 +246,7 @@ impl<const N: usize> Proof<N> {
         })
     }
 
-    /// The most by which P₃ falls short of M at joint j; it grows with the timestep where P₂ is positive.
+    /// The largest difference between M and P₃ at joint j. It grows with the timestep if P₂ is positive.
     fn taken_from_mass(&self, j: usize, h: f64) -> f64 {
         let Gains { kp, ki, kd } = &self.gains;
         let weight = self.weight[j];
@@ -255,11 +257,11 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// P₂ at joint j, at least.
+    /// Lower bound of P₂ at joint j.
     fn damping(&self, j: usize, h: f64) -> f64 {
         let Gains { kp, ki, kd } = &self.gains;
         if self.is_euler {
-            // Three times the integral's part, so that P₃ falls with the timestep.
+            // Three times the integral term, so that P₃ decreases with the timestep.
             kd[j] - h * (kp[j] + self.weight[j]) - 0.75 * h * h * ki[j]
         } else {
             let spring = kp[j] * (1.0 + 2.0 * self.stage(h));
@@ -267,7 +269,7 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// P₁ at joint j, at least.
+    /// Lower bound of P₁ at joint j.
     fn spring(&self, j: usize, h: f64) -> f64 {
         let Gains { kp, ki, .. } = &self.gains;
         if self.is_euler {
@@ -277,7 +279,7 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// ε of methods that look at gravity in several stages.
+    /// ε of methods that evaluate gravity in several stages.
     fn stage(&self, h: f64) -> f64 {
         let Gains { kp, kd, .. } = &self.gains;
         let most = |of: &dyn Fn(usize) -> f64| (0..N).map(of).fold(0.0, f64::max);
@@ -288,14 +290,14 @@ impl<const N: usize> Proof<N> {
         }
     }
 
-    /// The largest timestep that springs, damping and integrals allow, whatever the pose \[s\].
+    /// The largest timestep by the conditions on springs, damping and integrals, in any pose \[s\].
     fn largest_for_gains(&self) -> Option<f64> {
         let Gains { kp, ki, kd } = &self.gains;
-        // A weight that is not a number, as springs without any strength have it, is not less than a gain.
+        // Springs of zero stiffness give a weight of NaN, which is not less than a gain.
         if !(0..N).all(|j| kp[j] > self.weight[j] && kd[j] > 0.0) {
             return None;
         }
-        // P₂ ends before 2 kd/kp.
+        // P₂ becomes zero before 2 kd/kp.
         let end = (0..N)
             .map(|j| 2.0 * kd[j] / kp[j])
             .fold(f64::INFINITY, f64::min);
@@ -311,8 +313,8 @@ impl<const N: usize> Proof<N> {
         (cap > 0.0 && cap.is_finite()).then_some(cap)
     }
 
-    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds. Each part of the way is tried at its worst: falling
-    /// factors of P₁ P₂ are taken at its end, and P₃, which falls too, at its beginning.
+    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds. Each interval is tested in the worst case: the
+    /// decreasing factors of P₁ P₂ at its end, and P₃, which decreases too, at its start.
     fn largest_for_integrals(&self, end: f64) -> f64 {
         let stretched = mass_matrix(&self.arm, &[0.0; N]);
         let mass: [f64; N] = dominating(|i, j| stretched[i][j], |j| stretched[j][j]);
@@ -323,7 +325,7 @@ impl<const N: usize> Proof<N> {
                 .map(|j| self.spring(j, to) / ki[j])
                 .fold(f64::INFINITY, f64::min);
             (0..N).all(|j| {
-                // Gravity and the stages may add to P₃ what they may take away.
+                // Gravity and the stages may increase P₃ by as much as they may decrease it.
                 let weight =
                     0.25 * to * to * (self.weight[j] + 2.0 * self.stage(to) * self.gains.kp[j]);
                 let lost = 0.5 * from * self.gains.kd[j];
@@ -343,7 +345,7 @@ impl<const N: usize> Proof<N> {
     }
 }
 
-/// The largest timestep up to `end` at which `holds` does; it does so up to some timestep and not beyond.
+/// The largest timestep up to `end` for which `holds` is true. It must be true up to some timestep and false beyond.
 fn largest(end: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(end) {
         return end;
@@ -363,8 +365,8 @@ fn largest(end: f64, holds: impl Fn(f64) -> bool) -> f64 {
     good
 }
 
-/// A diagonal matrix above and, negative, below every symmetric one whose entries are no larger than these: as
-/// `2 y_i y_j ≤ t y_i² + y_j²/t`, with t after the sizes of the joints.
+/// A diagonal matrix D with -D ≤ A ≤ D for every symmetric A whose entries are no larger than these. It follows from
+/// `2 y_i y_j ≤ t y_i² + y_j²/t`, with t from the sizes of the joints.
 fn dominating<const N: usize>(
     entry: impl Fn(usize, usize) -> f64,
     size: impl Fn(usize) -> f64,
@@ -376,7 +378,8 @@ fn dominating<const N: usize>(
     })
 }
 
-/// The most that gravity adds to or takes from each spring: entry (i, j) of Γ is the load of joint `max(i, j)`, turned.
+/// The most by which gravity changes each spring's stiffness. Entry (i, j) of Γ is the load of joint `max(i, j)` of the
+/// turned arm.
 fn heaviest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>) -> [f64; N] {
     if arm.gravity() == 0.0 {
         return [0.0; N];

@@ -1,34 +1,35 @@
-//! Growth of a loop's slow modes beside fast ones a trillion times their rate.
+//! Growth of slow modes in a loop whose fast modes have up to a trillion times their rate.
 //!
-//! Eigenvalues of a matrix are good to some 1e-16 of the largest. At a damping rate of 1e12/s that says nothing of
-//! a mode that grows by a factor e a second. The matrix `(A - σ)⁻¹` has an eigenvalue `1 / (λ - σ)` for each mode λ.
-//! With a shift σ of the mode's own size no eigenvalue is much larger than that of the mode, which keeps its digits.
-//! The sizes are those of the eigenvalues of `A`, which have lost the slow modes, and of `A⁻¹`, which have lost the
-//! fast ones. A joint with large gains makes only its own column large, so that elimination keeps the other digits.
+//! Computed eigenvalues have errors of some 1e-16 of the largest one. At a damping rate of 1e12/s this hides a mode
+//! that grows by a factor e per second. The matrix `(A - σ)⁻¹` has an eigenvalue `1 / (λ - σ)` for each mode λ. With a
+//! shift σ of the mode's own size no eigenvalue is much larger than that of the mode, so its digits are kept. The sizes
+//! come from the eigenvalues of `A`, which are inaccurate for slow modes, and of `A⁻¹`, inaccurate for fast ones. A
+//! joint with large gains makes only its own column large, so elimination keeps the digits of the other columns.
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.6.
 //!
-//! **Invariant:** the work is bounded, and growth that rounding may have made counts for nothing.
+//! **Invariant:** the work is bounded, and growth within rounding error does not count.
 
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
 use crate::math::elementary::hypot;
 
-/// A mode is slow, and looked at here, if the fastest one is so many times faster.
+/// A mode is slow if its rate is below this part of the fastest rate.
 const SLOWER: f64 = 1e-4;
 
-/// Growth that counts, in parts of the mode's own rate: a thousand times what rounding leaves of a mode that is well
-/// apart from others.
+/// Least growth that counts, relative to the mode's own rate: a thousand times the rounding error of a well separated
+/// mode.
 const GROWTH: f64 = 1e-9;
 
-/// The shift of a mode, in its sizes: on the side of decay, and of no mode that only decays at its size.
+/// The shift relative to the mode's size. It is negative, on the side of decay, and differs from a purely decaying mode
+/// of this size.
 const SHIFT: f64 = -1.3;
 
-/// How many times larger or smaller than its size a mode may be to keep its digits.
+/// Largest ratio between a mode and the assumed size at which the mode keeps its digits.
 const NEAR: f64 = 100.0;
 
-/// Whether a mode grows that is slow beside the fastest `rate` \[1/s\], and whose growth is less than `doubtful`
-/// \[1/s\], so that rounding may have hidden it.
+/// Whether a mode grows that is slow compared with the fastest `rate` \[1/s\]. Its growth is less than `doubtful`
+/// \[1/s\], so rounding may have hidden it.
 pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64) -> bool {
     let is_slow = |size: f64, growth: f64| size < SLOWER * rate && growth.abs() < doubtful;
     if !modes.iter().any(|mode| is_slow(mode.modulus(), mode.re)) {
@@ -48,7 +49,7 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
     })
 }
 
-/// Real and imaginary parts of the modes by the eigenvalues of the shifted inverse; none where it is singular.
+/// Real and imaginary parts of the modes, from the eigenvalues of the shifted inverse; empty if the matrix is singular.
 fn shifted_modes(flow: &Matrix, shift: f64) -> Vec<(f64, f64)> {
     let shifted = Matrix::from_fn(flow.size(), |row, column| {
         flow[(row, column)] - if row == column { shift } else { 0.0 }

@@ -2,7 +2,7 @@
 //!
 //! A method steps the linear system of [`Linear`] by a matrix, `x ↦ (I + h E) x`. The loop is stable at the timestep
 //! `h` as long as no eigenvalue `1 + h μ` of that matrix leaves the unit circle: `2 Re μ + h |μ|² ≤ 0` for every
-//! eigenvalue μ of `E`. `E` is formed without subtracting the identity, so that growth of a trillionth part shows at
+//! eigenvalue μ of `E`. `E` is formed without subtracting the identity, so growth of one part in 10¹² is resolved at
 //! any timestep.
 //!
 //! | control | what is stepped | `E` |
@@ -11,12 +11,13 @@
 //! | held over the step | the arm with constant efforts, then the law closes the loop | monodromy matrix of a period |
 //!
 //! Verlet steps positions (and integrals) by `A + h/2 A²`, velocities by the mean of the accelerations at the start and
-//! at the predicted state. The held law is the shipped one: the integral takes up the error before it is used.
+//! at the predicted state. The held law is the live arm's: the integral is updated with the error before it is used.
 //!
 //! Source: Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), ch. IV.2; for sampled control,
 //! Åström and Wittenmark, *Computer-Controlled Systems* (1997), ch. 2 and 3.
 //!
-//! **Invariant:** the answer is the end of the stable timesteps that begin at zero; stable islands beyond are ignored.
+//! **Invariant:** the result is the end of the stable interval that begins at zero. Stable intervals beyond it are
+//! ignored.
 
 #![allow(
     clippy::indexing_slicing,
@@ -32,28 +33,28 @@ use super::matrix::{Complex, Matrix, largest};
 use super::slow_modes;
 use crate::math::integrator::Method;
 
-/// Growth, relative to the fastest eigenvalue, that rounding can feign: eigenvalues of graded 9×9 matrices are good to
-/// some 1e-13.
+/// Growth within rounding error, relative to the fastest eigenvalue. The computed eigenvalues of graded 9×9 matrices
+/// have errors of some 1e-13.
 pub(super) const NEUTRAL: f64 = 1e-11;
 
-/// Start of the search, in units of the fastest time constant. Already here an undamped swing shows its growth
-/// under Euler (1e-3) and midpoint (2.5e-10).
+/// Start of the search, in units of the fastest time constant. An undamped swing already grows measurably here under
+/// Euler (1e-3) and midpoint (2.5e-10).
 const SEARCH_START: f64 = 1e-3;
 
-/// Up to here the search doubles the timestep: so far below the fast mode's own limit growth changes slowly and
+/// Up to here the search doubles the timestep: far below the limit of the fast mode, growth changes slowly and
 /// regularly.
 const SEARCH_FINE: f64 = 0.1;
 
-/// Step of the search beyond, as a factor: an unstable window narrower than this may be missed.
+/// Factor between the timesteps of the search beyond. It may miss an unstable interval that is narrower.
 const SEARCH_STEP: f64 = 1.05;
 
-/// End of the search. No explicit method reaches beyond 3.
+/// End of the search. No limit of the explicit methods exceeds 3.
 const SEARCH_END: f64 = 30.0;
 
 /// When the control law is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sampling {
-    /// Once a step; the effort is held through all of its stages, as the live arm does it.
+    /// Once a step; the effort is held through all stages, as in the live arm.
     Held,
     /// In every stage, as if the law were part of the arm.
     Continuous,
@@ -85,12 +86,12 @@ pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) 
     Stepping::new(linear, method, sampling).matrix(h)
 }
 
-/// The loop as it would be in continuous time.
+/// The loop in continuous time.
 pub(super) struct Modes {
     eigenvalues: Vec<Complex>,
     /// The fastest rate \[1/s\].
     rate: f64,
-    /// Whether a mode grows so slowly that its eigenvalue does not show it.
+    /// Whether a mode grows so slowly that rounding hides it in its eigenvalue.
     slow_growth: bool,
 }
 
@@ -116,8 +117,8 @@ impl Modes {
         growth.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether there is a mode that no timestep can help. It grows, or it is so near to drifting that rounding
-    /// decides on which side it is (a double zero is good to the root of the rounding error).
+    /// Whether a mode is unstable at every timestep. It grows, or is so close to neutral that rounding decides its
+    /// sign: a double eigenvalue at zero has an error of the square root of the rounding error.
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;
         let grows = |mode: &Complex| {
@@ -128,7 +129,7 @@ impl Modes {
     }
 }
 
-/// A linear loop, and how it is stepped.
+/// A linear loop with the method, sampling and number of steps per period.
 pub struct Stepping<'a> {
     linear: &'a Linear,
     method: Method,
@@ -137,7 +138,7 @@ pub struct Stepping<'a> {
     substeps: u32,
     /// Whether an effort acts one period late.
     delayed: bool,
-    /// The matrix that the method steps: of the loop, or of the arm with constant efforts.
+    /// The matrix of the stepped system: the loop, or the arm with constant efforts.
     stepped: Matrix,
 }
 
@@ -156,8 +157,8 @@ impl<'a> Stepping<'a> {
         }
     }
 
-    /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as over a bus
-    /// or with a slow controller. There is no integral in a late one.
+    /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as with a bus
+    /// or a slow controller. A late law has no integral.
     #[must_use]
     pub fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
         Self {
@@ -254,25 +255,26 @@ impl<'a> Stepping<'a> {
             })
     }
 
-    /// Whether nothing grows at this period. NaN is not stable.
+    /// Whether no mode grows at this period. NaN counts as unstable.
     pub(super) fn is_stable(&self, period: f64) -> bool {
         self.growth(period) <= NEUTRAL
     }
 
-    /// Goes up from far below the fastest time constant to the first unstable period, then bisects.
+    /// Increases the period from far below the fastest time constant to the first unstable one, then bisects.
     pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
         let rate = modes.rate;
         if rate == 0.0 {
             return None;
         }
-        // At timesteps at which the fast modes are stable, the slow ones do not notice the length of a step.
+        // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
+        // timestep.
         if modes.slow_growth && !self.delayed {
             return Some(0.0);
         }
         let start = SEARCH_START / rate;
         if !self.is_stable(start) {
-            // A loop with almost no damping may still be stable at periods a thousand times shorter. It must show decay
-            // there: a loop that only seems neutral may grow too slowly to be seen, as an undamped swing does under
+            // A loop with almost no damping may still be stable at periods a thousand times shorter. It must decay
+            // there. A loop that only seems neutral may grow too slowly to be detected, as an undamped swing does under
             // midpoint.
             let tiny = 1e-3 * start;
             return if self.growth(tiny) < -NEUTRAL {
@@ -298,13 +300,13 @@ impl<'a> Stepping<'a> {
     }
 
     fn boundary(&self, stable: f64, unstable: f64) -> f64 {
-        // A thousandfold interval takes 60 halvings of its logarithm to come down to 1e-14.
+        // 60 halvings of the logarithm reduce a thousandfold interval to a relative width of 1e-14.
         bisect((stable, unstable), 60, |period| self.is_stable(period))
     }
 }
 
-/// The boundary between a value for which something holds and a larger one for which it does not, to some units of
-/// rounding or after so many halvings of its logarithm.
+/// The boundary between a value for which a condition holds and a larger one for which it does not. The search ends at
+/// a few units of rounding, or after the given number of halvings of the logarithm.
 pub(crate) fn bisect(
     (mut holding, mut failing): (f64, f64),
     halvings: u32,

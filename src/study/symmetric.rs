@@ -14,7 +14,7 @@ use crate::math::elementary::hypot;
 /// A symmetric matrix, row by row.
 pub(super) type Symmetric<const N: usize> = [[f64; N]; N];
 
-/// Sweeps over all pairs; convergence is quadratic, so that five are enough.
+/// Most sweeps over all pairs; convergence is quadratic, so five are enough.
 const SWEEPS: usize = 20;
 
 /// Eigenvalues, each with its unit vector, in no particular order.
@@ -56,7 +56,7 @@ pub(super) fn eigen<const N: usize>(matrix: &Symmetric<N>) -> [(f64, [f64; N]); 
     std::array::from_fn(|i| (a[i][i], vectors[i]))
 }
 
-/// Whether every eigenvalue is above zero: all pivots of an elimination are.
+/// Whether every eigenvalue is positive: all pivots of an elimination are positive.
 pub(super) fn is_positive<const N: usize>(matrix: &Symmetric<N>) -> bool {
     let mut a = *matrix;
     (0..N).all(|k| {
@@ -67,7 +67,7 @@ pub(super) fn is_positive<const N: usize>(matrix: &Symmetric<N>) -> bool {
                 *entry -= factor * above;
             }
         }
-        // This refuses NaN too.
+        // This is false for NaN too.
         pivot[k] > 0.0 && pivot[k].is_finite()
     })
 }

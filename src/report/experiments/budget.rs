@@ -1,12 +1,11 @@
 //! Origins of an error: truncation, rounding, and the effort held for a step.
 //!
 //! `live` are the live arm's steps in doubles, and `exact` the same steps with 106 bits. `plant` is the true motion
-//! under the effort that these steps hold, and `law` the true motion under the law at every instant:
+//! under the effort that these steps hold, and `law` the true motion under the continuous-time law:
 //!
 //! `live - law = (live - exact) + (exact - plant) + (plant - law)`: rounding, truncation, control hold.
 //!
-//! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the
-//! others.
+//! **Invariant:** each of the three parts is a difference of two computed motions; none is the remainder of the others.
 
 use super::error::{REACH_GAINS, REACH_SETPOINT};
 use super::reference::{
@@ -26,11 +25,11 @@ const MOST_LOOKS: usize = 1024;
 pub struct Parts {
     /// Length of a step \[s\].
     pub timestep: f64,
-    /// All of it: against the law at every instant (or the free motion).
+    /// The total: against the continuous-time law, or the free motion.
     pub total: f64,
     /// The error of the method.
     pub truncation: f64,
-    /// The error of doubles.
+    /// The rounding error of doubles.
     pub rounding: f64,
     /// The error of holding the effort for the step; 0 without control.
     pub hold: f64,

@@ -50,8 +50,8 @@ pub fn symplectic_drift<const N: usize>(
     })
 }
 
-/// The scale of energies \[J\]: twice the largest potential energy there can be, and the kinetic energy at the start.
-/// Never the energy itself, which is 0 for an arm let go from the horizontal.
+/// The scale of energies \[J\]: twice the largest possible potential energy plus the initial kinetic energy. Never the
+/// energy itself, which is 0 for an arm let go from the horizontal.
 fn energy_scale<const N: usize>(arm: &Arm<N>, start: &State<N>) -> f64 {
     let upright = std::array::from_fn(|i| if i == 0 { FRAC_PI_2 } else { 0.0 });
     2.0 * potential_energy(arm, &upright) + kinetic_energy(arm, &start.position, &start.velocity)
@@ -64,9 +64,9 @@ fn drift<const N: usize>(
     duration: f64,
     mut advance: impl FnMut(u64) -> Option<State<N>>,
 ) -> Vec<(f64, f64)> {
-    /// How much later the next point is.
+    /// Ratio of the times of two successive points.
     const FACTOR: f64 = 1.12;
-    /// Steps between two looks at the energy.
+    /// Steps between two samples of the energy.
     const LOOK: u64 = 8;
     let (scale, first) = (energy_scale(arm, start), energy(arm, start));
     let mut points = Vec::new();
@@ -89,7 +89,7 @@ struct Hamiltonian<'a, const N: usize> {
     arm: &'a Arm<N>,
     /// Angles and momenta.
     y: [[f64; N]; 2],
-    /// The last slope, from which the next one is looked for.
+    /// The last slope, the initial guess for the next one.
     slope: [[f64; N]; 2],
 }
 
@@ -103,7 +103,8 @@ impl<'a, const N: usize> Hamiltonian<'a, N> {
         Self { arm, y, slope }
     }
 
-    /// `y' = y + h f((y + y') / 2)`, solved by iteration: two digits or more a round at the steps used here.
+    /// `y' = y + h f((y + y') / 2)`, solved by fixed-point iteration, with two or more digits per round at the
+    /// timesteps used here.
     fn step(&mut self, h: f64) {
         const ROUNDS: usize = 12;
         for _ in 0..ROUNDS {

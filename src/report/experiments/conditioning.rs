@@ -1,10 +1,10 @@
-//! How many digits the accelerations of an arm lose, by mass ratio, pose and way of solving.
+//! Digits lost in the accelerations of an arm, by mass ratio, pose and solver.
 //!
-//! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two ways are compared with it: the live arm's
-//! recursion, and the textbook's: form `M(q)` in joint space and eliminate. The effect of a half-unit change in the
-//! last place of the angles on the truth is shown beside them: no algorithm can do better.
+//! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two solvers are compared with it: the live arm's
+//! recursion, and elimination of `M(q)` in joint space, as in textbooks. The inherent loss is the effect on the truth
+//! of a change of the angles by half a unit in the last place. No algorithm can lose less.
 //!
-//! **Invariant:** the same states for every way.
+//! **Invariant:** every solver gets the same states.
 
 #![allow(
     clippy::indexing_slicing,
@@ -25,8 +25,8 @@ pub enum PoseShape {
     Bent,
     /// Outer angles of some 1e-6 rad: nearly a straight line, where eliminating a joint-space matrix loses most.
     Stretched,
-    /// The second joint at π but for 1e-8 to 0.1 rad, the third anywhere. The first two links lie on one another, and
-    /// the third turns about a point next to the base.
+    /// The second joint within 1e-8 to 0.1 rad of π, the third at any angle. The first two links coincide, and the
+    /// third turns about a point near the base.
     Folded,
 }
 
@@ -45,7 +45,7 @@ pub struct Lost {
 #[must_use]
 pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
     let arm = Arm::<3>::new([1.0; 3], [1.0, 1.0, ratio], 9.81).ok()?;
-    // A fixed seed: the same report from the same program.
+    // A fixed seed makes the report reproducible.
     let mut random = fastrand::Rng::with_seed(7);
     let mut any = move || 2.0 * random.f64() - 1.0;
     let mut worst = Lost {
@@ -70,7 +70,7 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
         worst.recursion = lost(&truth, &found).max(worst.recursion);
         let dense = textbook(&arm, position, velocity, &tau);
         worst.dense = lost(&truth, &dense).max(worst.dense);
-        // The worst of turning one joint alone, and all of them.
+        // The worst case of changing one joint alone, and all of them.
         let changes = (0..=3).map(|turned| {
             let mut nudged = state;
             for (i, q) in nudged.position.iter_mut().enumerate() {
@@ -79,7 +79,7 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
                 }
             }
             let near = exact_acceleration(&arm, &nudged, &tau).map(DoubleDouble::to_f64);
-            // Half a unit, where the neighbour is a whole one away.
+            // The neighbour is a whole unit away, so one bit is subtracted for half a unit.
             (lost(&truth, &near) - std::f64::consts::LOG10_2).max(0.0)
         });
         worst.inherent = changes.fold(worst.inherent, f64::max);

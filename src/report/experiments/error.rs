@@ -22,10 +22,10 @@ use crate::study::stability::{Sampling, largest_timestep};
 /// Steps of the coarsest run of a row: a power of two, so that the timesteps of a duration that is one too are exact.
 pub const OUTPUTS: u64 = 64;
 
-/// Comparisons of a run: a millisecond apart in two seconds, where no peak of an error hides in between.
+/// Comparisons per run: about one per millisecond in two seconds, so no peak of the error is missed.
 const LOOKS: u64 = 2048;
 
-/// Gains of the reach: soft enough that timesteps of tens of milliseconds are on both sides of the stability edge.
+/// Gains of the reach: low enough that the stability limit is at tens of milliseconds.
 pub const REACH_GAINS: Gains<2> = Gains {
     kp: [200.0, 100.0],
     ki: [0.0; 2],
@@ -41,7 +41,7 @@ pub const REACH_SETPOINT: Setpoint<2> = Setpoint {
 /// The reach in words.
 pub const REACH: &str = "a reach of 2 links to (0.8, -0.6) with kp 200, 100 and kd 30, 12";
 
-/// Something to be computed by every method.
+/// A motion that every method computes.
 pub struct Scene {
     /// Short name, as files and tables use it.
     pub name: &'static str,
@@ -49,7 +49,7 @@ pub struct Scene {
     pub title: &'static str,
     /// Parameters in one line.
     pub about: String,
-    /// How the effort is found: `none`, `continuous` or `held`.
+    /// How the effort is computed: `none`, `continuous` or `held`.
     pub control: &'static str,
     /// Unit of its errors.
     pub unit: &'static str,
@@ -138,7 +138,7 @@ fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
     }
 }
 
-/// An arm in motion. The reference is the law at every instant; its integral gains are 0.
+/// An arm in motion. The reference has a continuous-time law with integral gains of 0.
 fn arm_scene<const N: usize>(
     (name, title, control): (&'static str, &'static str, &'static str),
     law: &str,
@@ -228,7 +228,7 @@ fn particle_scene() -> Scene {
     }
 }
 
-/// A particle with a function that can be read.
+/// A particle with a valid function.
 impl TaskRun for Option<Particle> {
     fn advance(&mut self, steps: u64) -> u64 {
         let steps = usize::try_from(steps).unwrap_or(usize::MAX);

@@ -1,13 +1,13 @@
-//! The largest stable timestep, measured: the arm itself is nudged off its equilibrium and watched.
+//! The largest stable timestep, measured on the arm itself: a small deviation from its equilibrium decays or grows.
 //!
 //! Held control runs through [`Simulation`], the live loop; control in every stage through [`ContinuousLoop`], where
-//! the method steps the arm and its law as one system. Stable means that the deviation decays. "Did it overflow?" would
-//! be the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. Decay is judged by
-//! energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose. A single joint may move further off
-//! for a while.
+//! the method steps the arm and its law as one system. Stable means that the deviation decays. Overflow is not the
+//! criterion: just past the limit a nonlinear arm chatters between two poses without end. Decay is judged by energy,
+//! `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose. A single joint may move further off for a
+//! while.
 //!
-//! How fast a deviation grows per control period shows once it is scaled back to the size of the nudge after every
-//! period. So the fastest mode alone is left, and neither dies in rounding nor leaves the linear range.
+//! The growth per control period is measured by rescaling the deviation to its initial size after every period. Then
+//! only the fastest mode remains. It neither vanishes in rounding nor leaves the linear range.
 //!
 //! **Invariant:** no prediction enters a measurement but the equilibrium and a value to start the search from.
 
@@ -29,24 +29,24 @@ use crate::study::linear::{Equilibrium, Linear, equilibrium, gravity_gradient};
 use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, Stepping, bisect, largest_timestep};
 
-/// Control periods for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold
-/// meanwhile.
+/// Control periods of a run: a mode that is off the unit circle by 0.1 % changes 50-fold in this time.
 pub const STEPS: u64 = 4000;
 
-/// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
+/// The initial deviation \[rad\]: small enough for linear behaviour, and a billion units of rounding.
 const NUDGE: f64 = 1e-6;
 
-/// A deviation, or a velocity times the control period, that has made its point \[rad\]: two thousand nudges, and still
-/// less than the chatter past a limit.
+/// A deviation, or a velocity times the control period, that counts as growth \[rad\]: two thousand times the initial
+/// one, and still less than the chatter past a limit.
 const ESCAPED: f64 = 2e-3;
 
-/// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.
+/// A deviation that has decayed \[rad\]: a hundred thousand units of rounding. Below it rounding would be compared.
 const DEAD: f64 = 1e-11;
 
 /// Periods before counting starts, in which all modes but the fastest fall behind.
 const BEFORE: u32 = 2000;
 
-/// Periods over which the growth is averaged: where in a swing they begin and end then matters less than 0.1 %.
+/// Periods over which the growth is averaged: the phase of the swing at both ends then has an effect of less than 0.1
+/// %.
 const COUNTED: u32 = 4000;
 
 /// Halvings of the search interval; the last one is narrower than 0.005 %.
@@ -89,7 +89,7 @@ impl LimitPair {
 
     fn of(predicted: Option<f64>, growth: impl Fn(f64) -> Option<f64>) -> Self {
         let predicted = predicted.filter(|limit| *limit > 0.0);
-        // The prediction itself is none of the values that are tried.
+        // The prediction itself is not among the tried values.
         let measure = |predicted: f64| boundary(0.9 * predicted, |limit| decays(growth(limit)));
         Self {
             predicted,
@@ -97,14 +97,14 @@ impl LimitPair {
         }
     }
 
-    /// How far the measured limit is from the predicted one, as a part of it; none without a limit.
+    /// Relative difference of the measured limit from the predicted one; `None` without a limit.
     #[must_use]
     pub fn off(&self) -> Option<f64> {
         let measured = self.measured.unwrap_or(f64::INFINITY);
         Some((measured / self.predicted? - 1.0).abs())
     }
 
-    /// Whether both are there, and agree to 1 %.
+    /// Whether both exist and agree to 1 %.
     #[must_use]
     pub fn agrees(&self) -> bool {
         self.off().is_some_and(|off| off < 0.01)
@@ -118,7 +118,7 @@ impl fmt::Display for LimitPair {
     }
 }
 
-/// A limit as a table shows it.
+/// A limit as text for a table.
 pub(super) fn short(value: Option<f64>) -> String {
     value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4e}"))
 }
@@ -141,9 +141,8 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
     ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
-/// Largest energy of the deviation in the last eighth of the periods, per largest in the second eighth. In the first,
-/// modes die out that say nothing about the last to do so. Zero once the deviation has died, `None` once it has
-/// escaped.
+/// Largest energy of the deviation in the last eighth of the periods, per largest in the second eighth. The first
+/// eighth is skipped, in which the fast modes decay. Zero once the deviation has decayed, `None` once it has escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
     const WINDOW: u64 = STEPS / 8;
@@ -208,7 +207,7 @@ fn energy_about<const N: usize>(
     }
 }
 
-/// The live loop in `state`, with the integral and the late effort that it has where it rests.
+/// The live loop in `state`, with the integral and the delayed effort of its equilibrium.
 pub(super) fn live_at<const N: usize>(
     control: &ControlLoop<N>,
     rest: &Equilibrium<N>,
@@ -240,8 +239,8 @@ pub fn in_substeps<const N: usize>(
         .with_period(ControlPeriod { period, delay })
 }
 
-/// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the
-/// velocity.
+/// A state slightly off `position`, differently in every joint, so that every mode is excited. The velocity excites the
+/// fast ones.
 fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> State<N> {
     let mut state = State::at_rest(*position);
     let mut nudge = NUDGE;
@@ -267,7 +266,7 @@ pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32
         let State { position, velocity } = *live.state();
         let integral = live.pid().integral();
         let moved: [f64; N] = std::array::from_fn(|i| position[i] - rest.position[i]);
-        // An integral that acts on nothing only drifts.
+        // An integral without effect only drifts.
         let acting = control.integrating().map(|acts| f64::from(u8::from(acts)));
         let gathered: [f64; N] =
             std::array::from_fn(|i| acting[i] * (integral[i] - rest.integral[i]));

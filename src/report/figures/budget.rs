@@ -1,6 +1,6 @@
-//! Truncation, rounding and control hold, apart.
+//! Truncation, rounding and control hold as separate parts of the error.
 //!
-//! **Invariant:** the parts are measured each on its own; their sum bounds the whole.
+//! **Invariant:** each part is measured separately; their sum bounds the total.
 
 use super::fit::{slope, worst};
 use crate::math::integrator::Method;
@@ -12,13 +12,13 @@ use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, scientifi
 const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
 
-/// A part of the error: its look and its value.
+/// A part of the error: its legend key and its value.
 type ErrorPart = (fn() -> Key, fn(&Parts) -> f64);
 
 const METHOD: fn() -> Key = || Key::line("c1", "truncation (the method)").marked(Marker::Diamond);
 const DIGITS: fn() -> Key = || Key::line("c3", "rounding (53 bits)").marked(Marker::Circle);
 const PERIOD: fn() -> Key = || Key::line("c2", "control hold (the period)").marked(Marker::Square);
-const TOTAL: fn() -> Key = || Key::line("ink", "all of it").dashed();
+const TOTAL: fn() -> Key = || Key::line("ink", "total").dashed();
 
 const PARTS: [ErrorPart; 4] = [
     (METHOD, |parts| parts.truncation),
@@ -77,10 +77,10 @@ fn figure(section: &mut Section, scenes: &[(&str, &Vec<Vec<Parts>>)]) {
     }
     section.figure(
         "error-budget",
-        "Under a held effort the hold outweighs everything else; rounding shows only where nothing else is left",
-        "2 links, 2 s. Truncation: the method's steps in twice the digits against the true motion under the effort \
-         that these steps hold. Rounding: the live arm's steps against the same steps in twice the digits. Hold: that \
-         true motion against the one under the law at every instant.",
+        "With a held effort the hold dominates the error; rounding is visible only if the other parts vanish",
+        "2 links, 2 s. Truncation: the method's steps in double-double arithmetic against the true motion under the \
+         effort that these steps hold. Rounding: the live arm's steps against the same steps in double-double \
+         arithmetic. Hold: that true motion against the one with a continuous-time law.",
         &panels,
     );
 }
@@ -102,7 +102,7 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
         if euler.total < 0.9 * rk4.total {
             "Euler's truncation happens to cancel part of the hold, which makes it no better method"
         } else {
-            "The hold is all that shows"
+            "The hold dominates the error"
         }
     ));
     section.find(format!(

@@ -1,13 +1,13 @@
-//! Digits lost by mass ratio.
+//! Digits lost, by mass ratio.
 //!
-//! **Invariant:** the truth behind the digits is known to at least ten more of them.
+//! **Invariant:** the truth has at least ten more correct digits than the results.
 
 use super::fit::worst;
 use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
 
-/// Digits that the recursion may lose at worst.
+/// Largest allowed loss of the recursion, in digits.
 const ALLOWED: f64 = 2.5;
 
 const POSES: [(&str, PoseShape); 3] = [
@@ -16,7 +16,7 @@ const POSES: [(&str, PoseShape); 3] = [
     ("3 links, folded back once", PoseShape::Folded),
 ];
 
-/// A way of solving: its look and its worst loss.
+/// A solver: its legend key and its worst loss.
 type Way = (fn() -> Key, fn(&Lost) -> f64);
 
 const DENSE: fn() -> Key = || Key::line("c2", "elimination of M(q)").marked(Marker::Square);
@@ -55,7 +55,8 @@ pub(super) fn make(section: &mut Section) {
     section.find(format!(
         "**With a last link up to 10⁹ times lighter or heavier than the others, bent and stretched arms lose at most \
          {} of 16 digits**. With the second link folded back onto the first they lose up to {}. At most {} of them are \
-         the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix loses up to {dense}.",
+         lost by the arm's own algorithm; the rest is due to the angles' last bits. Eliminating the mass matrix loses \
+         up to {dense}.",
         number(straight),
         number(folded),
         number(own),
@@ -85,8 +86,8 @@ pub(super) fn make(section: &mut Section) {
              of them",
             number(straight)
         ),
-        "Worst of all sampled states. The dashed line is the change by the last bit of an angle: no way of solving can \
-         be better. Crosses at the top: elimination failed.",
+        "Worst of all sampled states. The dashed line is the change by the last bit of an angle: no algorithm can be \
+         better. Crosses at the top: elimination failed.",
         &panels,
     );
 }

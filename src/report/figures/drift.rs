@@ -1,4 +1,4 @@
-//! Energy of a free swing that goes on for long.
+//! Energy of a long free swing.
 //!
 //! **Invariant:** drift is divided by the arm's energy scale, never by its energy, which is 0 at the start.
 
@@ -41,7 +41,7 @@ impl Swing {
             .map_or(f64::NAN, |point| point.1)
     }
 
-    /// Whether the better method keeps energy better. A run that left the finite numbers has no end to compare.
+    /// Whether the better method keeps energy better. A run that diverged has no final value to compare.
     fn is_ordered(&self) -> bool {
         let order_two = self.end(Method::Midpoint).min(self.end(Method::Verlet));
         let euler = self.end(Method::Euler);
@@ -83,7 +83,7 @@ pub(super) fn make(section: &mut Section) {
         ends_of_ensemble(Method::Rk4, duration)
     ));
     section.claim(
-        "At 1 ms energy is kept best by RK4, then by the methods of order 2, worst by Euler, in all three swings",
+        "At 1 ms RK4 has the smallest energy error, then the methods of order 2, then Euler, in all three swings",
         headline.clone(),
         swings.iter().all(Swing::is_ordered),
     );
@@ -124,7 +124,7 @@ fn figure(section: &mut Section, headline: &str, swings: [Swing; 3], duration: f
         "energy-drift",
         headline,
         "Free swings at a timestep of 1 ms, whose energy should stay constant. The scale is the arm's largest change \
-         of potential energy plus its kinetic energy at the start. A line that ends early left the finite numbers. \
+         of potential energy plus its kinetic energy at the start. A line that ends early is a run that diverged. \
          Implicit midpoint is a baseline of this report: it is symplectic, and its error does not grow with time.",
         &panels,
     );

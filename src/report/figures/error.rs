@@ -1,7 +1,7 @@
 //! Error against time and timestep, in every scene and for every method.
 //!
-//! **Invariant:** every time stands beside the error of the same steps; runs that are lost are drawn as lost, and
-//! nothing is interpolated between two runs.
+//! **Invariant:** every time is shown with the error of the same steps. Runs that are lost are drawn as lost, and no
+//! value is interpolated between two runs.
 
 use super::fit::{slope, worst};
 use crate::math::count::in_f64;
@@ -12,13 +12,13 @@ use crate::report::section::{Cell, Section, Table};
 use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, scientific, seconds};
 use crate::report::timing::{Effort, Timing, time};
 
-/// Errors between which a slope is fitted \[rad\]: above, higher orders still show; below, rounding does.
+/// Range of errors for a slope's fit \[rad\]: above it higher orders matter, below it rounding.
 const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
 
-/// The fewest steps for an error are found to this part of them.
+/// Resolution of the search for the fewest steps: one in this many.
 const RESOLUTION: u64 = 256;
 
-/// No search tries more steps than this: a method that needs more is far from the cheapest.
+/// Most steps of a search: a method that needs more is far from the cheapest.
 const MOST_SEARCHED: u64 = 1 << 17;
 
 /// The lower end of the axis of errors \[rad\].
@@ -29,7 +29,7 @@ const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 /// A scene with its runs.
 struct Data {
     scene: Scene,
-    /// Runs of ever half the timestep.
+    /// Runs with the timestep halved each time.
     runs: Vec<Run>,
     /// The run of each method that reaches each of [`TARGETS`] with the fewest steps.
     reached: Vec<(f64, Run)>,
@@ -115,7 +115,7 @@ impl Data {
             .of(method)
             .map(|run| (run.outcome.timestep, run.outcome.error));
         let inside: Vec<_> = inside.filter(|run| ASYMPTOTIC.contains(&run.1)).collect();
-        // The four finest of them: near the stability edge an error falls faster than its order.
+        // The four smallest timesteps: near the stability limit an error decreases faster than by its order.
         slope(inside.into_iter().rev().take(4))
     }
 
@@ -124,7 +124,7 @@ impl Data {
         self.runs.iter().filter(|run| run.outcome.steps >= 1000)
     }
 
-    /// Time of one step \[s\]: the least that any long run shows.
+    /// Time of one step \[s\]: the minimum over the long runs.
     fn step_time(&self, method: Method) -> Option<f64> {
         let runs = self.long_runs().filter(|run| run.method == method);
         runs.filter(|run| run.outcome.error.is_finite())
@@ -197,7 +197,7 @@ fn scene_list(data: &[Data]) -> Table {
     let mut table = Table::new(
         "scenes",
         "The scenes",
-        "Uncertainty: how far the reference itself may be off.",
+        "Uncertainty: the error bound of the reference itself.",
         ["Scene", "Parameters", "Uncertainty"],
     );
     let row = |Data { scene, .. }: &Data| {
@@ -212,8 +212,8 @@ fn scene_list(data: &[Data]) -> Table {
     table
 }
 
-/// A panel for each scene. All share the error axis, so that scenes can be compared. `place` has the x of a run and its
-/// quartiles.
+/// A panel for each scene. All share the error axis, so that scenes can be compared. `place` returns the x of a run and
+/// its quartiles.
 fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> (f64, Option<(f64, f64)>)) -> Vec<Plot> {
     let plot = |data: &Data| {
         let label = match data.scene.unit {
@@ -276,8 +276,8 @@ fn against_time(section: &mut Section, data: &[Data]) {
         "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is \
          the minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
          dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. The error \
-         of a reach is the distance from a law that acts at every instant. The distance from the loop whose law runs \
-         once a period is the truncation in the figure of the error's parts. Each mark's tooltip has its own \
+         of a reach is the distance from the loop with a continuous-time law. The distance from the loop whose law \
+         runs once a period is the truncation in the figure of the error's parts. Each mark's tooltip has its own \
          evaluations.",
         &plots,
     );
@@ -314,7 +314,7 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
     section.figure(
         "convergence",
         &format!(
-            "Every method shows its order, until the effort is held: then RK4's is {} and Verlet's {}",
+            "Every method converges at its order, unless the effort is held: then RK4's is {} and Verlet's {}",
             order(Method::Rk4),
             order(Method::Verlet)
         ),

@@ -1,6 +1,6 @@
-//! Slopes of lines through points, cells of a map, and the worst of many numbers.
+//! Slopes of fitted lines, cells of a map, and the largest of many numbers.
 //!
-//! **Invariant:** there is one more edge than cells, and a cell is measured between two of them.
+//! **Invariant:** there is one more edge than cells, and a cell is measured at its geometric centre.
 
 use crate::math::count::length_in_f64;
 

@@ -1,4 +1,4 @@
-//! The sections of the report, one file each: compute, draw, say what was found.
+//! The sections of the report, one file each: computation, figures and findings.
 //!
 //! **Invariant:** a section depends on no other section's results.
 
@@ -15,12 +15,12 @@ mod work;
 
 use super::section::Section;
 
-/// How a section is made.
+/// The function that makes a section, with its name and title.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Maker {
     pub(crate) name: &'static str,
     pub(crate) title: &'static str,
-    /// Whether it measures times: two such sections are never made side by side.
+    /// Whether it measures times: two such sections never run in parallel.
     pub(crate) timed: bool,
     pub(crate) make: fn(&mut Section),
 }

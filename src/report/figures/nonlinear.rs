@@ -1,6 +1,6 @@
 //! Stability beyond small deviations: by amplitude of a move, by speed of a swing, and beside a periodic swing.
 //!
-//! **Invariant:** every cell is measured; predictions are drawn over them and nothing is filled in.
+//! **Invariant:** every cell is measured. Predictions are drawn over the cells, and no cell is interpolated.
 
 use super::fit::{centres, edges};
 use crate::math::arm::{Arm, State};
@@ -33,7 +33,7 @@ const SWINGS: Kind = Kind {
     values: (0.3, 300.0),
 };
 
-/// The part of the predicted limit that the service advises.
+/// The advised part of the predicted limit.
 const ADVISED: f64 = 0.8;
 
 pub(super) fn make(section: &mut Section) {
@@ -49,8 +49,8 @@ pub(super) fn make(section: &mut Section) {
         let holds = move |amplitude, h| arrives(&move_of(amplitude, method, h));
         (predicted, holds)
     });
-    // Free swings are limited by the frequency of small ones, and by their speed. A method that lets small swings grow
-    // at every timestep is limited by the speed alone: in four seconds little comes of that growth.
+    // Free swings are limited by the frequency of small swings, and by their speed. If small swings grow under a method
+    // at every timestep, only the speed limits it: in four seconds that growth is small.
     let carried = map(&SWINGS, columns, &mut panels, |method| {
         let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
         let small = limit_held(&free).filter(|limit| *limit > 0.0);
@@ -130,10 +130,11 @@ fn map<P: Fn(f64) -> f64, H: Fn(f64, f64) -> bool>(
     counts
 }
 
-/// Steps of order 4 in a period whose multipliers are the true ones.
+/// Steps of order 4 per period, with which the multipliers are practically exact.
 const TRUE_STEPS: u32 = 4096;
 
-/// A multiplier beyond this is unstable: a double one on the unit circle is good to the root of the rounding error.
+/// A multiplier beyond this is unstable. A double multiplier on the unit circle has an error of the square root of the
+/// rounding error.
 const UNSTABLE: f64 = 1.001;
 
 /// The amplitude up to which a deviation from a periodic swing stays small, by the Floquet multipliers.
@@ -157,7 +158,7 @@ fn floquet(section: &mut Section) {
             }
             format!(
                 "{swing} up to {} rad of the first joint**. Beyond, a deviation grows in every period ({}-fold at {} \
-                 rad), and no method can follow it for long.",
+                 rad), and no method is accurate for long.",
                 number((100.0 * stable).floor() / 100.0),
                 number(multiplier),
                 number(*last),

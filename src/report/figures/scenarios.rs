@@ -1,6 +1,6 @@
-//! The catalogue of named stiff and extreme scenes, each run and judged.
+//! The catalogue of named stiff and extreme scenes, each simulated and checked.
 //!
-//! **Invariant:** a scene that is not run is listed as not run, one that falls short as falling short.
+//! **Invariant:** a scene that is not run is listed as not run, and one that fails as failed.
 
 use crate::report::experiments::scenarios;
 use crate::report::scenes::{LiveScene, live_scenes};
@@ -22,7 +22,7 @@ pub(super) fn make(section: &mut Section) {
         let Some(live) = live.iter().find(|live| live.id == scene.id) else {
             continue;
         };
-        // Slow ones take seconds each, which a quick look does not have.
+        // Slow scenes take seconds each, too long for a quick report.
         let verdict = (!scene.slow || !section.quick).then(|| scene.run());
         let holds = verdict.as_ref().map(|verdict| verdict.holds);
         let name = format!("{} {}", scene.id, live.name);
@@ -48,12 +48,12 @@ pub(super) fn make(section: &mut Section) {
     }
     let names = short.join(", ");
     let finding = format!(
-        "**{} of {run} stiff and extreme scenes do as theory says**",
+        "**{} of {run} stiff and extreme scenes agree with theory**",
         run - short.len()
     );
     section.find(match short.is_empty() {
         true => finding + ".",
-        false => format!("{finding}; these fall short: {names}."),
+        false => format!("{finding}; these do not: {names}."),
     });
     let seen = match (short.is_empty(), all.len() - run) {
         (true, 0) => "all of them".to_owned(),
@@ -61,7 +61,7 @@ pub(super) fn make(section: &mut Section) {
         (false, _) => format!("not {names}"),
     };
     section.claim(
-        format!("All {} named scenes do as expected", all.len()),
+        format!("All {} named scenes behave as expected", all.len()),
         seen,
         short.is_empty(),
     );
@@ -69,9 +69,9 @@ pub(super) fn make(section: &mut Section) {
         "scenarios",
         "The stiff and extreme scenes, each as one live arm",
         "Joint angles from their start, by the live arm's own steps. The scale is that of the largest angle, which is \
-         written below. A cross ends a run that would have left the finite numbers. Below: the time watched, the \
-         largest angle, and whether the scene does as theory says; the table has the details. A name opens the arm on \
-         the page of a running program at 127.0.0.1:9095, which applies the settings on a click.",
+         written below. A cross marks the end of a run that diverged. Below: the duration, the largest angle, and \
+         whether the scene agrees with theory; the table has the details. A name opens the arm on the page of a \
+         running program at 127.0.0.1:9095, which applies the settings on a click.",
         &panels,
     );
     section.table(&table);
@@ -83,7 +83,7 @@ const JOINTS: [(&str, &str); 3] = [("j1", "joint 1"), ("j2", "joint 2"), ("j3", 
 /// The page that a picture's name opens.
 const PAGE: &str = "http://127.0.0.1:9095/#";
 
-/// Joint angles over time by the scene's live arm, or why there are none.
+/// Joint angles over time of the scene's live arm, or the reason why there are none.
 fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
     let watched = live.watch();
     let samples = watched.as_ref().map_or(&[][..], |watched| &watched.samples);
@@ -112,7 +112,7 @@ fn picture(name: &str, live: &LiveScene, holds: Option<bool>) -> Plot {
     };
     let verdict = match holds {
         Some(true) => ("good", "holds"),
-        Some(false) => ("bad", "falls short"),
+        Some(false) => ("bad", "does not hold"),
         None => ("soft", "not run"),
     };
     plot.form = Form::Thumbnail(Thumbnail {

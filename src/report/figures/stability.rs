@@ -1,4 +1,5 @@
-//! The largest stable timestep and control period: predicted, measured, mapped over gains, and why.
+//! The largest stable timestep and control period: predicted, measured, mapped over gains, and explained by
+//! eigenvalues.
 //!
 //! **Invariant:** prediction and measurement share the arm and the gains, and nothing else.
 
@@ -95,10 +96,11 @@ fn limits_table(rows: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
-        "At (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5). Predicted from the loop linearised where it rests; \
-         measured by nudging the arm itself and watching whether it settles. Then the smallest limit of all poses, \
-         bounded where it can be, and 0.8 times that as advice. Held for the step, the limit belongs to the control \
-         period: the effort answers a state that is up to a step old. In every stage it belongs to the method.",
+        "At (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5). Predicted from the loop linearised where it rests; measured \
+         on the arm itself, by whether a small deviation decays. Then the smallest limit of all poses, bounded if \
+         there is a bound, and 0.8 times that as advice. With the effort held for the step, the control period sets \
+         the limit: the effort belongs to a state that is up to a step old. With the law in every stage, the method \
+         sets it.",
         by_method(&["Loop", "Control"]),
     );
     table.rows.extend(rows.iter().map(|row| {
@@ -152,7 +154,7 @@ fn findings(section: &mut Section, rows: &[LimitRow]) {
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
 
-/// The empty map, whose legend tells both kinds of control.
+/// The empty map, whose legend has both kinds of control.
 fn map_plot() -> Plot {
     let plot = Plot::new(
         "All methods",
@@ -164,7 +166,7 @@ fn map_plot() -> Plot {
     plot.with([held, continuous].map(Curve::named))
 }
 
-/// Does a nudge of the arm die out or grow, by timestep and stiffness, beside the predicted line.
+/// Decay or growth of a small deviation, by timestep and stiffness, with the predicted limit.
 fn map(section: &mut Section) {
     let columns = section.choose(48, 16);
     let timestep_edges = edges(TIMESTEPS, columns);
@@ -183,8 +185,8 @@ fn map(section: &mut Section) {
             let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
             predicted.push((limit, *factor));
             for (h, growth) in timesteps.iter().zip(&growth) {
-                // The watch is too short to tell where the slowest mode changes its energy by less than a factor e.
-                // Measurements have no part in this.
+                // The run is too short to judge a cell whose slowest mode changes its energy by less than a factor e.
+                // This decision uses no measurement.
                 let radius = step_matrix(&linear, method, sampling, *h).spectral_radius();
                 if 2.0 * in_f64(STEPS) * radius.ln().abs() < 1.0 {
                     undecided += 1;
@@ -193,7 +195,7 @@ fn map(section: &mut Section) {
                     disagreeing += usize::from(decays(*growth) != (*h < limit));
                 }
             }
-            // The edge below the first cell in which a nudge grew.
+            // The edge below the first cell in which a deviation grew.
             let first = growth.iter().position(|growth| !decays(*growth));
             let edge = first.filter(|first| *first > 0 && limit > 0.0);
             measured.extend(edge.and_then(|first| timestep_edges.get(first)).map(|h| {
@@ -220,24 +222,24 @@ fn map(section: &mut Section) {
              judge"
         ),
         "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power of \
-         3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as the \
-         live arm has it. Dashed lines: with the law in every stage. Marks: the shortest timestep at which a nudge of \
-         the arm itself grew. In the lowest rows the gains are too weak to carry the arm against gravity, and no \
+         3/2: the same motion, faster). Solid lines: the predicted limit with the effort held for the step, as in the \
+         live arm. Dashed lines: with the law in every stage. Marks: the smallest timestep at which a small deviation \
+         of the arm itself grew. In the lowest rows the gains are too low to hold the arm against gravity, and no \
          timestep is stable. A cell counts as too slow to judge if by the prediction its slowest mode changes its \
-         energy by less than a factor e in the 4000 steps watched.",
+         energy by less than a factor e in the 4000 simulated steps.",
         &[plot],
     );
 }
 
-/// Timesteps of the eigenvalues, in parts of the limit, and how many are shown.
+/// Timesteps of the eigenvalues, relative to the limit, and their number.
 const PARTS: (f64, f64) = (0.05, 1.25);
 const SHOWN: u32 = 25;
-/// Timesteps of the runs, in parts of the limit.
+/// Timesteps of the runs, relative to the limit.
 const RUNS: [f64; 2] = [0.97, 1.03];
-/// How far a run begins from the setpoint \[rad\].
+/// Initial distance of a run from the setpoint \[rad\].
 const NUDGE: f64 = 1e-6;
 
-/// The looks below the limit and beyond it.
+/// The legend keys below the limit and beyond it.
 fn sides() -> [Key; 2] {
     [
         Key::line("c1", "below the limit").marked(Marker::Circle),
@@ -245,7 +247,7 @@ fn sides() -> [Key; 2] {
     ]
 }
 
-/// Why a loop goes unstable: the eigenvalues of one step as the timestep grows, and the run that diverges.
+/// The cause of instability: the eigenvalues of one step as the timestep grows, and a run that diverges.
 fn regions(section: &mut Section) {
     let limited = Method::ALL.into_iter().filter_map(|method| {
         let control = stiffened(1.0).with_method(method);
@@ -262,7 +264,8 @@ fn regions(section: &mut Section) {
         &format!(
             "2 links held at (0.4, 0.8) with the default gains. Top: the eigenvalues of one step of the linearised \
              loop, and the unit circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they \
-             begin near 1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
+             begin near 1. Bottom: the arm itself, released {NUDGE} rad from the setpoint, at {} and {} of that \
+             limit.",
             PARTS.0, PARTS.1, RUNS[0], RUNS[1]
         ),
         &circles.chain(runs).collect::<Vec<Plot>>(),
@@ -271,7 +274,7 @@ fn regions(section: &mut Section) {
 
 fn eigenvalues(control: &ControlLoop<2>, limit: f64) -> Plot {
     let method = control.method;
-    // As wide as it is high, on the paper.
+    // Equal scales on both axes.
     let mut plot = Plot::new(
         format!("{method}: stable up to {}", seconds(limit)),
         Axis::linear("real part", (-1.7, 1.7)),
@@ -309,7 +312,7 @@ fn runs(control: &ControlLoop<2>, limit: f64) -> Plot {
     let setpoint = control.setpoint.position;
     for (part, key) in RUNS.into_iter().zip(sides()) {
         let h = part * limit;
-        // At rest at its setpoint, its integral carrying the load, brought there with short steps.
+        // The arm at rest at its setpoint, with the load on its integral. Short steps bring it there.
         let settling = control.with_method(Method::Rk4).with_timestep(1e-3);
         let mut live = settling.simulation(State::at_rest(setpoint));
         live.advance(30_000);
@@ -333,20 +336,20 @@ fn runs(control: &ControlLoop<2>, limit: f64) -> Plot {
 const PERIODS: (f64, f64) = (5e-4, 2e-2);
 const GROWTH: (f64, f64) = (0.85, 1.15);
 
-/// Steps per control period with their looks.
+/// Steps per control period with their legend keys.
 const SUBSTEPS: [(u32, &str, &str, Marker); 3] = [
     (1, "1 step per period", "c2", Marker::Square),
     (10, "10 steps per period", "c3", Marker::Triangle),
     (100, "100 steps per period", "c1", Marker::Circle),
 ];
 
-/// Growth of a nudge per control period, predicted and measured.
+/// Growth of a small deviation per control period, predicted and measured.
 #[derive(Default)]
 struct Growth {
     dots: u32,
-    /// How far the furthest dot lies from its curve, as a part of the growth.
+    /// Largest distance of a dot from its curve, relative to the growth.
     furthest: f64,
-    /// How far curves of 1, 10 and 100 steps are apart at most, for methods of order 2 and more, and their limits.
+    /// Largest distance between the curves of 1, 10 and 100 steps, for methods of order 2 and more, and their limits.
     apart: f64,
     limits: Vec<f64>,
 }
@@ -382,9 +385,9 @@ fn control_period(section: &mut Section) {
              measurements lie on their curves to {furthest_percent} %"
         ),
         "2 links, default gains, effort held over the period. Curves: spectral radius of one control period of the \
-         linearised loop. Dots: the growth of a nudge of the arm itself per period, over 4000 periods. The largest \
-         stable control period is where a curve crosses 1: shorter steps buy nothing. Only Euler with one step per \
-         period has a curve of its own.",
+         linearised loop. Dots: the growth of a small deviation of the arm itself per period, over 4000 periods. The \
+         largest stable control period is where a curve crosses 1: shorter steps do not increase it. Only Euler with \
+         one step per period has a curve of its own.",
         &panels,
     );
 }
@@ -412,7 +415,8 @@ impl Growth {
                 key.clone().marked(Marker::None),
                 curve.filter(|it| is_shown(it.1)),
             ));
-            // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
+            // The dots alternate along the curves, so that no mark hides another. They are denser where the curve
+            // rises.
             let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
             let limit = Stepping::held(&linear, method, substeps, false).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];

@@ -1,6 +1,6 @@
-//! Cost of an error by stiffness, explicit methods beside implicit baselines.
+//! Cost of an error by stiffness: explicit methods compared with implicit baselines.
 //!
-//! **Invariant:** a run that would take too many steps is shown as a prediction, and said to be one.
+//! **Invariant:** a run that would take too many steps is shown as a prediction, and labelled so.
 
 use super::fit::worst;
 use crate::math::count::in_f64;
@@ -11,10 +11,10 @@ use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, power, scientific};
 use crate::report::timing::{Effort, time};
 
-/// The error that is to be kept \[rad\].
+/// The allowed error \[rad\].
 const TARGET: f64 = 1e-4;
 
-/// The fewest steps are found to this part of them.
+/// Resolution of the search for the fewest steps: one in this many.
 const RESOLUTION: u64 = 16;
 
 const FAMILIES: [(By, &str); 2] = [
@@ -28,7 +28,7 @@ struct Cost {
     ratio: f64,
     solver: Solver,
     run: Option<(RunOutcome, f64)>,
-    /// Steps that stability asks for at least.
+    /// Fewest steps that stability requires.
     fewest: Option<f64>,
 }
 
@@ -44,7 +44,7 @@ pub(super) fn make(section: &mut Section) {
             uncertainty = uncertainty.max(task.uncertainty);
             costs.extend(Solver::ALL.map(|solver| {
                 let fewest = scene.fewest_stable_steps(solver);
-                // A run that stability forbids for all that may be taken is not begun.
+                // A run that would be unstable at every allowed number of steps is skipped.
                 let is_possible = fewest.is_none_or(|fewest| fewest <= in_f64(most));
                 let cheapest = || task.fewest(solver, TARGET, (1, most), RESOLUTION);
                 let run = is_possible.then(cheapest).flatten();
@@ -73,10 +73,10 @@ pub(super) fn make(section: &mut Section) {
         "stiff",
         &format!("Cost of {} rad as the arm gets stiffer", power(TARGET.log10())),
         &format!(
-            "2 links let go from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. Run time \
-             is that of the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines of this report \
-             and cannot be chosen on the live arm. Their Jacobians are taken by differences, and counted. Lines end \
-             where more than {most} steps would be needed."
+            "2 links released from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. The run \
+             time belongs to the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines of this \
+             report and cannot be chosen on the live arm. Their Jacobians are finite differences, whose evaluations \
+             are counted. Lines end where more than {most} steps would be needed."
         ),
         &panels,
     );
@@ -136,7 +136,7 @@ fn verdicts(section: &mut Section, costs: &[Cost], uncertainty: f64) {
         format!("{} evaluations", seen.join(", ")),
         is_flat,
     );
-    // Where it is accuracy that asks for steps, stability has nothing to say.
+    // Where accuracy requires more steps than stability, the stability limit is not tested.
     let bound = costs
         .iter()
         .filter(|cost| cost.fewest.is_some_and(|fewest| fewest > 100.0));
@@ -144,8 +144,8 @@ fn verdicts(section: &mut Section, costs: &[Cost], uncertainty: f64) {
         .filter_map(|cost| Some(in_f64(cost.run?.0.steps) / cost.fewest?))
         .fold(f64::INFINITY, f64::min);
     section.claim(
-        "No explicit method keeps the error with fewer than 0.7 of the steps that its predicted limit asks for, which \
-         is that of the hanging pose",
+        "No explicit method keeps within the error with fewer than 0.7 times the steps that its predicted limit in the \
+         hanging pose requires",
         format!("{} of them at least", number(least)),
         least > 0.7,
     );
@@ -195,7 +195,7 @@ fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Plot; 2] {
             evaluations.add(Curve::line(key, least));
         }
     }
-    let key = Key::line("soft", "demand of stability, predicted").dashed();
+    let key = Key::line("soft", "required for stability, predicted").dashed();
     evaluations.add(Curve::named(key));
     [evaluations, times]
 }

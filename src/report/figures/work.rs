@@ -1,10 +1,10 @@
-//! Work that a scene does not need, and whether it is left out.
+//! Work that a scene does not need, and the check that it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page. A missing count is said to be
-//! unmeasured.
+//! `scripts/measure-work.sh`, which writes them to `work.csv` next to the page. A missing count is shown as not
+//! measured.
 //!
-//! **Invariant:** no number in here that was not measured for this report.
+//! **Invariant:** every number was measured for this report.
 
 use std::collections::HashMap;
 use std::hint::black_box;
@@ -26,7 +26,7 @@ use crate::study::control_loop::no_control;
 /// Steps of a run.
 const STEPS: u64 = 20_000;
 
-/// Counts by the names that `scripts/measure-work.sh` knows them by, and seconds per step by the same.
+/// Counts by their names in `scripts/measure-work.sh`, and seconds per step by the same names.
 struct Measured {
     counts: HashMap<String, f64>,
     times: Vec<(&'static str, f64)>,
@@ -94,8 +94,8 @@ fn particle(function: &str) -> f64 {
     })
 }
 
-/// What is left out, a line each: the work, the place where it is left out, the counts with it and without it, each
-/// with a detail behind a colon, and whether their difference is saved.
+/// The work that is left out, one line per item. The columns: the work, the place in the source, the counts with and
+/// without it, and whether the difference is a saving. A count may have a detail after a colon.
 const LEFT_OUT: &str = include_str!("left_out.txt");
 
 fn columns(line: &'static str) -> Vec<&'static str> {
@@ -106,7 +106,7 @@ fn columns(line: &'static str) -> Vec<&'static str> {
 fn unit(name: &str) -> (f64, &'static str) {
     const RATE: &str = "million instructions a second";
     match name {
-        // Ten a second.
+        // Ten estimates per second.
         "estimate-2-rk4" => (1e-5, RATE),
         "program-size" | "program-size-bare" => (1e-6, "MB"),
         _ if name.ends_with("-encoded") => (1.0, "messages encoded a second"),
@@ -117,8 +117,8 @@ fn unit(name: &str) -> (f64, &'static str) {
     }
 }
 
-/// Claims about a count, a line each: the claim, the count's name and its unit, and a bound. Whole numbers below one
-/// half are none.
+/// Claims about counts, one per line: the claim, the count's name and unit, and a bound. For a whole number, a bound of
+/// one half means none.
 const BELOW: &str = include_str!("below.txt");
 
 impl Measured {
@@ -148,10 +148,10 @@ impl Measured {
         let mut lines = LEFT_OUT.lines().map(columns);
         let mut table = Table::new(
             "left-out",
-            "What is left out, and the proof",
+            "Work that is left out, and its measured cost",
             "Instructions are counted by callgrind over the same number of steps on both sides, without the start of \
-             the program. Times are the minimum of repeats on this machine. They follow the instructions only loosely, \
-             since a step is one chain of dependent operations.",
+             the program. Times are the minimum of repeats on this machine. They depend only loosely on the \
+             instructions, since a step is one chain of dependent operations.",
             lines.next().into_iter().flatten(),
         );
         let count = |told: &str| self.count(told.split(": ").next()?);
@@ -204,7 +204,7 @@ impl Measured {
         );
     }
 
-    /// Messages encoded a second, and the instructions of one.
+    /// Messages encoded per second, and the instructions per message.
     fn encoded(&self, server: &str) -> Option<(f64, f64)> {
         let messages = self.count(&format!("{server}-encoded"))?;
         let json = self.count(&format!("{server}-json"))?;
@@ -302,7 +302,7 @@ where
     })
 }
 
-/// Whether a live arm at gravity 0, which does not look at its first angle, moves by the same bits as steps that do.
+/// Whether a live arm at gravity 0, which skips its first angle, gives the same bits as steps that evaluate it.
 fn weightless_is_gravity_zero<const N: usize>() -> bool
 where
     Gains<N>: Default,
@@ -314,7 +314,7 @@ where
         live.set_state(state);
         let (arm, h) = (*live.arm(), live.timestep());
         (0..5000).all(|_| {
-            // From the same state each: the live arm carries its rounding, these steps do not.
+            // Both from the same state, since the live arm carries its rounding error and these steps do not.
             let State { position, velocity } = &state;
             let acceleration =
                 |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&arm, q, v, &[0.0; N]);

@@ -1,4 +1,4 @@
-//! Axes: from values to places on the paper, and the ticks beside them.
+//! Axes: maps from values to positions, and ticks.
 //!
 //! **Invariant:** a tick's label says its value exactly.
 
@@ -24,7 +24,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// A logarithmic axis over whole decades around `values`, those that are positive and finite.
+    /// A logarithmic axis over whole decades around the positive and finite `values`.
     pub(crate) fn around(
         label: &'static str,
         unit: Unit,
@@ -84,12 +84,12 @@ impl Axis {
         }
     }
 
-    /// Whether `value` lies between the ends, give or take rounding.
+    /// Whether `value` lies between the ends, within rounding.
     pub(crate) fn holds(&self, value: f64) -> bool {
         (-1e-9..=1.0 + 1e-9).contains(&self.place(value))
     }
 
-    /// Ticks, at most some `most` of them: value and label.
+    /// About `most` ticks at most: value and label.
     pub(crate) fn ticks(&self, most: f64) -> Vec<(f64, String)> {
         let (first, last) = if self.is_log {
             (self.min.log10(), self.max.log10())
@@ -97,7 +97,7 @@ impl Axis {
             (self.min, self.max)
         };
         let raw = (last - first) / most;
-        // Decades alone would leave a short axis bare.
+        // Decades alone would leave a short axis almost without ticks.
         let factors: &[f64] = if self.is_log && last - first < 2.2 {
             &[1.0, 2.0, 5.0]
         } else {

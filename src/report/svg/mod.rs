@@ -1,9 +1,10 @@
-//! Small SVG plots: axes, lines and markers. No library, no script, no colour of its own.
+//! Small SVG plots: axes, lines and markers. Without library, script or fixed colours.
 //!
-//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with
-//! a marker shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
+//! Colours are CSS classes ([`STYLE`]): one per method in all figures, each with a marker shape, for light and dark
+//! mode. The palette suits colour-blind readers. A plot is drawn for a column of some 400 px; figures are grids of such
+//! panels.
 //!
-//! **Invariant:** a value that has no place on the axes is drawn at the edge as lost, never dropped in silence.
+//! **Invariant:** a value outside the axes is drawn at the edge as lost, never dropped silently.
 
 mod axis;
 mod numbers;
@@ -19,11 +20,11 @@ use crate::math::integrator::Method;
 /// Classes that plots use, for the page and for files of their own.
 pub(crate) const STYLE: &str = include_str!("style.css");
 
-/// Paper of one panel.
+/// Size of one panel, in pixels.
 pub(crate) const WIDTH: f64 = 420.0;
 pub(crate) const HEIGHT: f64 = 336.0;
 
-/// Shapes, so that colour is never alone in telling lines apart.
+/// Marker shapes: lines differ in shape as well as in colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Marker {
     None,
@@ -113,7 +114,7 @@ pub(crate) struct Point {
     pub(crate) y: f64,
     /// From and to, along x.
     pub(crate) spread: Option<(f64, f64)>,
-    /// What its axes do not say; often empty.
+    /// A note that is not on the axes; often empty.
     pub(crate) note: String,
 }
 
@@ -183,7 +184,8 @@ pub(crate) fn escape(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word stands alone.
+/// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word has its own
+/// line.
 pub(crate) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in heading.split_whitespace() {

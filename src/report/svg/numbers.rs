@@ -1,4 +1,4 @@
-//! Numbers as people write them.
+//! Numbers in readable form, with SI prefixes and powers of ten.
 //!
 //! **Invariant:** a number and its unit stay on one line.
 
@@ -23,7 +23,7 @@ fn superscript(digits: &str) -> String {
         .collect()
 }
 
-/// A number with at most 3 digits that count, and without zeros at its end.
+/// A number with at most 3 significant digits and no trailing zeros.
 pub(crate) fn number(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
@@ -37,7 +37,7 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// A size that may be anything: `2.3·10⁻⁹`, or plain where that is short.
+/// A number of any magnitude: `2.3·10⁻⁹`, or plain if that is short.
 pub(crate) fn scientific(value: f64) -> String {
     if value == 0.0 || (0.01..1e4).contains(&value.abs()) {
         return number(value);
@@ -45,7 +45,7 @@ pub(crate) fn scientific(value: f64) -> String {
     with_power(&format!("{value:.1e}"))
 }
 
-/// A size of which one digit is known: `2·10⁻⁹`.
+/// A number with one significant digit: `2·10⁻⁹`.
 pub(crate) fn one_digit(value: f64) -> String {
     with_power(&format!("{value:.0e}"))
 }
@@ -76,7 +76,7 @@ pub(crate) fn plain(text: &str) -> String {
         let (before, number) = rest.split_at(start);
         let end = number.find(|it| !in_number(it)).unwrap_or(number.len());
         let (number, after) = number.split_at(end);
-        // The end of a sentence or of a range is no part of a number.
+        // A full stop or a range's dash is not part of a number.
         let trimmed = number.trim_end_matches(|it: char| !it.is_ascii_digit());
         let value = trimmed.split_once('e').and_then(|_| trimmed.parse().ok());
         out.push_str(before);

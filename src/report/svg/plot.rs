@@ -1,11 +1,11 @@
-//! One panel: axes and curves on paper, or horizontal bars.
+//! One panel: axes and curves, or horizontal bars.
 //!
-//! **Invariant:** lines end where points are lost; the lost ones are drawn at the upper edge.
+//! **Invariant:** lines break at lost points, which are drawn at the upper edge.
 
 use super::{Axis, Curve, HEIGHT, Key, Marker, Point, Unit, WIDTH, escape, lines, number};
 use crate::math::count::length_in_f64;
 
-/// Left, right, upper and lower ends of the axes on the paper, and on that of a picture of half the size.
+/// Left, right, upper and lower ends of the axes in a panel, and in a thumbnail of half its size.
 const ENDS: [f64; 4] = [58.0, WIDTH - 14.0, 42.0, HEIGHT - 46.0];
 const SMALL_ENDS: [f64; 4] = [8.0, 0.5 * WIDTH - 8.0, 40.0, 0.5 * HEIGHT - 24.0];
 
@@ -21,7 +21,7 @@ pub(crate) struct Plot {
     pub(crate) curves: Vec<Curve>,
 }
 
-/// What a panel looks like.
+/// The form of a panel.
 #[derive(Debug, Clone)]
 pub(crate) enum Form {
     /// Axes with scales, and curves.
@@ -32,7 +32,7 @@ pub(crate) enum Form {
     Bars,
 }
 
-/// The words of a picture without scales.
+/// The texts of a thumbnail.
 #[derive(Debug, Clone)]
 pub(crate) struct Thumbnail {
     /// The address that its title opens; empty for none.
@@ -55,7 +55,7 @@ impl Plot {
         }
     }
 
-    /// Horizontal bars from zero, each with its number; a row without one says so.
+    /// Horizontal bars from zero, each with its number; a row without a number is marked.
     pub(crate) fn bars(
         title: &'static str,
         class: &'static str,
@@ -138,9 +138,9 @@ impl Plot {
         format!("{label}{dashed}{points}")
     }
 
-    /// The title and the words below a picture without scales.
+    /// The title of a thumbnail and the texts below it.
     fn words(&self, thumbnail: &Thumbnail) -> String {
-        /// A letter of a heading is no wider on average, in pixels.
+        /// Upper bound of the average width of a heading's letter, in pixels.
         const LETTER: f64 = 8.2;
         let ([left, right, ..], below) = (SMALL_ENDS, 0.5 * HEIGHT - 8.0);
         let title = lines(&self.title, right - left, LETTER);
@@ -164,7 +164,7 @@ impl Plot {
         let mut out = text("title", (left, 17.0), "start", &self.title);
         for (value, label) in self.x.ticks(6.0) {
             let x = self.across(value);
-            // A long label at the very end would leave the paper.
+            // A long label at the end would exceed the panel.
             let half = 3.4 * length_in_f64(label.chars().count());
             let (anchor, shown) = if x + half > WIDTH - 3.0 {
                 ("end", WIDTH - 3.0)
@@ -212,7 +212,7 @@ impl Plot {
             let mut path = String::new();
             let mut letter = 'M';
             for point in &curve.points {
-                // Lost points break the line: nothing is known between them and their neighbours.
+                // Lost points break the line: the curve is unknown between them and their neighbours.
                 if point.y.is_finite() && self.x.holds(point.x) {
                     let (x, y) = (self.across(point.x), self.down(point.y));
                     path += &format!("{letter}{x:.1} {y:.1}");
@@ -302,8 +302,8 @@ fn text(class: &str, (x, y): (f64, f64), anchor: &str, words: &str) -> String {
     )
 }
 
-/// The numbers of a figure as CSV: a column for each axis of its panels, named by it, and filled by the panels that
-/// have it.
+/// The numbers of a figure as CSV: a column for each axis of its panels, with the axis' name and the values of its
+/// panels.
 pub(crate) fn csv(panels: &[Plot]) -> String {
     let mut axes: Vec<String> = Vec::new();
     for axis in panels
@@ -345,7 +345,7 @@ fn quoted(text: &str) -> String {
     text.to_owned()
 }
 
-/// A number that reads back to the same bits; nothing where there is none.
+/// A number that reads back to the same bits; empty if it is not finite.
 fn spelled(value: f64) -> String {
     if value.is_finite() {
         format!("{value:e}")

@@ -71,7 +71,7 @@ pub struct PlanRun<const N: usize> {
     pub error: f64,
     /// The duration of the run \[s\], greater than 0.
     pub duration: Option<f64>,
-    /// Whether the present gains control the arm if the request has none.
+    /// Whether the present gains apply if the request has none.
     pub servo: bool,
     /// Initial positions \[rad\].
     pub q0: Option<[f64; N]>,

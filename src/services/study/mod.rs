@@ -37,7 +37,7 @@ pub trait Computed<const N: usize>: Ask {
     /// The computation.
     type Work: Work<Self::Answer> + 'static;
 
-    /// The work that this asks for, of an arm that is `present` so.
+    /// The computation of this request for the `present` arm.
     #[must_use]
     fn work(self, present: Present<N>) -> Self::Work;
 }

@@ -1,4 +1,4 @@
-//! A complex number, as an eigenvalue is one.
+//! Complex numbers, for eigenvalues.
 //!
 //! **Invariant:** infinities and NaN are passed on.
 
@@ -18,7 +18,7 @@ impl Complex {
         Self { re, im: 0.0 }
     }
 
-    /// Modulus, without overflow on the way.
+    /// Modulus, without intermediate overflow.
     #[must_use]
     pub fn modulus(self) -> f64 {
         hypot(self.re, self.im)

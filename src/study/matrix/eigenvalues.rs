@@ -20,7 +20,8 @@ use crate::math::elementary::{exp2, log2};
 const MAX_SWEEPS: usize = 60;
 
 impl Matrix {
-    /// All eigenvalues, in no particular order; NaN for what does not converge or starts from what is not finite.
+    /// All eigenvalues, in no particular order; NaN for an eigenvalue that does not converge, and for every one if an
+    /// entry is not finite.
     #[must_use]
     pub fn eigenvalues(&self) -> Vec<Complex> {
         if !self.entries.iter().all(|entry| entry.is_finite()) {
@@ -32,12 +33,12 @@ impl Matrix {
         matrix.iterate()
     }
 
-    /// A diagonal similarity, in powers of two and so exact, that makes rows and columns alike in size. Velocities
-    /// beside positions, or an outer link of a milligram beside a link of a kilogram, would otherwise drown the small
-    /// eigenvalues.
+    /// A diagonal similarity that makes rows and columns similar in size. It uses powers of two and is therefore exact.
+    /// Without it small eigenvalues would be lost in rounding: velocities and positions, or links of a milligram and of
+    /// a kilogram, differ in scale.
     fn balance(&mut self) {
         let n = self.n;
-        // Each pass at least halves some row or column by 5 %; a dozen passes settle what can be settled.
+        // Each pass at least halves some row or column by 5 %; a dozen passes suffice.
         for _ in 0..24 {
             let mut settled = true;
             for i in 0..n {
@@ -80,7 +81,7 @@ impl Matrix {
     }
 
     /// Reflects from both sides so that a vector, whose first entry belongs to row `start`, turns into a multiple of
-    /// its first axis. Of the matrix the rows and columns in `block` are kept up to date.
+    /// its first axis. Only the rows and columns in `block` are updated.
     fn reflect(&mut self, start: usize, across: &mut [f64], block: RangeInclusive<usize>) {
         let size = largest(across.iter().map(|u| u.abs()));
         if size == 0.0 {
@@ -131,10 +132,10 @@ impl Matrix {
         values
     }
 
-    /// Whether the entry left of the diagonal in row `i` can be taken for zero.
+    /// Whether the entry left of the diagonal in row `i` is negligible.
     fn is_negligible(&self, i: usize, sweeps: usize, norm: f64) -> bool {
         let beside = self[(i, i)].abs() + self[(i - 1, i - 1)].abs();
-        // Nothing is small beside two eigenvalues that are zero: then the size of the whole matrix is taken.
+        // Compared with two zero eigenvalues no entry is small. After some sweeps the size of the matrix is the scale.
         let scale = if sweeps < MAX_SWEEPS / 3 {
             beside
         } else {
@@ -159,11 +160,11 @@ impl Matrix {
         [d + larger, d - other].map(Complex::real)
     }
 
-    /// A step of the iteration with two shifts at once on rows and columns `first..=last`: the first column of the
-    /// product of both factors is reflected to one entry, then each column below whose subdiagonal this leaves a bulge.
+    /// A double-shift step of the iteration on rows and columns `first..=last`. The first column of the product of both
+    /// factors is reflected to one entry. This leaves a bulge below the subdiagonal, which is reduced column by column.
     fn sweep(&mut self, first: usize, last: usize, sweeps: usize) {
         // The shifts are the eigenvalues of the last block, by its diagonal and the product of its other entries. Every
-        // tenth sweep takes others, to break a cycle.
+        // tenth sweep uses exceptional shifts, to break a cycle.
         let (diagonal, product) = if sweeps.is_multiple_of(10) {
             let size = self[(last, last - 1)].abs() + self[(last - 1, last - 2)].abs();
             ([0.75 * size; 2], -0.4375 * size * size)

@@ -1,9 +1,9 @@
 //! Small dense matrices for the step matrices of the stability predictions, of sizes up to some ten.
 //!
-//! It uses nothing but floating point.
+//! It uses only floating-point arithmetic.
 //!
-//! **Invariant:** no input panics or loops for ever. A value that can't be computed is NaN, which no comparison takes
-//! for stable.
+//! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
+//! comparison treats as unstable.
 
 #![allow(
     clippy::indexing_slicing,
@@ -50,7 +50,7 @@ impl Matrix {
         }
     }
 
-    /// The n×n matrix whose entry at `(row, column)` is what `entry` says.
+    /// The n×n matrix whose entry at `(row, column)` is `entry(row, column)`.
     #[must_use]
     pub fn from_fn(n: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
         let mut matrix = Self::zeros(n);
@@ -109,7 +109,7 @@ impl Matrix {
     }
 
     /// The solution `x` of `self · x = b`, by elimination with partial pivoting; `None` if the matrix is singular or
-    /// `b` has not n entries.
+    /// `b` does not have n entries.
     #[must_use]
     pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
         let n = self.n;
@@ -155,7 +155,7 @@ impl Matrix {
         Some(Self::from_fn(n, |row, column| columns[column][row]))
     }
 
-    /// Largest modulus of an eigenvalue; NaN where [`Matrix::eigenvalues`] has one.
+    /// Largest modulus of an eigenvalue; NaN if [`Matrix::eigenvalues`] has a NaN.
     #[must_use]
     pub fn spectral_radius(&self) -> f64 {
         largest(self.eigenvalues().into_iter().map(Complex::modulus))

@@ -1,16 +1,16 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
-//! The run is the live loop, [`Simulation`], from any state. Its reference obeys the same control law, evaluated at the
-//! same instants and held for the same period, and follows the arm in between to rounding ([`TaylorReference`]). So the
-//! difference is the error of the method alone. Against a law that acts at every instant ([`Rollout::from_ideal`])
-//! holding the effort costs an error of first order in the control period, which no method can mend.
+//! The run is the live loop, [`Simulation`], from any state. Its reference has the same control law, evaluated at the
+//! same instants and held for the same period. In between it follows the arm to rounding ([`TaylorReference`]). The
+//! difference is therefore the error of the method alone. Against a continuous-time law ([`Rollout::from_ideal`]) a
+//! held effort causes an error of first order in the control period, which no method can reduce.
 //!
-//! Three more references, of arms that differ in their last digits, one of them in steps half as long, say how far
-//! the first can be trusted. On a chaotic swing that is some twenty seconds. All of them err along the one direction
-//! that grows. Two may come near each other by chance; four hardly do, so that `SPREAD` times the largest distance
-//! between any two of them holds the truth.
+//! Three more references estimate the uncertainty of the first. Their arms differ in the last digits, and one of them
+//! takes steps half as long. On a chaotic swing the reference is usable for some twenty seconds. All errors are along
+//! the one growing direction. Two references may be close by chance, but four hardly ever are. The truth is therefore
+//! within `SPREAD` times the largest distance between any two of them.
 //!
-//! **Invariant:** steps, samples and work are bounded when a run is made.
+//! **Invariant:** the request bounds the steps, samples and work of a run.
 
 #![allow(
     clippy::indexing_slicing,
@@ -33,31 +33,31 @@ use crate::math::integrator::Method;
 use crate::math::pid::Pid;
 use crate::math::simulation::{Divergence, Held, Hold, Simulation};
 
-/// Longest span that a reference without control is asked to follow at once \[s\].
+/// Longest span of one call of a reference without control \[s\].
 const MAX_SPAN: f64 = 0.05;
 
-/// How far a run is from a reference.
+/// The distance of a run from a reference.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviation {
-    /// Samples at which the reference was known: fewer than those of the run if it was lost on the way.
+    /// Samples at which the reference was known. Fewer than those of the run if the reference was lost.
     pub samples: usize,
     /// Largest error of a joint position \[rad\].
     pub error: f64,
-    /// How far the errors may be off at most \[rad\]: the distance between the references, at least a last digit.
+    /// Uncertainty of the errors \[rad\]: the distance between the references, at least one unit in the last place.
     pub uncertainty: f64,
 }
 
 /// References of a run.
 const REFERENCES: usize = 4;
 
-/// How many times the largest distance between two references the first one may be off.
+/// Uncertainty of the first reference, relative to the largest distance between two references.
 const SPREAD: f64 = 3.0;
 
-/// How many times its uncertainty a known error is at least: in a smaller one the reference's own error would show.
+/// Least ratio of a known error to its uncertainty. A smaller error could be that of the reference.
 const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
-    /// The largest error \[rad\], if the references know it: `None` if it is about as large as their difference.
+    /// The largest error \[rad\]; `None` if it is not clearly larger than the distance between the references.
     #[must_use]
     pub fn known(&self) -> Option<f64> {
         (self.error >= ABOVE_UNCERTAINTY * self.uncertainty).then_some(self.error)
@@ -70,7 +70,7 @@ impl Deviation {
     }
 }
 
-/// A run with its samples. It ends early where a step led out of the finite numbers.
+/// A run with its samples. It ends early if a step diverges.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rollout<const N: usize> {
     /// Times of the samples \[s\].
@@ -79,30 +79,30 @@ pub struct Rollout<const N: usize> {
     pub positions: Vec<[f64; N]>,
     /// Joint velocities of the samples \[rad/s\].
     pub velocities: Vec<[f64; N]>,
-    /// Efforts of the steps that led to the samples \[N m\]; zeros at the start.
+    /// Efforts of the last steps before the samples \[N m\]; zeros at the start.
     pub efforts: Vec<[f64; N]>,
     /// Kinetic plus potential energy of the samples \[J\].
     pub energy: Vec<f64>,
     /// Steps made.
     pub steps: u64,
-    /// How often the run itself, without its references, has evaluated the dynamics.
+    /// Evaluations of the dynamics by the run itself, without its references.
     pub evaluations: u64,
-    /// Errors against the reference, if one was asked for.
+    /// Errors against the reference, if one was requested.
     pub deviation: Option<Deviation>,
-    /// Errors of the method, and of holding the effort, against the loop whose law acts at every instant. There are
-    /// some if there is a law and a reference was asked for.
+    /// Errors of the method and of the held effort, against the loop with a continuous-time law. `None` without a
+    /// control law, or if no reference was requested.
     pub from_ideal: Option<Deviation>,
-    /// The place at which a step led out of the finite numbers, if one did.
+    /// The step that diverged, if one did.
     pub divergence: Option<Divergence>,
 }
 
-/// The most memory that [`rollout`] takes beside its samples, in bytes.
+/// The most memory of [`rollout`] without its samples, in bytes.
 #[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     size_of::<[Reference<N>; REFERENCES]>() + size_of::<[Ideal<N>; 2]>()
 }
 
-/// Makes a run, in pieces; its start is its first sample.
+/// Simulates a run, in pieces. The start is the first sample.
 ///
 /// # Errors
 /// The first value of the request that is out of bounds.
@@ -114,7 +114,7 @@ pub async fn rollout<const N: usize>(
     let samples = request.samples.min(steps + 1);
     let intervals = samples.saturating_sub(1).max(1);
     let mut run = control.simulation(start);
-    // On the heap, so that a run that has not begun takes no room for them.
+    // On the heap, so that a run that has not begun has no memory for them.
     let references = |index| Reference::new(&control, start, index);
     let mut references: Option<Box<[Reference<N>; REFERENCES]>> = request
         .reference
@@ -129,7 +129,7 @@ pub async fn rollout<const N: usize>(
     let mut piece = PieceWork::default();
     let evaluations = u64::from(control.method.evaluations());
     for index in 0..samples {
-        // The step nearest to the sample's place, of places that are spread evenly; at most 1e5 times 1e7.
+        // The step nearest to the sample, for evenly spaced samples. The product is at most 1e5 times 1e7.
         let due = (2 * index * steps + intervals) / (2 * intervals);
         while run.steps() < due && run.divergence().is_none() {
             let ahead = due - run.steps();
@@ -153,8 +153,8 @@ pub async fn rollout<const N: usize>(
     Ok(made)
 }
 
-/// Steps that are made in one go: one if references have to look at every step, else those of [`MAX_SPAN`] at most, so
-/// that a reference is not asked for longer spans, and a piece is short.
+/// Steps per call: one if references evaluate the law in every step. Otherwise at most [`MAX_SPAN`] of them, so that
+/// the spans of a reference and the pieces stay short.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -197,8 +197,8 @@ impl<const N: usize> Rollout<N> {
         }
     }
 
-    /// The largest error of a deviation of this run and its uncertainty \[rad\], where they are known for all samples.
-    /// An error of some of them can't be compared with another run's.
+    /// The largest error of a deviation of this run and its uncertainty \[rad\], if they are known for all samples. An
+    /// error over some of the samples is not comparable with that of another run.
     #[must_use]
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
         let whole = deviation.filter(|deviation| deviation.samples == self.times.len());
@@ -207,21 +207,21 @@ impl<const N: usize> Rollout<N> {
     }
 }
 
-/// Longest step of Runge-Kutta 4 of an ideal loop \[s\]: of the default arms it leaves errors of some 1e-12 rad.
+/// Longest step of Runge-Kutta 4 in an ideal loop \[s\]. The error is then some 1e-12 rad for the default arms.
 const LONGEST_STEP: f64 = 2.5e-4;
 
-/// Most of its steps in one of the run's: a run in longer ones learns that nothing is known.
+/// Most of its steps per step of the run. With longer steps of the run the error is reported as unknown.
 const MOST_STEPS: u32 = 256;
 
-/// The loop whose law acts at every instant, in whole parts of the run's timestep.
+/// The loop with a continuous-time law. Its timestep divides that of the run.
 struct Ideal<const N: usize> {
-    /// None once it is lost.
+    /// `None` once it has diverged.
     run: Option<ContinuousLoop<N>>,
     parts: u32,
 }
 
 impl<const N: usize> Ideal<N> {
-    /// The loop from `start` on, in steps that are `cuts` times shorter than they might be.
+    /// The loop from `start` on, with steps divided by `cuts`.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -250,7 +250,7 @@ impl<const N: usize> Ideal<N> {
     }
 }
 
-/// The motion that the run ought to have.
+/// The reference motion of the run.
 struct Reference<const N: usize> {
     arm: Arm<N>,
     taylor: TaylorReference<N>,
@@ -258,7 +258,7 @@ struct Reference<const N: usize> {
     hold: Hold<N>,
     /// Length of a step of the run \[s\].
     timestep: f64,
-    /// Whether the motion was too wild to be followed.
+    /// Whether the motion changed too fast to be computed.
     is_lost: bool,
 }
 
@@ -278,7 +278,7 @@ impl<const N: usize> Reference<N> {
         }
     }
 
-    /// Follows the run by this number of its steps: one after the other under a control law, else all at once.
+    /// Follows the run by this number of its steps: one by one with a control law, else in one span.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
         let has_law = self.pid.is_enabled();
         let (stretches, stretch) = if has_law || steps == 0 {
@@ -305,9 +305,9 @@ impl<const N: usize> Reference<N> {
     }
 }
 
-/// An arm that differs in the last digit of a length and a mass, in another way for every index; that of index 0 does
-/// not. The equations of motion lose as much by rounding their constants, and lose the same in every step, so that
-/// steps of another length would not show it.
+/// An arm with a length and a mass changed in the last digit, differently for every index above 0. Rounding the
+/// constants of the equations of motion has an effect of this size. It is the same in every step, so a different step
+/// length would not reveal it.
 fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
     let (mut lengths, mut masses) = (*arm.lengths(), *arm.masses());
     if let (Some(length), Some(mass)) = (lengths.first_mut(), masses.last_mut()) {
@@ -330,7 +330,7 @@ fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
     largest(pairs)
 }
 
-/// The worth of the last digit of a joint position \[rad\].
+/// One unit in the last place of a joint position \[rad\].
 fn last_digit<const N: usize>(state: &State<N>) -> f64 {
     let largest = largest(state.position.iter().map(|q| q.abs()));
     f64::EPSILON * largest.max(1.0)

@@ -1,6 +1,6 @@
-//! The request for a rollout, and why it is refused.
+//! The request for a rollout, and the reasons to reject it.
 //!
-//! **Invariant:** a request that passes has a bounded number of steps and samples, and no number that is not finite.
+//! **Invariant:** an accepted request has a bounded number of steps and samples, and only finite numbers.
 
 use crate::math::arm::State;
 use crate::math::count::{in_f64, steps_in};
@@ -8,7 +8,7 @@ use crate::math::pid::Gains;
 use crate::math::shown::{Shown, shown_against};
 use crate::study::control_loop::ControlLoop;
 
-/// Most steps of one run: some seconds of one core, with a reference under control up to two minutes.
+/// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
 pub const MAX_STEPS: u64 = 10_000_000;
 
 /// Most samples of one run, some 30 MB of JSON.
@@ -17,19 +17,19 @@ pub const MAX_SAMPLES: u64 = 100_000;
 /// The request for a run: its loop, its start, its length and its samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RolloutRequest<const N: usize> {
-    /// The loop that the steps obey.
+    /// The loop of the run.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
-    /// How long \[s\]; the run has the nearest number of steps.
+    /// Duration \[s\]; the run has the nearest number of steps.
     pub duration: f64,
-    /// How many samples, start and end among them, if there are as many steps.
+    /// The number of samples, with start and end; fewer if the run has fewer steps.
     pub samples: u64,
-    /// Whether to run the reference too.
+    /// Whether to compute a reference too.
     pub reference: bool,
 }
 
-/// Why a run is refused. The field names are those of the request.
+/// Why a request is rejected. The field names are those of the request.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RolloutError {
     /// A number that is NaN or infinite, a negative gain, or a time that is not positive.
@@ -63,7 +63,7 @@ pub enum RolloutError {
         /// The given value.
         steps: f64,
     },
-    /// Fewer samples than start and end, or more than [`MAX_SAMPLES`].
+    /// Fewer than 2 samples, or more than [`MAX_SAMPLES`].
     #[error("samples must be between 2 and {MAX_SAMPLES}, got {samples}")]
     Samples {
         /// The given value.

@@ -1,10 +1,10 @@
-//! An arm followed to rounding or within a tolerance: under constant efforts in doubles, and for the report's
-//! references under any drive and in more digits.
+//! A Taylor integrator for the arm's motion, to rounding or within a tolerance. The study uses doubles and constant
+//! efforts; the report's references use any drive and more digits.
 //!
-//! Its motion is a power series (`series.rs`). A step is so short that the last terms of the series are small.
-//! Positions and velocities are summed with compensation.
+//! Its motion is a power series (`series.rs`). The step length makes the last terms of the series small. Positions and
+//! velocities are summed with compensation.
 //!
-//! **Invariant:** it computes the motion differently from every method under study, and the work of a span is bounded.
+//! **Invariant:** it shares no formula with the methods under study, and the work of a span is bounded.
 
 #![allow(
     clippy::indexing_slicing,
@@ -24,34 +24,32 @@ use crate::math::number::Arithmetic;
 use crate::math::trig;
 use series::PowerSeries;
 
-/// The least tolerance that makes a difference: below it rounding is all that is left.
+/// The smallest useful tolerance: below it rounding dominates.
 pub const ROUNDING: f64 = f64::LEAST_TOLERANCE;
 
-/// Coefficients after which a span is given up, since the motion is too wild to be followed. They make a thousand
-/// steps.
+/// Most coefficients per span, some thousand steps. A motion that needs more changes too fast to be computed.
 const MAX_COEFFICIENTS: u64 = 20_000;
 
-/// Terms that have to be small before a series is believed to have come to its end. An arm that is let go at rest and
-/// stretched along the horizontal has three in a row that vanish between two that do not.
+/// Number of last terms that must be small before a series counts as converged. For an arm released at rest, stretched
+/// along the horizontal, three consecutive terms vanish between two that do not.
 const LAST: usize = 4;
 
-/// The factor by which a step may be longer than the last.
+/// Largest ratio of a step to the last one.
 const LONGER: f64 = 1.25;
 
-/// Factors by which a step is shortened if its series does not reach so far: the second one if its last terms are
-/// [`MUCH`] too large.
+/// Factors that shorten a step whose last terms are too large; the second one applies if they are [`MUCH`] too large.
 const SHORTER: [f64; 2] = [0.95, 0.25];
 const MUCH: f64 = 1e9;
 
-/// Numbers in which a motion is followed.
+/// The arithmetic in which a motion is computed.
 pub(crate) trait Precision: Arithmetic + Default {
     /// Relative size of a rounding error.
     const LEAST_TOLERANCE: f64;
-    /// Highest order of a series: beyond it rounding is all that a coefficient adds.
+    /// Highest order of a series: beyond it a coefficient contributes only rounding.
     const HIGHEST_ORDER: usize;
     /// The magnitude as a double.
     fn magnitude(self) -> f64;
-    /// `sum + change`, and the rounding error of that, for the sum that `carry` is the rounding error of.
+    /// `sum + change` and its rounding error, where `carry` is the rounding error of `sum`.
     fn plus_carried(self, carry: Self, change: Self) -> (Self, Self);
     /// Sines and cosines of angles \[rad\].
     fn directions<const N: usize>(angles: &[Self; N]) -> ([Self; N], [Self; N]);
@@ -109,27 +107,27 @@ impl<T: Precision, const N: usize> Drive<T, N> for [T; N] {
     }
 }
 
-/// A motion that is followed, rounding errors carried along.
+/// A motion in progress, with compensated rounding errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Taylor<T, const N: usize> {
     pub(crate) position: [T; N],
     pub(crate) velocity: [T; N],
     carry: [[T; N]; 2],
     tolerance: f64,
-    /// Order of the series where no span ends.
+    /// Order of the series, except at the end of a span.
     order: usize,
-    /// Factors of [`SHORTER`], and what they leave of the last terms.
+    /// Factors of [`SHORTER`], and the factors by which they reduce the last terms.
     shorter: [(f64, f64); 2],
-    /// How many times the tolerance each of the last terms may be: a term of lower order is not asked for as much.
+    /// Largest size of each of the last terms, relative to the tolerance. Terms of lower order may be larger.
     allowances: [f64; LAST],
-    /// Parts that a step and a span are cut into, beyond what the tolerance asks for.
+    /// Factor by which steps and spans are divided in addition to the tolerance's demand.
     cuts: f64,
     coefficients: u64,
-    /// The last length of a step that a series allowed \[s\].
+    /// The last step length that a series allowed \[s\].
     step: f64,
     /// The present span \[s\].
     span: f64,
-    /// How much of it is left \[s\], and what rounding took from that.
+    /// The rest of the span \[s\], and its rounding error.
     pub(crate) rest: (f64, f64),
     /// The series of the last step.
     pub(crate) series: PowerSeries<T, N>,
@@ -164,7 +162,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         self.rest = (span, 0.0);
     }
 
-    /// Goes on with the span by a step.
+    /// Takes the next step of the span.
     pub(crate) fn step(&mut self, arm: &Arm<N>, drive: &impl Drive<T, N>) {
         let (span, rest) = (self.span, self.rest);
         let whole = (span / self.cuts).min(rest.0);
@@ -201,7 +199,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         let h = if small == LAST || cut >= whole {
             whole
         } else {
-            // Two steps of one length are better than a long one and a remnant.
+            // Two equal steps are better than a long one and a short rest.
             cut.min(0.5 * rest.0)
         };
         let is_last = h >= rest.0;
@@ -225,7 +223,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         };
     }
 
-    /// The longest step \[s\] up to `step` whose last terms are as small as the tolerance asks for.
+    /// The longest step \[s\] up to `step` whose last terms are within the tolerance.
     fn allowed(&self, mut step: f64) -> f64 {
         let first = self.order + 1 - LAST;
         let mut of_order = power(step, first);
@@ -234,7 +232,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             excess = excess.max(self.excess(order, step, of_order) / allowance);
             of_order *= step;
         }
-        // Terms fall with at least the power of the first of them, less 1 for what they are measured by.
+        // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
         while excess > 1.0 && step > 0.0 {
             let (factor, of_terms) = self.shorter[usize::from(excess > MUCH)];
             step *= factor;
@@ -255,8 +253,8 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
     }
 }
 
-/// The order at which a motion costs least for a tolerance: two more than in Jorba and Zou, section 3.3. They take
-/// the cost of a step to grow with the square of its order; every step begins with an evaluation besides.
+/// The order of least cost for a tolerance: two more than in Jorba and Zou, section 3.3. Their cost of a step grows
+/// with the square of its order. Here every step also needs an evaluation at its start.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -282,7 +280,7 @@ fn size<T: Precision, const N: usize>(x: &[T; N]) -> f64 {
     largest(x.iter().map(|x| x.magnitude()))
 }
 
-/// An arm under constant efforts, followed in doubles.
+/// The motion of an arm under constant efforts, in doubles.
 #[derive(Debug, Clone)]
 pub struct TaylorReference<const N: usize> {
     taylor: Taylor<f64, N>,
@@ -290,7 +288,7 @@ pub struct TaylorReference<const N: usize> {
 }
 
 impl<const N: usize> TaylorReference<N> {
-    /// An arm in the given state, to be followed to rounding.
+    /// The motion from the given state, computed to rounding.
     #[must_use]
     pub fn new(state: State<N>) -> Self {
         Self::within(state, ROUNDING)
@@ -312,7 +310,7 @@ impl<const N: usize> TaylorReference<N> {
         }
     }
 
-    /// Follows the same motion in steps that are so many times shorter than they might be.
+    /// The same motion with its steps divided by this factor.
     #[must_use]
     pub(super) fn cut(mut self, cuts: u32) -> Self {
         self.taylor.cuts = f64::from(cuts);
@@ -325,14 +323,14 @@ impl<const N: usize> TaylorReference<N> {
         &self.state
     }
 
-    /// Coefficients of the series so far. Each takes about as long as an evaluation of the dynamics.
+    /// Number of series coefficients so far. Each costs about as much as an evaluation of the dynamics.
     #[must_use]
     pub fn coefficients(&self) -> u64 {
         self.taylor.coefficients
     }
 
-    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere
-    /// on the way.
+    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if the motion could not be computed. The state
+    /// is then somewhere within the span.
     pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
         at_once(self.follow_in_pieces(arm, effort, span, &mut PieceWork::default()))
     }

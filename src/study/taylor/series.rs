@@ -5,17 +5,17 @@
 //! `Σ_j K_ij (cos(φ_i - φ_j) φ̈_j + sin(φ_i - φ_j) φ̇_j²) + W_i cos φ_i = τ_i - τ_{i+1}`
 //!
 //! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`. Products of series are
-//! convolutions. The accelerations' coefficients solve one linear system after the other, always with the same matrix.
-//! The first of them is given, so that it can come from a kernel that loses fewer digits. Known limit: a last link of a
-//! billion times the mass of the two that it folds costs a digit or two beyond those that its start has lost.
+//! convolutions. Each order of the accelerations solves a linear system, always with the same matrix. The first order
+//! is an input, so that it can come from a kernel that loses fewer digits. Known limit: on a folded arm with a last
+//! link a billion times heavier than the others, the series loses one or two digits more than its start.
 //!
-//! The series is one for doubles, as the study follows an arm, and for numbers of twice the digits, as the report's
-//! references have them.
+//! The series works in doubles, for the study, and in double-double arithmetic, for the report's references.
 //!
 //! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
 //! methods*, Experimental Mathematics 14 (2005).
 //!
-//! **Invariant:** it uses sums, products, quotients and square roots alone, so that every machine gives the same bits.
+//! **Invariant:** it uses only sums, products, quotients and square roots, so results are bit-identical on every
+//! machine.
 
 #![allow(
     clippy::indexing_slicing,
@@ -37,35 +37,34 @@ type PerLink<T, const N: usize> = [[T; N]; ORDER + 1];
 /// `d = 0`.
 type PerPair<T, const N: usize> = [[[T; N]; N]; ORDER];
 
-/// Where the coefficient of an order stands in a series that is kept backwards, so that both factors of a convolution
-/// are read forwards.
+/// Index of a coefficient in a series stored in reverse order. Both factors of a convolution are then read forwards.
 const fn backwards(order: usize) -> usize {
     ORDER - 1 - order
 }
 
-/// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are computed from.
+/// Series of the angles of the links \[rad\], their rates \[rad/s\], and the series from which they are computed.
 #[derive(Debug, Clone)]
 pub(crate) struct PowerSeries<T, const N: usize> {
     /// Order up to which rates are known.
     order: usize,
     pub(crate) angle: PerLink<T, N>,
     pub(crate) rate: PerLink<T, N>,
-    /// Accelerations and squared rates, backwards.
+    /// Accelerations and squared rates, in reverse order.
     acceleration: [[T; N]; ORDER],
     squared_rate: [[T; N]; ORDER],
-    /// Sine and cosine of the angle from one link to the other, and its rate, backwards.
+    /// Sine and cosine of the angle from one link to the other, and its rate, in reverse order.
     sin: PerPair<T, N>,
     cos: PerPair<T, N>,
     turning: PerPair<T, N>,
     equation: Equation<T, N>,
 }
 
-/// The constants of the equation of motion, and its matrix where the series begins.
+/// The constants of the equation of motion, and its matrix at the start of the series.
 #[derive(Debug, Clone)]
 struct Equation<T, const N: usize> {
     /// At `[d][i]` the `K_ij` of links `i` and `i - d` \[kg m²\]; `W_i` \[N m\] for `d = 0`.
     factors: [[T; N]; N],
-    /// The matrix where the series begins, eliminated: inverse pivots on the diagonal, multipliers above it.
+    /// The matrix at the start of the series, after elimination: inverse pivots on the diagonal, multipliers above it.
     eliminated: [[T; N]; N],
 }
 
@@ -111,7 +110,7 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
     pub(crate) fn extend(&mut self, effort: &[T; N]) {
         let k = self.order;
         let zero = [[T::default(); N]; N];
-        // Sums for sines, cosines and squares, and for what a link does to one farther out, and to one farther in.
+        // Sums for sines, cosines and squares, and for the effect of a link on outer and on inner links.
         let (mut sine, mut cosine, mut square) = (zero, zero, [T::default(); N]);
         let (mut pull, mut push) = ((zero, zero), (zero, zero));
         {
@@ -171,7 +170,7 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
         self.close(k, acceleration);
     }
 
-    /// Keeps the accelerations of order `k`, and what follows from them.
+    /// Stores the accelerations of order `k` and the coefficients that follow from them.
     #[inline(always)]
     fn close(&mut self, k: usize, acceleration: [T; N]) {
         self.acceleration[backwards(k)] = acceleration;
@@ -192,7 +191,7 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
         self.order = k + 1;
     }
 
-    /// By how much positions and velocities of the joints change in a time \[s\].
+    /// The changes of the joints' positions and velocities in a time \[s\].
     pub(crate) fn change(&self, time: T) -> ([T; N], [T; N]) {
         let change = |series: &PerLink<T, N>, order: usize| {
             let mut value = series[order];
