@@ -34,7 +34,11 @@ bash scripts/wheel.sh "$program"
 cp python/target/wheels/*.whl dist/
 
 bash scripts/install.sh "$program" "$work/$name"
-cp LICENSE-MIT LICENSE-APACHE README.md SECURITY.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
+cp LICENSE-MIT LICENSE-APACHE ./*.md packaging/pendularm.service python/NOTICE-THIRD-PARTY.txt "$work/$name"
+# The targets of the links in README.md.
+cp -R docs course "$work/$name"
+mkdir "$work/$name/python"
+cp -R python/examples "$work/$name/python"
 tar -czf "dist/$name.tar.gz" -C "$work" "$name"
 
 if command -v sha256sum >/dev/null; then sums=(sha256sum); else sums=(shasum -a 256); fi

@@ -25,6 +25,9 @@ mkdir "$work/empty"
 tar -xzf dist/pendularm-*-"$(uname -s | tr '[:upper:]' '[:lower:]')-$(uname -m)".tar.gz -C "$work"
 cp "$work"/pendularm-*/bin/pendularm "$work/empty"
 grep -q '^glam ' "$work"/pendularm-*/NOTICE-THIRD-PARTY.txt || fail "no notices"
+for link in $(grep -o '](\([^):#]*\)[)#]' "$work"/pendularm-*/README.md | tr -d '()#]'); do
+    [ -e "$(echo "$work"/pendularm-*)/$link" ] || fail "README.md links to $link, which the archive lacks"
+done
 alone=(chroot "$work/empty")
 "${alone[@]}" /pendularm --version 2>/dev/null || alone=(unshare -r chroot "$work/empty")
 try_program '{"op":"call_service","service":"/ik/solve","args":{"x":1.2,"y":0.5}}' '*"result":true*' \

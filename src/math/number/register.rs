@@ -12,6 +12,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+#[cfg(target_arch = "x86_64")]
 use fearless_simd::f64x2;
 use fearless_simd::prelude::*;
 
