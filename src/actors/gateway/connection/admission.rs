@@ -12,7 +12,7 @@ use tokio::io::AsyncRead;
 use tokio::sync::Semaphore;
 use tokio::time::{Instant, timeout_at};
 
-use super::plain::{CHUNK, read_some};
+use super::plain::read_some;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
 use crate::protocol::op::{self, Op};
@@ -168,7 +168,7 @@ pub(super) async fn first_op<S: AsyncRead + Unpin>(
         if seen > MAX_AUTH_BYTES {
             return Err(AuthError::TooMuch);
         }
-        match timeout_at(due, read_some(stream, first, CHUNK)).await {
+        match timeout_at(due, read_some(stream, first)).await {
             Err(_) => return Err(AuthError::TooLate),
             Ok(Ok(0) | Err(_)) => return Err(AuthError::NotShown),
             Ok(Ok(_)) => {}

@@ -19,6 +19,7 @@ mod reader;
 mod session;
 mod timer;
 mod transport;
+mod turns;
 #[cfg(feature = "web")]
 mod websocket;
 mod writer;

@@ -12,12 +12,8 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
-/// Most bytes of one read. It is enough for a burst of short frames, and small enough for short turns of many
-/// clients.
-pub(super) const CHUNK: usize = 16 * 1024;
-/// Most bytes of one read during a long frame. If hundreds of clients send one each, another client's short frame waits
-/// for a turn of each.
-pub(super) const LONG_CHUNK: usize = CHUNK / 2;
+/// Most bytes of one read. It is enough for a burst of short frames.
+pub(super) const CHUNK: usize = 32 * 1024;
 
 /// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
 /// with unread input resets it.
@@ -34,30 +30,22 @@ pub(super) enum ClientLost {
     Refused,
 }
 
-/// Schedules the task behind other tasks and sockets. Waking it at once would poll it before them.
-pub(super) fn yield_turn(cx: &mut Context<'_>) {
-    // The task is woken although the future is dropped.
-    let _ = pin!(tokio::task::yield_now()).poll(cx);
-}
-
-/// Appends at most `most` available bytes to `chunk`. Returns 0 at the end of the stream.
+/// Appends at most [`CHUNK`] available bytes to `chunk`. Returns 0 at the end of the stream.
 pub(super) fn poll_read<S: AsyncRead + Unpin>(
     stream: &mut S,
     cx: &mut Context<'_>,
     chunk: &mut BytesMut,
-    most: usize,
 ) -> Poll<io::Result<usize>> {
-    pin!(read_some(stream, chunk, most)).poll(cx)
+    pin!(read_some(stream, chunk)).poll(cx)
 }
 
 /// The same as [`poll_read`], for a task of its own.
 pub(super) async fn read_some<S: AsyncRead + Unpin>(
     stream: &mut S,
     chunk: &mut BytesMut,
-    most: usize,
 ) -> io::Result<usize> {
-    chunk.reserve(most);
-    stream.read_buf(&mut chunk.limit(most)).await
+    chunk.reserve(CHUNK);
+    stream.read_buf(&mut chunk.limit(CHUNK)).await
 }
 
 /// Writes some of `frames`, in order. Returns the number of bytes.

@@ -17,10 +17,11 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::Connection;
-use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, LONG_CHUNK, yield_turn};
+use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;
+use super::turns::yield_turn;
 use super::writer::ClientWriter;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
@@ -343,7 +344,7 @@ impl ClientReader {
         let Some(mut performer) = self.performer.take() else {
             return false;
         };
-        performer.give_back(self.is_coming(MEDIUM));
+        performer.give_back(self.is_long_coming());
         self.waits_since = None;
         let cut = match self.messages.pop_front() {
             Some((message, permit)) => {
@@ -357,7 +358,7 @@ impl ClientReader {
         }
         let Some(cut) = cut else {
             self.is_cut = true;
-            if performer.permit.is_none() && self.is_coming(MEDIUM) {
+            if performer.permit.is_none() && self.is_long_coming() {
                 self.frame_due = None;
                 self.room = Some(Box::pin(performer.room()));
             }
@@ -373,9 +374,9 @@ impl ClientReader {
         true
     }
 
-    /// Whether a frame is incomplete, and its buffer is longer than this.
-    fn is_coming(&self, longer_than: usize) -> bool {
-        self.frames.is_unfinished() && self.frames.buffered() > longer_than
+    /// Whether a frame is incomplete, and so long that it needs a memory permit.
+    fn is_long_coming(&self) -> bool {
+        self.frames.is_unfinished() && self.frames.buffered() > MEDIUM
     }
 
     /// Handles the end of the stream. An incomplete frame is an error.
@@ -400,12 +401,7 @@ impl ClientReader {
         let Some(transport) = &mut connection.transport else {
             return Poll::Ready(Err(ClientLost::Gone));
         };
-        let most = if self.is_coming(CHUNK) {
-            LONG_CHUNK
-        } else {
-            CHUNK
-        };
-        if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk, most) {
+        if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
             return Poll::Ready(read.map(Some));
         }
         let is_unfinished = self.frames.is_unfinished() || transport.is_unfinished();
@@ -420,7 +416,7 @@ impl ClientReader {
             if late.is_some_and(|late| late <= Instant::now()) {
                 return Poll::Ready(transport.give_up(TOO_SLOW).map(|()| None));
             }
-            let is_coming = self.is_coming(MEDIUM);
+            let is_coming = self.is_long_coming();
             if let Some(performer) = &mut self.performer {
                 performer.fragments.forget_old(Instant::now().into_std());
                 performer.give_back(is_coming);
@@ -450,7 +446,7 @@ impl ClientReader {
         if bytes >= CHUNK || self.messages.len() >= FRAMES_IN_A_ROW {
             return Poll::Pending;
         }
-        let received = ready!(transport.poll_read(cx, &mut self.chunk, CHUNK))?;
+        let received = ready!(transport.poll_read(cx, &mut self.chunk))?;
         self.take_in(received);
         Poll::Ready(Ok(()))
     }

@@ -11,7 +11,7 @@ use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
-use super::plain::{self, CHUNK, ClientLost};
+use super::plain::{self, ClientLost};
 #[cfg(feature = "web")]
 use super::websocket::WebSocket;
 #[cfg(feature = "web")]
@@ -49,10 +49,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         &mut self,
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
-        most: usize,
     ) -> Poll<Result<ReceivedData, ClientLost>> {
         Poll::Ready(match self {
-            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk, most)) {
+            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk)) {
                 Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
                 Err(_) => Err(ClientLost::Gone),
             },
@@ -93,7 +92,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => plain::poll_read(stream, cx, chunk, CHUNK),
+            Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
         }

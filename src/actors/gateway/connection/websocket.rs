@@ -19,7 +19,8 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, CHUNK, ClientLost};
+use super::plain::{self, ClientLost};
+use super::turns::yield_turn;
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM};
@@ -114,7 +115,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             return Poll::Ready(Ok(message));
         }
         // Other connections have a turn.
-        plain::yield_turn(cx);
+        yield_turn(cx);
         Poll::Pending
     }
 
@@ -135,7 +136,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         self.stream().left = TURN;
-        plain::poll_read(self.stream(), cx, chunk, CHUNK)
+        plain::poll_read(self.stream(), cx, chunk)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
@@ -338,7 +339,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         if self.left == 0 {
-            plain::yield_turn(cx);
+            yield_turn(cx);
             return Poll::Pending;
         }
         ready!(self.poll_room(cx));

@@ -15,9 +15,9 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::Connection;
-use super::plain::yield_turn;
 use super::timer::Timer;
 use super::transport::Transport;
+use super::turns::yield_turn;
 use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
 use crate::actors::panics::contain;
 
