@@ -69,7 +69,7 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the speed of the last joint at one measurement, after a tiny push. The arm moves in slow motion: two measurements a second.",
+    text: "Each bar is the computed speed of the last joint at one measurement, after a tiny push without gravity. The arm on the left starts beside its setpoint, in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
@@ -125,10 +125,10 @@ export const STEPS = [
   },
   {
     id: "price", title: "The price of accuracy",
-    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of the hold.",
+    text: "Each dot is one run: its error over its run time. Solid lines show the error of the method. Dashed lines show the error of the hold. A cross marks a run that diverged.",
     scene: (links) => controlled(links, WITHIN[links]),
     chart: "ladder", dial: null,
-    task: { text: "Measure. Find where more run time no longer reduces the error.", done: ({ measured }) => measured },
+    task: { text: "Measure the four methods.", done: ({ measured }) => measured },
     question: {
       text: "Your controller measures every 4 ms. What does Runge–Kutta 4 at 0.25 ms improve?", answers: ["The robot", "Nearly nothing", "The limit"], right: 1,
       because: "The error of the hold is far larger than the error of the method. Reduce the larger one first.",

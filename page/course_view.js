@@ -428,7 +428,7 @@ function strip(series) {
   const chart = new StripChart(series, 0.2, 300);
   return () => {
     stripTime = newest();
-    chart.draw(surface.context, surface.width, surface.height, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS });
+    chart.draw(surface.context, surface.width, surface.height, { now: stripTime || 0, span: SPAN, links: state.links, shown: ALL_JOINTS, across: "simulation time [s]" });
   };
 }
 

@@ -79,11 +79,11 @@ function describe(about) {
 /** @param {Rung[]} best the cheapest sufficient run of each method */
 function inWords(best) {
   const controlled = found.some(({ sampling }) => sampling !== null);
-  const truths = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces." : "";
-  if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${truths}`;
+  const meaning = controlled ? " Solid lines: error of the method. Dashed lines: error of the controller’s hold, which no method reduces." : "";
+  if (best.length === 0) return `No run came within ${WANTED} rad of the exact motion.${meaning}`;
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
-  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${truths}`
+  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}.${meaning}`
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 

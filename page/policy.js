@@ -70,7 +70,7 @@ export function limitInForce(/** @type {any} */ state, /** @type {string} */ met
   const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
   const places = {
-    setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, saddle: `where it falls to, ${named}`,
+    setpoint: `at the setpoint ${named}`, sagging: `at the pose to which it sags, ${named}`, saddle: `at the pose to which it falls, ${named}`,
     hanging: state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns", unstable: `at ${named}, where the gains themselves are at fault`,
   };
   const place = places[/** @type {keyof typeof places} */ (answer.equilibrium_kind ?? (free ? "hanging" : "setpoint"))];

@@ -42,11 +42,12 @@ export class StripChart {
   }
 
   /**
-   * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor` and a reference level.
+   * Draws `span` seconds up to `now`, for the joints that are `shown`, with a mark at `cursor`, a reference level, and
+   * a name of the time axis.
    * @param {any} context @param {number} width @param {number} height @param {{now: number, span: number, links:
-   * number, shown: boolean[], cursor?: number, level?: number}} what
+   * number, shown: boolean[], cursor?: number, level?: number, across?: string}} what
    */
-  draw(context, width, height, { now, span, links, shown, cursor = NaN, level = NaN }) {
+  draw(context, width, height, { now, span, links, shown, cursor = NaN, level = NaN, across = "" }) {
     this.from = now - span;
     this.span = span;
     const first = Math.max(0, firstAfter(this.from) - 1);
@@ -57,9 +58,9 @@ export class StripChart {
     this.axis.fit(level < min ? level : min, level > max ? level : max);
     const leftAt = this.leftAt(lines, first, last);
     const named = lines.filter(({ name }) => name);
-    const chart = new Chart(context, width, height, times(this.from, now), this.axis, named.length > 0 ? { top: 18 } : {});
+    const chart = new Chart(context, width, height, times(this.from, now), this.axis, { ...(named.length > 0 && { top: 18 }), ...(across && { bottom: 30 }) });
     this.chart = chart;
-    chart.frame();
+    chart.frame({ across });
     const { data } = record;
     chart.inside(() => {
       if (Number.isFinite(level)) chart.path([[this.from, level], [now, level]], colors.muted, { width: 1, dash: DASHED });

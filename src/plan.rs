@@ -128,8 +128,8 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
         };
         let _ = writeln!(
             out,
-            "Plan: {} at a timestep of {:.4e} s{period}. The truth is known to {:.0e} m; methods that are not listed \
-             cost more.",
+            "Plan: {} at a timestep of {:.4e} s{period}. The reference is known to {:.0e} m. Methods that are not \
+             listed cost more.",
             best.method.name(),
             best.timestep,
             planned.uncertainty

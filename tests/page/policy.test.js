@@ -44,7 +44,7 @@ const VERDICTS = [
   ["within the limit of this pose alone", at(0.006), { kind: "here", sentence: /at the setpoint \(0\.90, −1\.30\) rad, but other poses are stable only up to 4\.32 ms/, advised: ADVISED }],
   ["beyond the limit", at(0.02), { kind: "beyond", sentence: /20 ms is above .* 13\.6 ms, at the setpoint/ }],
   ["a motion with a smaller limit than the pose", at(0.006, served({ timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" })), { kind: "beyond", where: /^moving at 12\.5 rad\/s$/ }],
-  ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^where it sags to, \(0\.50, −1\.40\) rad$/ }],
+  ["a pose that the arm sags to", served({ equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" }), { where: /^at the pose to which it sags, \(0\.50, −1\.40\) rad$/ }],
   ["Euler's free swing", { enabled: false, ...served({ timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 }) }, { kind: "never", advised: NaN }],
   ["nothing that limits", { enabled: false, stability: Object.fromEntries(Object.keys(VALUES).map((key) => [key, null])) }, { kind: "stable", limit: Infinity }],
   ["an arm that has diverged", { diagnostics: { state: "diverged" } }, { kind: "diverged" }],

@@ -1,7 +1,6 @@
 //! The Makefile: its targets, its help, and `make run` where there is no cargo.
 
 use std::collections::BTreeSet;
-#[cfg(unix)]
 use std::fs;
 #[cfg(unix)]
 use std::path::Path;
@@ -9,6 +8,7 @@ use std::process::Command;
 
 use super::{codes, printed};
 use crate::papers::{table, text};
+use crate::tree::{files_in, root, rust_files};
 
 #[test]
 fn the_papers_list_the_targets_that_make_help_lists() {
@@ -33,6 +33,44 @@ fn the_papers_list_the_targets_that_make_help_lists() {
         .map(|row| codes(&row[0])[0].to_owned())
         .collect();
     assert_eq!(readme, documented);
+}
+
+/// `cargo test` passes without a test if its filter matches none.
+#[test]
+fn every_filter_of_a_test_in_the_documents_names_a_module() {
+    let mut filters = 0;
+    for paper in files_in("docs", &["md"]) {
+        let paper = fs::read_to_string(paper).unwrap();
+        for command in codes(&paper) {
+            let Some((_, command)) = command.split_once("cargo test --test ") else {
+                continue;
+            };
+            let (program, named) = command.split_once(" -- ").unwrap_or((command, ""));
+            let folder = format!("tests/{program}");
+            let modules: Vec<String> = rust_files(&folder)
+                .iter()
+                .map(|file| {
+                    file.strip_prefix(root().join(&folder))
+                        .unwrap()
+                        .with_extension("")
+                })
+                .map(|module| {
+                    module
+                        .to_str()
+                        .unwrap()
+                        .replace("/mod", "")
+                        .replace('/', "::")
+                        + "::"
+                })
+                .collect();
+            for filter in named.split(' ').filter(|filter| filter.ends_with("::")) {
+                filters += 1;
+                let is_there = modules.iter().any(|module| module.contains(filter));
+                assert!(is_there, "{command}: no module {filter}");
+            }
+        }
+    }
+    assert!(filters > 10, "{filters} filters");
 }
 
 /// A target that CI does not run breaks unseen. Functions that no step calls do not count.
