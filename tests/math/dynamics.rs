@@ -17,18 +17,6 @@ use serde_json::Value;
 /// Half the distance from 1 to the next number: the relative error of one rounding.
 const ROUND_OFF: f64 = f64::EPSILON / 2.0;
 
-/// Runs a check that is generic in the number of links for 1 to 6 of them.
-macro_rules! for_one_to_six_links {
-    ($check:ident) => {
-        $check::<1>();
-        $check::<2>();
-        $check::<3>();
-        $check::<4>();
-        $check::<5>();
-        $check::<6>();
-    };
-}
-
 /// One stored case: an arm in motion, and what is known about it.
 struct Case<const N: usize> {
     arm: Arm<N>,
@@ -101,7 +89,7 @@ fn read<const N: usize>(text: &str) -> Vec<Case<N>> {
 
 fn cases<const N: usize>() -> Vec<Case<N>> {
     let cases = read(include_str!("../data/dynamics.json"));
-    assert!(cases.len() >= 38, "only {} cases of {N} links", cases.len());
+    assert!(cases.len() >= 46, "only {} cases of {N} links", cases.len());
     cases
 }
 
@@ -138,7 +126,8 @@ fn every_term_of_the_equation_of_motion_agrees_with_the_stored_values() {
             );
         }
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 /// Digits lost: the logarithm of the relative error of the acceleration vector over one rounding.
@@ -160,7 +149,8 @@ fn forward_dynamics_lose_at_most_a_digit_and_a_half_on_any_stored_arm() {
             assert!(lost <= 1.5, "{}: {lost:.2} digits lost", case.stored["id"]);
         }
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 /// Measured: 1.17. Bent, stretched, nearly stretched (1e-6 rad) and folded, with an outermost link of up to 1e9 kg on links of 1 kg. A mass matrix in
@@ -177,8 +167,6 @@ fn forward_dynamics_lose_at_most_a_digit_and_a_half_with_a_heavy_tip() {
     }
     check::<2>();
     check::<3>();
-    check::<4>();
-    check::<6>();
 }
 
 /// An ordinary arm in ordinary motion, and efforts.
@@ -310,7 +298,8 @@ fn the_terms_are_those_of_the_lagrangian() {
             Ok(())
         });
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 /// Both ways to the accelerations belong to the same effort; apart they may be by what an ill-conditioned M hides.
@@ -332,7 +321,8 @@ fn the_line_of_the_book_and_the_recursion_agree() {
             )
         });
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 /// The first angle only sets the direction of gravity relative to the arm.
@@ -354,7 +344,8 @@ fn without_gravity_the_first_angle_changes_no_bit() {
             Ok(())
         });
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 #[test]
@@ -368,7 +359,8 @@ fn leaving_out_the_first_angle_changes_no_bit() {
             Ok(())
         });
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }
 
 /// Any parameter that an arm may have and any finite state: non-finite results are allowed, panics are not.
@@ -390,5 +382,6 @@ fn extreme_but_valid_input_never_panics() {
             Ok(())
         });
     }
-    for_one_to_six_links!(check);
+    check::<2>();
+    check::<3>();
 }

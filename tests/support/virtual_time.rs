@@ -20,7 +20,7 @@ use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, DuplexStream, duplex};
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::{Instant, sleep};
 
 /// Longer than anything in here waits.
 const LONG: Duration = Duration::from_secs(7 * 24 * 3600);
@@ -87,25 +87,10 @@ impl Peer {
         self.send_bytes(text.as_bytes()).await;
     }
 
-    /// Shuts down the writing side.
-    pub async fn half_close(&mut self) {
-        self.finish().await;
-    }
-
     /// Takes what comes up to the end of the stream.
     pub async fn drain(&mut self) {
         let mut bytes = Vec::new();
         let _ = self.stream().read_to_end(&mut bytes).await;
-    }
-
-    /// Takes just this many bytes out of the pipe.
-    pub async fn take(&mut self, bytes: usize) {
-        let mut buffer = vec![0; bytes];
-        let reading = self.stream().read_exact(&mut buffer);
-        timeout(LONG, reading)
-            .await
-            .expect("they come")
-            .expect("an open pipe");
     }
 
     pub async fn subscribe(&mut self, topic: &str) {
@@ -130,13 +115,6 @@ impl Peer {
 
     pub async fn call(&mut self, service: &str, id: u64) {
         self.send(json!({"op": "call_service", "service": service, "id": id}))
-            .await;
-    }
-
-    /// Answers a call that this client has received as a provider.
-    pub async fn answer(&mut self, call: &Value, values: Value) {
-        let (service, id) = (&call["service"], &call["id"]);
-        self.send(json!({"op": "service_response", "service": service, "id": id, "values": values, "result": true}))
             .await;
     }
 }

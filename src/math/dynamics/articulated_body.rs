@@ -29,7 +29,7 @@
 //! acceleration of the base. Without gravity nothing depends on the first joint angle, and
 //! [`super::weightless_dynamics`] omits its sine and cosine.
 //!
-//! On the stored arms of 1 to 6 links, masses 1e-9 to 1e9 and lengths 1e-6 to 1e6, at most one digit is lost, and 1.2
+//! On the stored arms of 2 and 3 links, masses 1e-9 to 1e9 and lengths 1e-6 to 1e6, at most one digit is lost, and 1.2
 //! with a heavy tip (`tests/math/`). Known limit: masses *and* lengths that both differ by many powers of ten, such as
 //! 1e7 kg in 0.1 mm at the end of 500 km of links of a gram. There the last joint may lose eight digits.
 //!

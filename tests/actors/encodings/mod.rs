@@ -5,7 +5,6 @@
 mod long_frames;
 mod losses;
 mod order;
-mod sizes;
 
 use std::time::Duration;
 

@@ -95,7 +95,7 @@ fn what_a_throttle_holds_back_holds_up_no_other_message_and_no_end() {
         }
         assert!(began.elapsed() < Duration::from_secs(1));
         publish_long(&mut publisher, "/t").await;
-        subscriber.half_close().await;
+        subscriber.finish().await;
         subscriber.rest().await;
         assert!(began.elapsed() < Duration::from_secs(2));
     });
