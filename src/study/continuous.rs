@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** a step whose result is not finite changes nothing.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
-)]
-
 use super::control_loop::ControlLoop;
 use crate::math::arm::State;
 use crate::math::dynamics::forward_dynamics;

@@ -6,11 +6,6 @@
 //!
 //! **Invariant:** for every arm and all gains the search ends in bounded time.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use super::control_loop::ControlLoop;

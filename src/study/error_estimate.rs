@@ -10,11 +10,6 @@
 //!
 //! **Invariant:** the simulation is not changed. An estimate costs one step of the method and two of Runge-Kutta 4.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::{Increment, Method};

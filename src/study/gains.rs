@@ -11,11 +11,6 @@
 //!
 //! **Invariant:** the work is bounded, and returned gains were simulated.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::control_loop::ControlLoop;

@@ -16,11 +16,6 @@
 //!
 //! **Invariant:** for every arm and all gains the linearisation takes bounded time.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements, or over the joints of a matrix of their number"
-)]
-
 use super::control_loop::ControlLoop;
 pub use super::control_loop::no_control;
 pub(crate) use super::equilibrium::gravity_gradient;

@@ -18,6 +18,11 @@
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N of arrays and matrices of that size, as they do in the formulas"
+)]
+
 pub(crate) mod beside;
 pub mod clocks;
 pub mod continuous;

@@ -27,11 +27,6 @@
 //!
 //! [`max_rotation_per_step`]: crate::math::integrator::Method::max_rotation_per_step
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 use std::ops::RangeInclusive;
 

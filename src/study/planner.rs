@@ -180,7 +180,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         let control = control.with_method(method);
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);
-        let least = ceiling(truth.whole / most * (1.0 - count::ROUNDING));
+        let least = count::whole((truth.whole / most * (1.0 - count::ROUNDING)).ceil());
         // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
         let affordable = cheapest.map_or(u64::MAX, |least| {
@@ -279,7 +279,7 @@ impl<const N: usize> Truth<N> {
         } = task;
         let (count, whole) = if is_sampled(&control) {
             let period = control.period.period;
-            (ceiling((duration / period).round()).max(1), period)
+            (count::whole((duration / period).round()).max(1), period)
         } else {
             (1, duration)
         };
@@ -358,7 +358,11 @@ impl<const N: usize> Truth<N> {
 
 /// Number of comparisons of truths per whole \[s\], for `count` wholes.
 fn spans(whole: f64, count: u64) -> u64 {
-    ceiling((whole / LONGEST_SPAN).max(FEWEST_SPANS / in_f64(count)))
+    count::whole(
+        (whole / LONGEST_SPAN)
+            .max(FEWEST_SPANS / in_f64(count))
+            .ceil(),
+    )
 }
 
 /// Whether the control period is given.
@@ -373,14 +377,4 @@ fn known(uncertainty: f64) -> String {
     } else {
         "the motion itself cannot be computed this accurately over this duration".to_owned()
     }
-}
-
-/// The smallest integer that is at least `x`.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count of steps; a cast saturates"
-)]
-fn ceiling(x: f64) -> u64 {
-    x.ceil() as u64
 }

@@ -14,11 +14,6 @@
 //!
 //! **Invariant:** the work is bounded: [`cells`] poses, and at most one climb from each.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "digits are taken modulo the grid's own length, cells below their number"
-)]
-
 use crate::math::count::length_in_f64;
 use std::f64::consts::{PI, TAU};
 

@@ -19,11 +19,6 @@
 //! **Invariant:** the result is the end of the stable interval that begins at zero. Stable intervals beyond it are
 //! ignored.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over the states of matrices that are made for them"
-)]
-
 pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{
     ADVISED_PART, Limits, Rest, limit_held, limits, most_bytes, search_limits,

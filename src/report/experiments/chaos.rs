@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** every run starts at a stated state and uses the live arm's stepper.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};

@@ -6,11 +6,6 @@
 //!
 //! **Invariant:** every solver gets the same states.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 use std::f64::consts::PI;
 
 use super::reference::{DoubleDouble, exact_acceleration, largest_difference};

@@ -11,11 +11,6 @@
 //!
 //! **Invariant:** no prediction enters a measurement but the equilibrium and a value to start the search from.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
-)]
-
 use std::fmt;
 
 use crate::math::arm::{Arm, State};

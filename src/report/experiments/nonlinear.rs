@@ -9,14 +9,10 @@
 //!
 //! **Invariant:** no prediction enters a measurement.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over two joints and the four states of a 2-link arm"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};
+use crate::math::count::{in_f64, whole};
 use crate::math::dynamics::{energy, potential_energy};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
@@ -93,15 +89,6 @@ pub struct PeriodicSwing {
 const STRIDE: f64 = 0.02;
 const NEAR: f64 = 0.05;
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bounded below by 1 and above by 1000"
-)]
-fn strides(amplitude: f64) -> u32 {
-    (amplitude / STRIDE).ceil().clamp(1.0, 1000.0) as u32
-}
-
 /// Steps to the hanging pose while a swing is looked for.
 const FINE: f64 = 1e-3;
 
@@ -110,12 +97,12 @@ impl PeriodicSwing {
     /// amplitude; none where it can't be continued so far.
     #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
-        let strides = strides(amplitude);
+        let strides = (amplitude / STRIDE).ceil().clamp(1.0, 1000.0);
         // The slow mode of two equal rods: q₂ per q₁.
         let (mut before, mut ratio) = (0.44, 0.44);
         let mut swing = None;
-        for stride in 1..=strides {
-            let reached = amplitude * f64::from(stride) / f64::from(strides);
+        for stride in 1..=whole(strides) {
+            let reached = amplitude * in_f64(stride) / strides;
             let found = Self::near(reached, reached * (2.0 * ratio - before))?;
             (before, ratio) = (ratio, found.start.position[1] / reached);
             swing = Some(found);

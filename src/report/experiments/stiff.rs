@@ -15,11 +15,6 @@
 //!
 //! **Invariant:** every evaluation is counted, those for Jacobians too.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over the four states of arrays of that length"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use super::task::{Task, TaskRun};

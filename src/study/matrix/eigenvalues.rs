@@ -5,11 +5,6 @@
 //!
 //! **Invariant:** the iteration ends; an eigenvalue that does not converge is NaN.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
-)]
-
 use std::ops::RangeInclusive;
 
 use super::complex::Complex;

@@ -5,11 +5,6 @@
 //! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
 //! comparison treats as unstable.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
-)]
-
 mod complex;
 mod eigenvalues;
 

@@ -12,11 +12,6 @@
 //!
 //! **Invariant:** the request bounds the steps, samples and work of a run.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 mod request;
 
 pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
@@ -27,7 +22,7 @@ use super::matrix::largest;
 use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, whole};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::Pid;
@@ -155,16 +150,11 @@ pub async fn rollout<const N: usize>(
 
 /// Steps per call: one if references evaluate the law in every step. Otherwise at most [`MAX_SPAN`] of them, so that
 /// the spans of a reference and the pieces stay short.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bounded below by 1 and above by 1000"
-)]
 fn stride<const N: usize>(request: &RolloutRequest<N>) -> u64 {
     if request.reference && !request.control.is_free() {
         1
     } else {
-        (MAX_SPAN / request.control.timestep).clamp(1.0, 1000.0) as u64
+        whole(MAX_SPAN / request.control.timestep).clamp(1, 1000)
     }
 }
 
@@ -211,26 +201,21 @@ impl<const N: usize> Rollout<N> {
 const LONGEST_STEP: f64 = 2.5e-4;
 
 /// Most of its steps per step of the run. With longer steps of the run the error is reported as unknown.
-const MOST_STEPS: u32 = 256;
+const MOST_STEPS: u64 = 256;
 
 /// The loop with a continuous-time law. Its timestep divides that of the run.
 struct Ideal<const N: usize> {
     /// `None` once it has diverged.
     run: Option<ContinuousLoop<N>>,
-    parts: u32,
+    parts: u64,
 }
 
 impl<const N: usize> Ideal<N> {
     /// The loop from `start` on, with steps divided by `cuts`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a cast to an integer saturates, and the result is bounded"
-    )]
-    fn new(control: &ControlLoop<N>, start: State<N>, cuts: u32) -> Self {
-        let parts = (control.timestep / LONGEST_STEP).ceil() as u32;
+    fn new(control: &ControlLoop<N>, start: State<N>, cuts: u64) -> Self {
+        let parts = whole((control.timestep / LONGEST_STEP).ceil());
         let parts = parts.clamp(1, MOST_STEPS) * cuts;
-        let timestep = control.timestep / f64::from(parts);
+        let timestep = control.timestep / in_f64(parts);
         let control = control.with_method(Method::Rk4).with_timestep(timestep);
         Self {
             run: Some(ContinuousLoop::new(control, start, [0.0; N])),
@@ -240,7 +225,7 @@ impl<const N: usize> Ideal<N> {
 
     /// Follows the run by this number of its steps.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
-        for _ in 0..steps * u64::from(self.parts) {
+        for _ in 0..steps * self.parts {
             self.run.take_if(|run| !run.step());
             if self.run.is_none() {
                 return;

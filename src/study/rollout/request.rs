@@ -3,7 +3,7 @@
 //! **Invariant:** an accepted request has a bounded number of steps and samples, and only finite numbers.
 
 use crate::math::arm::State;
-use crate::math::count::{in_f64, steps_in};
+use crate::math::count::{in_f64, steps_in, whole};
 use crate::math::pid::Gains;
 use crate::math::shown::{Shown, shown_against};
 use crate::study::control_loop::ControlLoop;
@@ -76,11 +76,6 @@ impl<const N: usize> RolloutRequest<N> {
     ///
     /// # Errors
     /// The first value that is out of bounds.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the quotient is checked to lie between 1 and MAX_STEPS"
-    )]
     pub fn steps(&self) -> Result<u64, RolloutError> {
         let ControlLoop {
             gains: Gains { kp, ki, kd },
@@ -129,6 +124,6 @@ impl<const N: usize> RolloutRequest<N> {
             let samples = self.samples;
             return Err(RolloutError::Samples { samples });
         }
-        Ok(steps as u64)
+        Ok(whole(steps))
     }
 }

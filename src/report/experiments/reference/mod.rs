@@ -8,11 +8,6 @@
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 mod double_double;
 
 pub use double_double::DoubleDouble;

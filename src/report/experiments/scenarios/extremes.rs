@@ -3,11 +3,6 @@
 //! **Invariant:** values that no arm can have are refused by name. A run with accepted values stays finite, or the
 //! scene falls short.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices name the joints of arrays of that length"
-)]
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{

@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** a limit is predicted before it is measured, and both are shown.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices name the joints of arrays of that length"
-)]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::support::{

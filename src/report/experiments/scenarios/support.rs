@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** a seed in the source gives what is random, so a scene does the same every time.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
