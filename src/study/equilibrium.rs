@@ -89,8 +89,9 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     };
     let mut integral = [0.0; N];
     let mut balanced = false;
-    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones.
-    for _ in 0..=N {
+    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones, so there are
+    // at most N + 1.
+    loop {
         let (sag, leaves) = descent.settle();
         balanced |= leaves;
         let load = descent.gradient(&sag);
@@ -117,13 +118,6 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
                 balanced,
             };
         }
-    }
-    Equilibrium {
-        position: setpoint.position,
-        integral,
-        integrating: [false; N],
-        residual: f64::INFINITY,
-        balanced,
     }
 }
 

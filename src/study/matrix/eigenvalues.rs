@@ -7,8 +7,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::complex::Complex;
-use super::{Matrix, largest};
+use super::{Complex, Matrix, largest};
 use crate::math::elementary::{exp2, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.

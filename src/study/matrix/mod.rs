@@ -5,12 +5,11 @@
 //! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
 //! comparison treats as unstable.
 
-mod complex;
 mod eigenvalues;
 
-pub use complex::Complex;
-
 use std::ops::{Index, IndexMut};
+
+use crate::math::elementary::hypot;
 
 /// A real square matrix, indexed by `(row, column)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +153,27 @@ impl Matrix {
     #[must_use]
     pub fn spectral_radius(&self) -> f64 {
         largest(self.eigenvalues().into_iter().map(Complex::modulus))
+    }
+}
+
+/// A complex number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Complex {
+    /// Real part.
+    pub re: f64,
+    /// Imaginary part.
+    pub im: f64,
+}
+
+impl Complex {
+    const fn real(re: f64) -> Self {
+        Self { re, im: 0.0 }
+    }
+
+    /// Modulus, without intermediate overflow.
+    #[must_use]
+    pub fn modulus(self) -> f64 {
+        hypot(self.re, self.im)
     }
 }
 

@@ -10,11 +10,7 @@
 //! the one growing direction. Two references may be close by chance, but four hardly ever are. The truth is therefore
 //! within `SPREAD` times the largest distance between any two of them.
 //!
-//! **Invariant:** the request bounds the steps, samples and work of a run.
-
-mod request;
-
-pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
+//! **Invariant:** an accepted request has only finite numbers, and bounds the steps, samples and work of its run.
 
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
@@ -22,11 +18,125 @@ use super::matrix::largest;
 use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
-use crate::math::count::{in_f64, whole};
+use crate::math::count::{in_f64, steps_in, whole};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
-use crate::math::pid::Pid;
+use crate::math::pid::{Gains, Pid};
+use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::{Divergence, Held, Hold, Simulation};
+
+/// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
+pub const MAX_STEPS: u64 = 10_000_000;
+
+/// Most samples of one run, some 30 MB of JSON.
+pub const MAX_SAMPLES: u64 = 100_000;
+
+/// The request for a run: its loop, its start, its length and its samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RolloutRequest<const N: usize> {
+    /// The loop of the run.
+    pub control: ControlLoop<N>,
+    /// The arm's state at the start.
+    pub start: State<N>,
+    /// Duration \[s\]; the run has the nearest number of steps.
+    pub duration: f64,
+    /// The number of samples, with start and end; fewer if the run has fewer steps.
+    pub samples: u64,
+    /// Whether to compute a reference too.
+    pub reference: bool,
+}
+
+/// Why a request is rejected. The field names are those of the request.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RolloutError {
+    /// A number that is NaN or infinite, a negative gain, or a time that is not positive.
+    #[error("{field} must be {bound}, got {}", Shown(*.value))]
+    OutOfBounds {
+        /// `q0`, `qdot0`, `duration`, `timestep`, `kp`, `ki`, `kd` or `setpoint`.
+        field: &'static str,
+        /// `finite`, `at least 0` or `greater than 0`.
+        bound: &'static str,
+        /// The given value.
+        value: f64,
+    },
+    /// Less than one step.
+    #[error(
+        "duration must be at least the timestep {}, got {}",
+        shown_against(*.timestep, *.duration),
+        shown_against(*.duration, *.timestep)
+    )]
+    TooShort {
+        /// The given time \[s\].
+        duration: f64,
+        /// The given time \[s\].
+        timestep: f64,
+    },
+    /// More steps than [`MAX_STEPS`].
+    #[error(
+        "duration / timestep must be at most {MAX_STEPS:e} steps, got {}",
+        shown_against(*.0, in_f64(MAX_STEPS))
+    )]
+    TooManySteps(f64),
+    /// Fewer than 2 samples, or more than [`MAX_SAMPLES`].
+    #[error("samples must be between 2 and {MAX_SAMPLES}, got {0}")]
+    Samples(u64),
+}
+
+impl<const N: usize> RolloutRequest<N> {
+    /// The number of steps that is nearest to the duration.
+    ///
+    /// # Errors
+    /// The first value that is out of bounds.
+    pub fn steps(&self) -> Result<u64, RolloutError> {
+        let ControlLoop {
+            gains: Gains { kp, ki, kd },
+            setpoint,
+            timestep,
+            ..
+        } = self.control;
+        let fields: [(&'static str, &[f64]); 9] = [
+            ("q0", &self.start.position),
+            ("qdot0", &self.start.velocity),
+            ("duration", &[self.duration]),
+            ("timestep", &[timestep]),
+            ("kp", &kp),
+            ("ki", &ki),
+            ("kd", &kd),
+            ("setpoint", &setpoint.position),
+            ("setpoint", &setpoint.velocity),
+        ];
+        for (field, values) in fields {
+            let is_gain = field.starts_with('k');
+            let is_time = field == "duration" || field == "timestep";
+            for &value in values {
+                let bound = match value {
+                    value if !value.is_finite() => "finite",
+                    value if is_gain && value < 0.0 => "at least 0",
+                    value if is_time && value <= 0.0 => "greater than 0",
+                    _ => continue,
+                };
+                return Err(RolloutError::OutOfBounds {
+                    field,
+                    bound,
+                    value,
+                });
+            }
+        }
+        let duration = self.duration;
+        let steps = steps_in(duration, timestep);
+        if steps < 1.0 {
+            return Err(RolloutError::TooShort { duration, timestep });
+        }
+        let steps = steps.round();
+        if steps > in_f64(MAX_STEPS) {
+            return Err(RolloutError::TooManySteps(steps));
+        }
+        if !(2..=MAX_SAMPLES).contains(&self.samples) {
+            return Err(RolloutError::Samples(self.samples));
+        }
+        Ok(whole(steps))
+    }
+}
 
 /// Longest span of one call of a reference without control \[s\].
 const MAX_SPAN: f64 = 0.05;
