@@ -56,7 +56,6 @@ pub struct LiveRun {
 }
 
 /// All scenes, in order.
-#[must_use]
 pub fn live_scenes() -> Vec<LiveScene> {
     let rows = MODULE.split_once("SCENES = [");
     let rows = rows.and_then(|(_, rest)| rest.split_once("\n];"));
@@ -67,7 +66,6 @@ pub fn live_scenes() -> Vec<LiveScene> {
 
 impl LiveScene {
     /// Duration of the picture \[s\]; 0 for a scene without one.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         number(&self.watch["seconds"], 0.0)
     }

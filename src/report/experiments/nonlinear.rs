@@ -34,7 +34,6 @@ pub const ENERGY_FACTOR: f64 = 2.0;
 
 /// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default
 /// gains.
-#[must_use]
 pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> {
     let setpoint = Setpoint::at([amplitude, -0.75 * amplitude]);
     ControlLoop::new(Arm::default(), Gains::default(), setpoint)
@@ -43,7 +42,6 @@ pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> 
 }
 
 /// Whether a move arrives and is there at its end.
-#[must_use]
 pub fn arrives(control: &ControlLoop<2>) -> bool {
     let mut live = control.simulation(State::rest());
     while live.time() < MOVE && live.step() {}
@@ -52,7 +50,6 @@ pub fn arrives(control: &ControlLoop<2>) -> bool {
 }
 
 /// A free swing of a 2-link arm from the horizontal, turning at `spin` \[rad/s\].
-#[must_use]
 pub fn spun(spin: f64) -> State<2> {
     State {
         position: [0.0, 0.5],
@@ -61,7 +58,6 @@ pub fn spun(spin: f64) -> State<2> {
 }
 
 /// Whether a free swing keeps its energy above that of the hanging arm to a factor of [`ENERGY_FACTOR`] for [`SWING`].
-#[must_use]
 pub fn is_carried(control: &ControlLoop<2>, start: State<2>) -> bool {
     let arm = &control.arm;
     let lowest = potential_energy(arm, &[-FRAC_PI_2, 0.0]);
@@ -95,7 +91,6 @@ const FINE: f64 = 1e-3;
 impl PeriodicSwing {
     /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest, continued from the one of small
     /// amplitude; none where it can't be continued so far.
-    #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
         let strides = (amplitude / STRIDE).ceil().clamp(1.0, 1000.0);
         // The slow mode of two equal rods: q₂ per q₁.
@@ -142,7 +137,6 @@ impl PeriodicSwing {
     /// The Floquet multipliers of a method that takes `steps` steps to a period.
     ///
     /// The method's derivative is taken along the true swing, which is followed with far smaller steps.
-    #[must_use]
     pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
         /// Steps of the swing in one of the method's, and a deviation.
         const WITHIN: u32 = 32;
@@ -162,7 +156,6 @@ impl PeriodicSwing {
     }
 
     /// The larger modulus of the pair that is not 1 of the true swing: the two farthest from 1.
-    #[must_use]
     pub fn transverse(&self, method: Method, steps: u32) -> f64 {
         let mut multipliers = self.multipliers(method, steps);
         let from_one = |mu: &Complex| (mu.re - 1.0).hypot(mu.im);

@@ -65,7 +65,6 @@ impl Solver {
     ];
 
     /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Explicit(method) => method.name(),
@@ -75,7 +74,6 @@ impl Solver {
     }
 
     /// Whether it is a baseline of the report.
-    #[must_use]
     pub const fn is_baseline(self) -> bool {
         !matches!(self, Self::Explicit(_))
     }
@@ -109,7 +107,6 @@ const START: State<2> = State {
 
 impl StiffScene {
     /// The scene whose elbow is about so many times as fast as its swing.
-    #[must_use]
     pub fn new(by: By, stiffness: f64) -> Self {
         let hanging = [-FRAC_PI_2, 0.0];
         let even = Arm::<2>::default();
@@ -167,7 +164,6 @@ impl StiffScene {
     }
 
     /// The fewest steps that the linearised loop allows an explicit method where it hangs; none for a baseline.
-    #[must_use]
     pub fn fewest_stable_steps(&self, solver: Solver) -> Option<f64> {
         let Solver::Explicit(method) = solver else {
             return None;

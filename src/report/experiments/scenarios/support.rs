@@ -34,7 +34,6 @@ pub(super) type Named = (&'static str, Check);
 
 impl Scenario {
     /// Runs the scene.
-    #[must_use]
     pub fn run(&self) -> Observation {
         (self.check)()
     }
