@@ -5,9 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::support::{
-    Named, Noise, Observation, apart, arm, each, fastest, free, held, is_near, verdict,
-};
+use super::{Check, Noise, Observation, apart, arm, each, fastest, free, held, is_near};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::forward_dynamics;
@@ -25,7 +23,7 @@ use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 use crate::study::taylor::TaylorReference;
 
 /// The checks of S27 to S39.
-pub(super) const CHECKS: [Named; 13] = [
+pub(super) const CHECKS: [(&str, Check); 13] = [
     ("S27", gravity),
     ("S28", tiny_steps),
     ("S29", huge_steps),
@@ -81,18 +79,18 @@ fn gravity() -> Observation {
     each([
         (is_scaled, errors),
         ((fallen - 1.0).abs() < 1e-6, falls),
-        (refused.holds, refused.observed),
+        refused,
     ])
 }
 
 fn tiny_steps() -> Observation {
     let Some((error, made)) = error(9.81, [0.3 - FRAC_PI_2, 0.0], 1e-6, 10.0) else {
-        return verdict(false, "not run");
+        return (false, "not run".to_owned());
     };
     let end = made.times.last().copied().unwrap_or(f64::NAN);
     let late = (end - 1e7 * 1e-6).abs();
     let steps = made.steps;
-    verdict(
+    (
         error < 1e-13 && late == 0.0,
         format!("error {error:.1e} rad, time off by {late:e} s after {steps} steps"),
     )
@@ -147,7 +145,7 @@ fn wound() -> Observation {
     // Both moved by as much; the wound one to the spacing of its doubles.
     other.position[0] = other.position[0] - angle + unwound;
     let after = apart(&one, &other);
-    verdict(
+    (
         at_once < 1e-13 && after < 1.5e-7,
         format!("accelerations apart by {at_once:.1e}, after 1 s states by {after:.1e}"),
     )
@@ -182,7 +180,7 @@ fn subnormal_start() -> Observation {
     // 1e-310 is 2e13 times the smallest double; a few hundred roundings of half of that.
     let off = (0..2).map(|i| (tiny.position[i] - 1e-10 * small.position[i]).abs() / 1e-310);
     let worst = largest(off);
-    verdict(
+    (
         tiny.is_finite() && worst < 1e-10,
         format!("apart by {worst:.1e} of the start"),
     )
@@ -190,7 +188,7 @@ fn subnormal_start() -> Observation {
 
 fn subnormal_inertia() -> Observation {
     let Ok(arm) = Arm::new([1e-160; 2], [1.0; 2], 9.81) else {
-        return verdict(false, "no such arm");
+        return (false, "no such arm".to_owned());
     };
     let mut simulation = free(arm, State::rest(), Method::Rk4, 0.001);
     let taken = simulation.advance(1000);
@@ -198,7 +196,7 @@ fn subnormal_inertia() -> Observation {
         || "goes on".to_owned(),
         |divergence| format!("refuses step {}", divergence.step),
     );
-    verdict(
+    (
         simulation.state().is_finite(),
         format!("takes {taken} steps and {end}"),
     )
@@ -209,7 +207,7 @@ fn refusal(arm: Result<Arm<2>, impl std::fmt::Display>, begins: &str) -> Observa
     let said = arm
         .err()
         .map_or_else(|| "taken".to_owned(), |error| error.to_string());
-    verdict(said.starts_with(begins), said)
+    (said.starts_with(begins), said)
 }
 
 fn refused() -> Observation {
@@ -225,10 +223,10 @@ fn refused() -> Observation {
     let gravity = values.iter().take(3);
     let gravity = gravity.map(|&bad| refusal(Arm::new([1.0; 2], [1.0; 2], bad), "gravity must be"));
     let all: Vec<_> = parts.chain(gravity).collect();
-    let named = all.iter().filter(|one| one.holds).count();
+    let named = all.iter().filter(|one| one.0).count();
     let count = all.len();
-    let first = all.first().map_or("", |one| one.observed.as_str());
-    verdict(
+    let first = all.first().map_or("", |one| one.1.as_str());
+    (
         named == count,
         format!("{named} of {count} by name, such as: {first}"),
     )
@@ -292,7 +290,7 @@ fn one_joint() -> Observation {
             }
         }
     }
-    verdict(
+    (
         off < 2e-15 && mismatches == 0 && close < 10,
         format!("steps apart by {off:.1e}; {mismatches} of 80 000 verdicts differ"),
     )
@@ -335,7 +333,7 @@ fn changes() -> Observation {
     };
     let slope = (error(500) / error(1000)).log2();
     let bits = if kept { "kept" } else { "lost" };
-    verdict(
+    (
         kept && (slope - 2.0).abs() < 0.2,
         format!("bits {bits}; slope of the mixed swing {slope:.2}"),
     )
