@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::fit::{centres, edges, worst};
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::report::experiments::measure::{
@@ -393,7 +393,7 @@ fn control_period(section: &mut Section) {
 }
 
 impl Growth {
-    fn panel(&mut self, method: Method, dots: u32) -> Plot {
+    fn panel(&mut self, method: Method, dots: usize) -> Plot {
         let control = stiffened(1.0).with_method(method);
         let linear = Linear::at_setpoint(&control);
         let x = Axis::log("control period", Unit::Seconds, PERIODS);
@@ -407,7 +407,7 @@ impl Growth {
                 let stepping = Stepping::held(&linear, method, substeps, false);
                 stepping.matrix(period).spectral_radius()
             };
-            let curve = (0..=200).map(|index| along(index, 200));
+            let curve = edges(PERIODS, 200).into_iter();
             let curve = curve.map(|period| (period, predicted(substeps, period)));
             let key = Key::line(class, label).marked(marker);
             let is_shown = |growth: f64| growth <= GROWTH.1;
@@ -417,13 +417,14 @@ impl Growth {
             ));
             // The dots alternate along the curves, so that no mark hides another. They are denser where the curve
             // rises.
-            let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
+            let even = edges(PERIODS, 3 * dots).into_iter().skip(turn).step_by(3);
             let limit = Stepping::held(&linear, method, substeps, false).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
             let steep =
-                around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * f64::from(turn)));
+                around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * length_in_f64(turn)));
             let mut points = Vec::new();
             for period in even
+                .take(dots)
                 .chain(steep)
                 .filter(|period| is_shown(predicted(substeps, *period)))
             {
@@ -446,8 +447,4 @@ impl Growth {
         }
         plot
     }
-}
-
-fn along(index: u32, count: u32) -> f64 {
-    PERIODS.0 * (PERIODS.1 / PERIODS.0).powf(f64::from(index) / f64::from(count))
 }
