@@ -247,7 +247,8 @@ impl<const N: usize> Descent<'_, N> {
     }
 }
 
-fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; N] {
+/// The point at `length` times the way.
+pub(crate) fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; N] {
     std::array::from_fn(|i| from[i] + length * way[i])
 }
 

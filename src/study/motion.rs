@@ -101,7 +101,7 @@ impl Motion {
 }
 
 /// The potential energy of the hanging arm \[J\].
-fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
+pub(crate) fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
     let mut hanging = [0.0; N];
     if let Some(first) = hanging.first_mut() {
         *first = -FRAC_PI_2;

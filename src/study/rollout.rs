@@ -14,7 +14,7 @@
 
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
-use super::matrix::largest;
+use super::matrix::{largest, largest_difference};
 use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
@@ -287,13 +287,15 @@ impl<const N: usize> Rollout<N> {
         {
             let states = references.each_ref().map(|one| one.taylor.state());
             let spread = SPREAD * largest_distance(&states);
-            deviation.take(apart(state, states[0]), spread.max(last_digit));
+            let error = largest_difference(&state.position, &states[0].position);
+            deviation.take(error, spread.max(last_digit));
         }
         if let (Some(deviation), Some([first, second])) = (&mut self.from_ideal, ideals)
             && let (Some(first), Some(second)) = (&first.run, &second.run)
         {
-            let uncertainty = apart(&first.state, &second.state).max(last_digit);
-            deviation.take(apart(state, &second.state), uncertainty);
+            let [first, second] = [&first.state.position, &second.state.position];
+            let uncertainty = largest_difference(first, second).max(last_digit);
+            deviation.take(largest_difference(&state.position, second), uncertainty);
         }
     }
 
@@ -420,7 +422,9 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
 fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
     let pairs = states.iter().enumerate().flat_map(|(index, one)| {
         let others = &states[..index];
-        others.iter().map(|other| apart(one, other))
+        others
+            .iter()
+            .map(|other| largest_difference(&one.position, &other.position))
     });
     largest(pairs)
 }
@@ -429,9 +433,4 @@ fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
 fn last_digit<const N: usize>(state: &State<N>) -> f64 {
     let largest = largest(state.position.iter().map(|q| q.abs()));
     f64::EPSILON * largest.max(1.0)
-}
-
-/// Largest difference of a joint position \[rad\].
-fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
-    largest((0..N).map(|i| (a.position[i] - b.position[i]).abs()))
 }

@@ -13,12 +13,13 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, whole};
-use crate::math::dynamics::{energy, potential_energy};
+use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::state_after;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{Complex, Matrix};
+use crate::study::motion::lowest;
 
 /// Time of a move \[s\].
 const MOVE: f64 = 6.0;
@@ -60,7 +61,7 @@ pub fn spun(spin: f64) -> State<2> {
 /// Whether a free swing keeps its energy above that of the hanging arm to a factor of [`ENERGY_FACTOR`] for [`SWING`].
 pub fn is_carried(control: &ControlLoop<2>, start: State<2>) -> bool {
     let arm = &control.arm;
-    let lowest = potential_energy(arm, &[-FRAC_PI_2, 0.0]);
+    let lowest = lowest(arm);
     let first = energy(arm, &start) - lowest;
     let kept = first / ENERGY_FACTOR..=first * ENERGY_FACTOR;
     let mut live = control.simulation(start);

@@ -26,8 +26,8 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
-use crate::study::linear::{Linear, gravity_gradient};
-use crate::study::matrix::{Matrix, largest};
+use crate::study::linear::{Linear, gravity_gradient, moved};
+use crate::study::matrix::{Matrix, largest, largest_difference};
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// Simulated time of a run \[s\].
@@ -144,7 +144,7 @@ impl StiffScene {
         let differences = fine
             .iter()
             .zip(&other)
-            .map(|(one, other)| apart(one, other));
+            .map(|(one, other)| largest_difference(one, other));
         Self {
             control,
             ratio: brake * mobility / swing,
@@ -157,7 +157,7 @@ impl StiffScene {
                 distance: Box::new(move |done, steps, place| {
                     let output = usize::try_from(done * OUTPUTS / steps).unwrap_or(0);
                     fine.get(output.saturating_sub(1))
-                        .map_or(f64::NAN, |fine| apart(fine, place))
+                        .map_or(f64::NAN, |fine| largest_difference(fine, place))
                 }),
             },
         }
@@ -212,7 +212,7 @@ impl TaskRun for Implicit {
     fn advance(&mut self, steps: u64) -> u64 {
         for taken in 0..steps {
             let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
-            self.y = moved(&self.y, 1.0, &change);
+            self.y = moved(&self.y, &change, 1.0);
             if !self.y.iter().all(|y| y.is_finite()) {
                 return taken;
             }
@@ -260,10 +260,10 @@ impl Implicit {
         let (mut k, jacobian) = self.jacobian();
         let newton = jacobian.shifted_identity(-0.5 * h);
         for _ in 0..MAX_ITERATIONS {
-            let f = self.slope(&moved(&y, 0.5 * h, &k));
+            let f = self.slope(&moved(&y, &k, 0.5 * h));
             let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
             let change: Whole = newton.solve(&left)?.try_into().ok()?;
-            k = moved(&k, 1.0, &change);
+            k = moved(&k, &change, 1.0);
             if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
                 break;
             }
@@ -285,25 +285,12 @@ impl Implicit {
         };
         let k1 = stage(&start, &[0.0; 4])?;
         let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let f3 = self.slope(&moved(&y, 2.0, &k1));
+        let f3 = self.slope(&moved(&y, &k1, 2.0));
         let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
+        let ahead = moved(&moved(&y, &k1, 2.0), &k3, 1.0);
         let f4 = self.slope(&ahead);
         let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
         let k4 = stage(&f4, &others)?;
         Some(std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
     }
-}
-
-fn moved(y: &Whole, length: f64, way: &Whole) -> Whole {
-    std::array::from_fn(|i| y[i] + length * way[i])
-}
-
-/// Largest distance of a joint \[rad\].
-fn apart(one: &[f64], other: &[f64]) -> f64 {
-    largest(
-        one.iter()
-            .zip(other)
-            .map(|(one, other)| (one - other).abs()),
-    )
 }

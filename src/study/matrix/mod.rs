@@ -177,6 +177,15 @@ impl Complex {
     }
 }
 
+/// The largest difference of two entries in the same place; NaN if one is.
+pub(crate) fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
+    largest(
+        one.iter()
+            .zip(other)
+            .map(|(one, other)| (one - other).abs()),
+    )
+}
+
 /// The largest of `values`; NaN if one of them is.
 #[must_use]
 pub fn largest(values: impl Iterator<Item = f64>) -> f64 {

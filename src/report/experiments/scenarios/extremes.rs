@@ -16,7 +16,7 @@ use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::error_estimate::estimate_step;
 use crate::study::linear::Linear;
-use crate::study::matrix::largest;
+use crate::study::matrix::{largest, largest_difference};
 use crate::study::paused::at_once;
 use crate::study::rollout::{Rollout, RolloutRequest, rollout};
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
@@ -136,7 +136,7 @@ fn wound() -> Observation {
     let acceleration =
         |state: &State<2>| forward_dynamics(&arm, &state.position, &state.velocity, &[0.0; 2]);
     let (a, b) = (acceleration(&start), acceleration(&turned));
-    let at_once = largest((0..2).map(|i| (a[i] - b[i]).abs())) / largest(a.iter().map(|a| a.abs()));
+    let at_once = largest_difference(&a, &b) / largest(a.iter().map(|a| a.abs()));
     let [one, mut other] = [start, turned].map(|start| {
         let mut simulation = free(arm, start, Method::Rk4, 0.001);
         simulation.advance(1000);
@@ -380,7 +380,7 @@ fn step_doubling() -> Observation {
             let mut exact = TaylorReference::new(state);
             let is_followed = exact.follow(&arm, &effort, h);
             let exact = exact.state().position;
-            let error = largest((0..3).map(|i| (end.position[i] - exact[i]).abs()));
+            let error = largest_difference(&end.position, &exact);
             let estimate = estimate.filter(|_| is_followed);
             estimate.map_or(f64::NAN, |estimate| estimate.local_error / error)
         });

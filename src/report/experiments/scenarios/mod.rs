@@ -19,7 +19,7 @@ use crate::math::simulation::Simulation;
 use crate::report::experiments::conditioning::lost;
 use crate::report::experiments::reference::exact_acceleration;
 use crate::study::control_loop::ControlLoop;
-use crate::study::matrix::largest;
+use crate::study::matrix::{largest, largest_difference};
 
 /// A named scene.
 #[derive(Debug, Clone, Copy)]
@@ -104,9 +104,8 @@ fn free<const N: usize>(
 
 /// Largest difference of positions \[rad\] and velocities \[rad/s\].
 fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
-    let positions = (0..N).map(|i| (a.position[i] - b.position[i]).abs());
-    let velocities = (0..N).map(|i| (a.velocity[i] - b.velocity[i]).abs());
-    largest(positions.chain(velocities))
+    let [one, other] = [a, b].map(|it| [it.position, it.velocity]);
+    largest_difference(one.as_flattened(), other.as_flattened())
 }
 
 /// Speed of the fastest joint \[rad/s\].
