@@ -11,7 +11,6 @@ mod counts;
 mod goals;
 mod journal;
 mod limit;
-mod limit_watch;
 mod requests;
 mod scene;
 mod steps;
@@ -24,7 +23,7 @@ use bytes::Bytes;
 
 use self::counts::Telemetry;
 use self::goals::Goals;
-use self::limit_watch::LimitWatch;
+use self::limit::LimitWatch;
 use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;

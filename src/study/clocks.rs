@@ -30,7 +30,6 @@ pub struct ClockLimits {
 }
 
 /// Both limits at the equilibrium that belongs to the setpoint. Takes 1 to 2 ms of one core (optimised build).
-#[must_use]
 pub fn clock_limits<const N: usize>(control: &ControlLoop<N>) -> ClockLimits {
     let linear = Linear::at_setpoint(control);
     let period = Stepping::held(&linear, Method::Rk4, EXACT, control.period.delay).limit();

@@ -26,7 +26,6 @@ pub struct ContinuousLoop<const N: usize> {
 
 impl<const N: usize> ContinuousLoop<N> {
     /// The loop in `state`, with an `integral` \[rad s\].
-    #[must_use]
     pub fn new(control: ControlLoop<N>, state: State<N>, integral: [f64; N]) -> Self {
         Self {
             control,
@@ -38,7 +37,6 @@ impl<const N: usize> ContinuousLoop<N> {
     }
 
     /// Steps taken.
-    #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }

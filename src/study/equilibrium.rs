@@ -57,7 +57,6 @@ pub struct Equilibrium<const N: usize> {
 /// Joints that integrate stay at the setpoint. The others descend the potential `V = U + ½ kp (q - q*)² - c q` by
 /// Newton steps, and leave every saddle. The result is therefore a pose in which the arm would rest. An integral that
 /// would have to exceed its limit counts as a constant effort at the limit.
-#[must_use]
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let ControlLoop {
         arm,

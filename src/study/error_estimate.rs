@@ -28,7 +28,6 @@ pub struct ErrorEstimate {
 }
 
 /// The error of the next step of a simulation; `None` if that step is not finite, or if the simulation has diverged.
-#[must_use]
 pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstimate> {
     if simulation.divergence().is_some() {
         return None;
@@ -44,7 +43,6 @@ pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstim
 }
 
 /// The error of a step of `h` \[s\] from `state` under the constant `effort` \[N m\]; `None` if it is not finite.
-#[must_use]
 pub fn estimate_step<const N: usize>(
     arm: &Arm<N>,
     state: &State<N>,

@@ -111,7 +111,6 @@ pub enum GainsError {
 }
 
 /// The most memory that [`search_gains`] takes, in bytes.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     limits::most_bytes::<N>()
 }

@@ -50,7 +50,6 @@ pub struct Motion {
 
 impl Motion {
     /// The coming motion of an arm in this state, under this loop.
-    #[must_use]
     pub fn ahead<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> Self {
         let ControlLoop {
             arm,

@@ -135,7 +135,6 @@ impl Fineness {
 }
 
 /// The most memory of [`plan`], in bytes: a run, its truth, and a search for limits.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
 }

@@ -163,7 +163,6 @@ const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
     /// The largest error \[rad\]; `None` if it is not clearly larger than the distance between the references.
-    #[must_use]
     pub fn known(&self) -> Option<f64> {
         (self.error >= ABOVE_UNCERTAINTY * self.uncertainty).then_some(self.error)
     }
@@ -202,7 +201,6 @@ pub struct Rollout<const N: usize> {
 }
 
 /// The most memory of [`rollout`] without its samples, in bytes.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     size_of::<[Reference<N>; REFERENCES]>() + size_of::<[Ideal<N>; 2]>()
 }
@@ -301,7 +299,6 @@ impl<const N: usize> Rollout<N> {
 
     /// The largest error of a deviation of this run and its uncertainty \[rad\], if they are known for all samples. An
     /// error over some of the samples is not comparable with that of another run.
-    #[must_use]
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
         let whole = deviation.filter(|deviation| deviation.samples == self.times.len());
         let uncertainty = whole.map(|deviation| deviation.uncertainty);

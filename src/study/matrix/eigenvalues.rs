@@ -16,7 +16,6 @@ const MAX_SWEEPS: usize = 60;
 impl Matrix {
     /// All eigenvalues, in no particular order; NaN for an eigenvalue that does not converge, and for every one if an
     /// entry is not finite.
-    #[must_use]
     pub fn eigenvalues(&self) -> Vec<Complex> {
         if !self.entries.iter().all(|entry| entry.is_finite()) {
             return vec![Complex::real(f64::NAN); self.n];

@@ -282,14 +282,12 @@ pub struct TaylorReference<const N: usize> {
 
 impl<const N: usize> TaylorReference<N> {
     /// The motion from the given state, computed to rounding.
-    #[must_use]
     pub fn new(state: State<N>) -> Self {
         Self::within(state, ROUNDING)
     }
 
     /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
     /// held between [`ROUNDING`] and 1.
-    #[must_use]
     pub fn within(state: State<N>, tolerance: f64) -> Self {
         let tolerance = if tolerance > ROUNDING {
             tolerance.min(1.0)
@@ -311,13 +309,11 @@ impl<const N: usize> TaylorReference<N> {
     }
 
     /// The arm's state.
-    #[must_use]
     pub fn state(&self) -> &State<N> {
         &self.state
     }
 
     /// Number of series coefficients so far. Each costs about as much as an evaluation of the dynamics.
-    #[must_use]
     pub fn coefficients(&self) -> u64 {
         self.taylor.coefficients
     }
