@@ -76,7 +76,7 @@ fn a_planned_swing_keeps_within_its_error() {
         // A step a half longer is too long.
         let longer = Candidate {
             timestep: task.duration / (task.duration / (1.5 * best.timestep)).ceil(),
-            ..*best
+            ..best
         };
         assert!(error_of(&task, &Law::FREE, &longer) > error, "{planned:?}");
     }
