@@ -1,8 +1,6 @@
 //! The two clocks of a sampled loop: the largest stable control period, and the largest stable timestep.
 //!
-//! The largest stable *control period* is a property of controller and arm. Between two runs of the law the arm moves
-//! exactly, so a real robot would show the same limit. The largest stable *timestep* at a control period is a property
-//! of the simulation: of its method, and of how many steps it takes in a period.
+//! The limit of the period belongs to controller and arm, that of the timestep to the simulation (`docs/study.md`).
 //!
 //! **Invariant:** if the law runs in every step, the timestep limit is that of [`limit_held`].
 

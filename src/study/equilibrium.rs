@@ -52,11 +52,8 @@ pub struct Equilibrium<const N: usize> {
 }
 
 /// The equilibrium that the arm reaches from the setpoint. It is the setpoint itself if every joint has an integral,
-/// and the sagging pose otherwise. A free arm hangs.
-///
-/// Joints that integrate stay at the setpoint. The others descend the potential `V = U + ½ kp (q - q*)² - c q` by
-/// Newton steps, and leave every saddle. The result is therefore a pose in which the arm would rest. An integral that
-/// would have to exceed its limit counts as a constant effort at the limit.
+/// and the sagging pose otherwise. A free arm hangs. An integral that would have to exceed its limit counts as a
+/// constant effort at the limit.
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let ControlLoop {
         arm,

@@ -2,8 +2,7 @@
 //!
 //! The run is the live loop, [`Simulation`], from any state. Its reference has the same control law, evaluated at the
 //! same instants and held for the same period. In between it follows the arm to rounding ([`TaylorReference`]). The
-//! difference is therefore the error of the method alone. Against a continuous-time law ([`Rollout::from_ideal`]) a
-//! held effort causes an error of first order in the control period, which no method can reduce.
+//! difference is therefore the error of the method alone. [`Rollout::from_ideal`] has the error of the held effort too.
 //!
 //! Three more references estimate the uncertainty of the first. Their arms differ in the last digits, and one of them
 //! takes steps half as long. On a chaotic swing the reference is usable for some twenty seconds. All errors are along

@@ -5,13 +5,13 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Check, Noise, Observation, apart, arm, each, fastest, free, held, is_near};
+use super::{Check, Noise, Observation, apart, arm, each, fastest, free, gains, held, is_near};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::{Method, increment};
 use crate::math::pid::Gains;
-use crate::math::simulation::{Simulation, state_after};
+use crate::math::simulation::state_after;
 use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::error_estimate::estimate_step;
@@ -165,15 +165,12 @@ fn huge_setpoints() -> Observation {
 }
 
 fn subnormal_start() -> Observation {
-    let gains = Gains {
-        kp: [100.0; 2],
-        ki: [0.0; 2],
-        kd: [10.0; 2],
+    let control = ControlLoop {
+        arm: arm([1.0; 2], 0.0),
+        ..held(gains(100.0, 0.0, [10.0; 2]), [0.0; 2])
     };
     let [tiny, small] = [1e-310, 1e-300].map(|off: f64| {
-        let mut live = Simulation::new(arm([1.0; 2], 0.0), gains);
-        live.set_state(State::at_rest([off, 0.0]));
-        live.enable(true);
+        let mut live = control.simulation(State::at_rest([off, 0.0]));
         live.advance(200);
         *live.state()
     });

@@ -5,13 +5,14 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::{
-    Check, Observation, apart, arm, digits_lost, each, fastest, free, held, is_near, states,
+    Check, Observation, apart, arm, digits_lost, each, fastest, free, gains, held, is_near, states,
 };
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::state_after;
+use crate::report::experiments::error::REACH_GAINS as MODERATE;
 use crate::report::experiments::measure::{
     LimitPair, boundary, growth, in_substeps, live_at, short,
 };
@@ -187,17 +188,6 @@ fn chaotic<const N: usize>(expected: f64) -> Observation {
 // ---- S07 to S15: the controller ------------------------------------------------------------------------------------
 
 const POSE: [f64; 2] = [0.5, 0.8];
-
-const MODERATE: Gains<2> = Gains {
-    kp: [200.0, 100.0],
-    ki: [0.0; 2],
-    kd: [30.0, 12.0],
-};
-
-fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
-    let (kp, ki) = ([kp; 2], [ki; 2]);
-    Gains { kp, ki, kd }
-}
 
 /// Whether prediction and measurement agree to 1 % for all methods, and the limits of Runge-Kutta 4, held and
 /// continuous, in words.
@@ -429,7 +419,7 @@ fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> Obser
 fn light_outer_link(mass: f64) -> Observation {
     let control = ControlLoop {
         arm: arm([1.0, mass], 9.81),
-        ..held(MODERATE, [0.5, 0.8])
+        ..held(MODERATE, POSE)
     };
     let limit = LimitPair::of_timestep(&control, Sampling::Held);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.

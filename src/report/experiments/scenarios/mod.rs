@@ -81,6 +81,12 @@ fn is_near(value: Option<f64>, expected: f64, part: f64) -> bool {
     value.is_some_and(|value| (value / expected - 1.0).abs() < part)
 }
 
+/// Gains of two joints, with the same springs and integrals.
+fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
+    let (kp, ki) = ([kp; 2], [ki; 2]);
+    Gains { kp, ki, kd }
+}
+
 /// Links of 1 m and 1 kg, held with these gains in this pose, by Runge-Kutta 4 at a millisecond.
 fn held<const N: usize>(gains: Gains<N>, pose: [f64; N]) -> ControlLoop<N> {
     ControlLoop::new(Arm::default(), gains, Setpoint::at(pose))
