@@ -18,8 +18,8 @@
 
 use super::control_loop::ControlLoop;
 pub use super::control_loop::no_control;
+pub(crate) use super::equilibrium::gravity_gradient;
 pub use super::equilibrium::{Equilibrium, equilibrium};
-pub(crate) use super::equilibrium::{gravity_gradient, moved};
 use super::matrix::Matrix;
 use crate::math::arm::Arm;
 use crate::math::dynamics::forward_dynamics;

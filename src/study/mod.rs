@@ -14,7 +14,7 @@ pub mod clocks;
 pub mod continuous;
 pub mod control_loop;
 mod critical;
-mod equilibrium;
+pub(crate) mod equilibrium;
 pub mod error_estimate;
 pub mod fewest;
 pub mod gains;

@@ -26,7 +26,8 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
-use crate::study::linear::{Linear, gravity_gradient, moved};
+use crate::study::equilibrium::moved;
+use crate::study::linear::{Linear, gravity_gradient};
 use crate::study::matrix::{Matrix, largest, largest_difference};
 use crate::study::stability::{Sampling, largest_timestep};
 

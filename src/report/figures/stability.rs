@@ -154,25 +154,17 @@ fn findings(section: &mut Section, rows: &[LimitRow]) {
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
 
-/// The empty map, whose legend has both kinds of control.
-fn map_plot() -> Plot {
-    let plot = Plot::new(
-        "All methods",
-        Axis::log("timestep", Unit::Seconds, TIMESTEPS),
-        Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
-    );
-    let held = Key::line("soft", "predicted, effort held for the step");
-    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
-    plot.with([held, continuous].map(Curve::named))
-}
-
 /// Decay or growth of a small deviation, by timestep and stiffness, with the predicted limit.
 fn map(section: &mut Section) {
     let columns = section.choose(48, 16);
     let timestep_edges = edges(TIMESTEPS, columns);
     let timesteps = centres(&timestep_edges);
     let factors = centres(&edges(FACTORS, columns * 3 / 4));
-    let mut plot = map_plot();
+    let x = Axis::log("timestep", Unit::Seconds, TIMESTEPS);
+    let y = Axis::log("stiffness, times the default gains", Unit::Number, FACTORS);
+    let held = Key::line("soft", "predicted, effort held for the step");
+    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
+    let mut plot = Plot::new("All methods", x, y).with([held, continuous].map(Curve::named));
     let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
     let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
     for (method, sampling) in all.into_iter().flatten() {
