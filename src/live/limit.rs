@@ -4,11 +4,11 @@
 //! ticks check it, only while a topic that shows it has subscribers. With the controller off the active loop is the
 //! free arm, without gains and setpoint.
 //!
-//! **Invariant:** limits and errors are only published. Nothing is refused or changed because of them. A limit is stored
-//! together with its loop.
+//! **Invariant:** limits and errors are only published. Nothing is refused or changed because of them.
 
 use std::time::Duration;
 
+use super::limit_watch::{resemble, share_limit};
 use super::{LiveArm, World};
 use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::ControlPeriod;
@@ -22,20 +22,6 @@ use crate::study::motion::Motion;
 /// Least time between two predictions for one arm with one set of gains. Each takes a millisecond of a worker, and
 /// thousands of setpoints may arrive per second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
-
-/// The last predicted limit, stored with its loop.
-#[derive(Default)]
-pub(super) struct LimitWatch<const N: usize> {
-    /// The loop of the last request, and its time.
-    pub(super) asked: Option<(ControlLoop<N>, Duration)>,
-    /// Whether the answer is still pending.
-    pub(super) waiting: bool,
-    /// The latest answer and its loop.
-    pub(super) known: Option<(ControlLoop<N>, ClockLimits)>,
-    /// The last published warnings: whether a timestep or a period was too long, and whether a goal waited for
-    /// the controller.
-    pub(super) warned: (bool, bool),
-}
 
 /// An exceeded limit.
 enum Exceeded {
@@ -210,17 +196,4 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
             predicted_limit: self.timestep_limit(),
         }
     }
-}
-
-/// Whether two loops have the same limit. It depends on everything except the timestep.
-fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.setpoint == other.setpoint && resemble(one, other)
-}
-
-/// Whether two loops differ at most in setpoint and timestep.
-fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.arm == other.arm
-        && one.gains == other.gains
-        && one.method == other.method
-        && one.period == other.period
 }

@@ -11,6 +11,7 @@ mod counts;
 mod goals;
 mod journal;
 mod limit;
+mod limit_watch;
 mod requests;
 mod scene;
 mod steps;
@@ -23,7 +24,7 @@ use bytes::Bytes;
 
 use self::counts::Telemetry;
 use self::goals::Goals;
-use self::limit::LimitWatch;
+use self::limit_watch::LimitWatch;
 use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;

@@ -5,7 +5,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::{Check, Noise, Observation, apart, arm, each, fastest, free, gains, held, is_near};
+use super::support::{
+    Check, Noise, Observation, apart, arm, each, fastest, free, gains, held, is_near,
+};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::forward_dynamics;

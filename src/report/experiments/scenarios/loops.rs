@@ -4,7 +4,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{
+use super::support::{
     Check, Observation, apart, arm, digits_lost, each, fastest, free, gains, held, is_near, states,
 };
 use crate::math::arm::{Arm, State};
