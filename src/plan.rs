@@ -120,21 +120,20 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
             one.error
         );
     }
-    if let Some(best) = planned.best() {
-        let period = if control.is_free() {
-            String::new()
-        } else {
-            format!(", control period {:.4e} s", best.timestep)
-        };
-        let _ = writeln!(
-            out,
-            "Plan: {} at a timestep of {:.4e} s{period}. The reference is known to {:.0e} m. Methods that are not \
-             listed cost more.",
-            best.method.name(),
-            best.timestep,
-            planned.uncertainty
-        );
-    }
+    let best = planned.best;
+    let period = if control.is_free() {
+        String::new()
+    } else {
+        format!(", control period {:.4e} s", best.timestep)
+    };
+    let _ = writeln!(
+        out,
+        "Plan: {} at a timestep of {:.4e} s{period}. The reference is known to {:.0e} m. Methods that are not \
+         listed cost more.",
+        best.method.name(),
+        best.timestep,
+        planned.uncertainty
+    );
     out
 }
 

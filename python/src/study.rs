@@ -335,7 +335,7 @@ fn listed_plan<'py>(
     planned: &Planned,
     period: Option<f64>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let best = planned.best().ok_or_else(|| refused("no plan was found"))?;
+    let best = &planned.best;
     let all = || planned.candidates.iter().rev();
     let found = PyDict::new(py);
     found.set_item("integrator", best.method.name())?;

@@ -1,6 +1,6 @@
-//! Counts as floating-point numbers.
+//! Counts as floating-point numbers, and back.
 //!
-//! **Invariant:** the conversion is exact for counts up to 2^53.
+//! **Invariant:** the conversions are exact for counts up to 2^53.
 
 /// A count as a double: exact up to 2^53, which no count here reaches.
 #[inline]
@@ -15,6 +15,18 @@ pub const fn in_f64(count: u64) -> f64 {
 #[must_use]
 pub const fn length_in_f64(length: usize) -> f64 {
     in_f64(length as u64)
+}
+
+/// The whole part of a number as a count: 0 below 1 and for NaN, `u64::MAX` where it is too large.
+#[inline]
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast to an integer saturates, and NaN becomes 0"
+)]
+pub const fn whole(number: f64) -> u64 {
+    number as u64
 }
 
 /// Bound on the relative rounding errors of a duration, such as 0.1 + 0.2, and of its quotient by a timestep.

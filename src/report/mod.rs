@@ -49,21 +49,11 @@ pub struct ReportOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The file of a kept section cannot be read.
-    #[error("cannot read {}: {error}; recompute it with --only NAME", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The fault.
-        error: io::Error,
-    },
+    #[error("cannot read {path}: {error}; recompute it with --only NAME", path = .0.display(), error = .1)]
+    Read(PathBuf, io::Error),
     /// A file or directory cannot be written.
-    #[error("cannot write {}: {error}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        error: io::Error,
-    },
+    #[error("cannot write {path}: {error}", path = .0.display(), error = .1)]
+    Write(PathBuf, io::Error),
 }
 
 /// The sections' names, in order.
@@ -78,10 +68,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
 pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     let machine = Machine::here();
     let kept = options.out.join("sections");
-    fs::create_dir_all(&kept).map_err(|error| ReportError::Write {
-        path: kept.clone(),
-        error,
-    })?;
+    fs::create_dir_all(&kept).map_err(|error| ReportError::Write(kept.clone(), error))?;
     let file = |maker: &Maker| kept.join(format!("{}.json", maker.name));
     let (makers, others): (Vec<_>, Vec<_>) = SECTIONS.iter().partition(|maker| {
         options.only.is_empty() || options.only.iter().any(|only| only == maker.name)
@@ -189,10 +176,7 @@ fn read(path: &Path) -> Result<Option<Section>, ReportError> {
     match fs::read_to_string(path).and_then(|text| Ok(serde_json::from_str(&text)?)) {
         Ok(section) => Ok(Some(section)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(ReportError::Read {
-            path: path.to_owned(),
-            error,
-        }),
+        Err(error) => Err(ReportError::Read(path.to_owned(), error)),
     }
 }
 
@@ -201,8 +185,5 @@ fn write(path: &Path, text: &str) -> Result<(), ReportError> {
     let beside = path.with_extension("part");
     fs::write(&beside, text)
         .and_then(|()| fs::rename(&beside, path))
-        .map_err(|error| ReportError::Write {
-            path: path.to_owned(),
-            error,
-        })
+        .map_err(|error| ReportError::Write(path.to_owned(), error))
 }

@@ -15,6 +15,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::math::arm::{Arm, State};
+use crate::math::count::whole;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ControlPeriod, DEFAULT_TIMESTEP};
@@ -55,7 +56,6 @@ pub struct LiveRun {
 }
 
 /// All scenes, in order.
-#[must_use]
 pub fn live_scenes() -> Vec<LiveScene> {
     let rows = MODULE.split_once("SCENES = [");
     let rows = rows.and_then(|(_, rest)| rest.split_once("\n];"));
@@ -66,7 +66,6 @@ pub fn live_scenes() -> Vec<LiveScene> {
 
 impl LiveScene {
     /// Duration of the picture \[s\]; 0 for a scene without one.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         number(&self.watch["seconds"], 0.0)
     }
@@ -120,11 +119,6 @@ impl LiveScene {
             }))
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a ratio of two positive times; a cast saturates"
-    )]
     fn run<const N: usize>(&self) -> Result<LiveRun, String>
     where
         Gains<N>: Default,
@@ -137,7 +131,7 @@ impl LiveScene {
             velocity: list(&self.velocity, [0.0; N]),
         };
         let mut simulation = control.simulation(start);
-        let steps = (self.seconds() / control.timestep).round() as u64;
+        let steps = whole((self.seconds() / control.timestep).round());
         let each = steps.div_ceil(SAMPLES).max(1);
         let mut watched = LiveRun {
             samples: vec![(0.0, vec![0.0; N])],

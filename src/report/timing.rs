@@ -9,6 +9,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use crate::math::count::whole;
+
 /// The least and the largest number of repeats, and their total time \[s\].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
@@ -42,17 +44,17 @@ pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
     // Short computations are repeated within one measurement, or the clock itself would be measured.
     const SHORTEST: f64 = 20e-6;
     let once = started.elapsed().as_secs_f64().max(1e-9);
-    let batch = batch_for(SHORTEST / once);
+    let batch = (SHORTEST / once).ceil().clamp(1.0, 1000.0);
     let mut times = Vec::with_capacity(effort.most);
     let started = Instant::now();
     while times.len() < effort.most
         && (times.len() < effort.least || started.elapsed().as_secs_f64() < effort.seconds)
     {
         let start = Instant::now();
-        for _ in 0..batch {
+        for _ in 0..whole(batch) {
             black_box(work());
         }
-        times.push(start.elapsed().as_secs_f64() / f64::from(batch));
+        times.push(start.elapsed().as_secs_f64() / batch);
     }
     times.sort_by(f64::total_cmp);
     let at = |quarter: usize| {
@@ -63,13 +65,4 @@ pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
         minimum: at(0),
         quartiles: (at(1), at(3)),
     }
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to small whole numbers first"
-)]
-fn batch_for(ratio: f64) -> u32 {
-    ratio.ceil().clamp(1.0, 1000.0) as u32
 }

@@ -1,8 +1,6 @@
 //! The two clocks of a sampled loop: the largest stable control period, and the largest stable timestep.
 //!
-//! The largest stable *control period* is a property of controller and arm. Between two runs of the law the arm moves
-//! exactly, so a real robot would show the same limit. The largest stable *timestep* at a control period is a property
-//! of the simulation: of its method, and of how many steps it takes in a period.
+//! The limit of the period belongs to controller and arm, that of the timestep to the simulation (`docs/study.md`).
 //!
 //! **Invariant:** if the law runs in every step, the timestep limit is that of [`limit_held`].
 
@@ -30,7 +28,6 @@ pub struct ClockLimits {
 }
 
 /// Both limits at the equilibrium that belongs to the setpoint. Takes 1 to 2 ms of one core (optimised build).
-#[must_use]
 pub fn clock_limits<const N: usize>(control: &ControlLoop<N>) -> ClockLimits {
     let linear = Linear::at_setpoint(control);
     let period = Stepping::held(&linear, Method::Rk4, EXACT, control.period.delay).limit();

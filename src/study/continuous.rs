@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** a step whose result is not finite changes nothing.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
-)]
-
 use super::control_loop::ControlLoop;
 use crate::math::arm::State;
 use crate::math::dynamics::forward_dynamics;
@@ -31,7 +26,6 @@ pub struct ContinuousLoop<const N: usize> {
 
 impl<const N: usize> ContinuousLoop<N> {
     /// The loop in `state`, with an `integral` \[rad s\].
-    #[must_use]
     pub fn new(control: ControlLoop<N>, state: State<N>, integral: [f64; N]) -> Self {
         Self {
             control,
@@ -43,7 +37,6 @@ impl<const N: usize> ContinuousLoop<N> {
     }
 
     /// Steps taken.
-    #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }

@@ -29,7 +29,6 @@ pub struct ControlLoop<const N: usize> {
 
 impl<const N: usize> ControlLoop<N> {
     /// The loop, stepped by Runge-Kutta 4 at [`DEFAULT_TIMESTEP`].
-    #[must_use]
     pub const fn new(arm: Arm<N>, gains: Gains<N>, setpoint: Setpoint<N>) -> Self {
         Self {
             arm,
@@ -45,13 +44,11 @@ impl<const N: usize> ControlLoop<N> {
     }
 
     /// A free arm.
-    #[must_use]
     pub fn free(arm: Arm<N>) -> Self {
         Self::new(arm, no_control(), Setpoint::default())
     }
 
     /// The loop of a simulation with its gains, even if the controller is off.
-    #[must_use]
     pub fn of(simulation: &Simulation<N>) -> Self {
         let pid = simulation.pid();
         Self {
@@ -65,7 +62,6 @@ impl<const N: usize> ControlLoop<N> {
     }
 
     /// The loop that is active in the next step of a simulation.
-    #[must_use]
     pub fn in_force(simulation: &Simulation<N>) -> Self {
         let set = Self::of(simulation);
         if simulation.pid().is_enabled() {
@@ -109,13 +105,11 @@ impl<const N: usize> ControlLoop<N> {
     }
 
     /// The joints that have an integral gain.
-    #[must_use]
     pub fn integrating(&self) -> [bool; N] {
         self.gains.ki.map(|ki| ki > 0.0)
     }
 
     /// The live simulation in the state `start`, with an integral of zero.
-    #[must_use]
     pub fn simulation(&self, start: State<N>) -> Simulation<N> {
         let mut simulation = Simulation::new(self.arm, self.gains);
         simulation.set_method(self.method);
@@ -129,7 +123,6 @@ impl<const N: usize> ControlLoop<N> {
 }
 
 /// Gains that are all zero: a free arm.
-#[must_use]
 pub const fn no_control<const N: usize>() -> Gains<N> {
     Gains {
         kp: [0.0; N],

@@ -6,11 +6,6 @@
 //!
 //! **Invariant:** for every arm and all gains the search ends in bounded time.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use super::control_loop::ControlLoop;
@@ -57,12 +52,8 @@ pub struct Equilibrium<const N: usize> {
 }
 
 /// The equilibrium that the arm reaches from the setpoint. It is the setpoint itself if every joint has an integral,
-/// and the sagging pose otherwise. A free arm hangs.
-///
-/// Joints that integrate stay at the setpoint. The others descend the potential `V = U + ½ kp (q - q*)² - c q` by
-/// Newton steps, and leave every saddle. The result is therefore a pose in which the arm would rest. An integral that
-/// would have to exceed its limit counts as a constant effort at the limit.
-#[must_use]
+/// and the sagging pose otherwise. A free arm hangs. An integral that would have to exceed its limit counts as a
+/// constant effort at the limit.
 pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     let ControlLoop {
         arm,
@@ -94,8 +85,9 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
     };
     let mut integral = [0.0; N];
     let mut balanced = false;
-    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones.
-    for _ in 0..=N {
+    // Every pass but the last finds a saturated integral and removes its joint from the integrating ones, so there are
+    // at most N + 1.
+    loop {
         let (sag, leaves) = descent.settle();
         balanced |= leaves;
         let load = descent.gradient(&sag);
@@ -122,13 +114,6 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
                 balanced,
             };
         }
-    }
-    Equilibrium {
-        position: setpoint.position,
-        integral,
-        integrating: [false; N],
-        residual: f64::INFINITY,
-        balanced,
     }
 }
 
@@ -258,7 +243,8 @@ impl<const N: usize> Descent<'_, N> {
     }
 }
 
-fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; N] {
+/// The point at `length` times the way.
+pub(crate) fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64) -> [f64; N] {
     std::array::from_fn(|i| from[i] + length * way[i])
 }
 

@@ -10,11 +10,6 @@
 //!
 //! **Invariant:** the simulation is not changed. An estimate costs one step of the method and two of Runge-Kutta 4.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::{Increment, Method};
@@ -33,7 +28,6 @@ pub struct ErrorEstimate {
 }
 
 /// The error of the next step of a simulation; `None` if that step is not finite, or if the simulation has diverged.
-#[must_use]
 pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstimate> {
     if simulation.divergence().is_some() {
         return None;
@@ -49,7 +43,6 @@ pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstim
 }
 
 /// The error of a step of `h` \[s\] from `state` under the constant `effort` \[N m\]; `None` if it is not finite.
-#[must_use]
 pub fn estimate_step<const N: usize>(
     arm: &Arm<N>,
     state: &State<N>,

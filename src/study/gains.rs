@@ -11,11 +11,6 @@
 //!
 //! **Invariant:** the work is bounded, and returned gains were simulated.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::control_loop::ControlLoop;
@@ -97,11 +92,8 @@ pub struct SuggestedGains<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GainsError {
     /// More steps than [`MAX_STEPS`].
-    #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {}", shown_against(*.steps, MAX_STEPS))]
-    TooManySteps {
-        /// The given number of steps.
-        steps: f64,
-    },
+    #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {}", shown_against(*.0, MAX_STEPS))]
+    TooManySteps(f64),
     /// No gains meet both demands: slow loops settle too late, and fast loops lack the stability margin.
     #[error(
         "settling_time: no gains found that settle within {} s and leave a margin of {} at the timestep {} s; allow \
@@ -119,7 +111,6 @@ pub enum GainsError {
 }
 
 /// The most memory that [`search_gains`] takes, in bytes.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     limits::most_bytes::<N>()
 }
@@ -139,7 +130,7 @@ pub async fn search_gains<const N: usize>(
     let timestep = control.timestep;
     let steps = settling_time / timestep;
     if steps > MAX_STEPS {
-        return Err(GainsError::TooManySteps { steps });
+        return Err(GainsError::TooManySteps(steps));
     }
     control.setpoint = Setpoint::default();
     for shape in SHAPES {

@@ -97,7 +97,6 @@ pub struct Limits<const N: usize> {
 impl<const N: usize> Limits<N> {
     /// The advised timestep for a motion \[s\]: [`ADVISED_PART`] of the limit of poses and motion; `None` if there is
     /// no limit.
-    #[must_use]
     pub fn advised_for(&self, motion: &Motion) -> Option<f64> {
         let carried = ADVISED_PART * motion.timestep;
         let carried = Some(carried).filter(|timestep| timestep.is_finite());
@@ -109,20 +108,17 @@ impl<const N: usize> Limits<N> {
 
     /// A reliable value of the smallest limit over all poses, effort held over the step \[s\]. It is `minimum_held` if
     /// that is certified or there is no bound, else the bound.
-    #[must_use]
     pub fn trusted(&self) -> Option<f64> {
         self.bound.filter(|_| !self.certified).or(self.minimum_held)
     }
 }
 
 /// All limits of a loop. Takes some 15 ms of one core for two links, 0.3 s for three (optimised build).
-#[must_use]
 pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
     at_once(search_limits(*control))
 }
 
 /// The most memory that [`search_limits`] takes, in bytes.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     Proof::<N>::MOST_BYTES + poses::most_bytes::<N>()
 }
@@ -242,7 +238,6 @@ fn is_near(bound: Option<f64>, least: Option<f64>) -> bool {
 
 /// The limit [`Limits::held`] alone, for the live arm at its present setpoint. Takes 0.5 ms of one core for two links,
 /// 1 ms for three (optimised build).
-#[must_use]
 pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
     let linear = Linear::at_setpoint(control);
     match largest_timestep(&linear, control.method, Sampling::Held) {

@@ -16,11 +16,6 @@
 //!
 //! **Invariant:** for every arm and all gains the linearisation takes bounded time.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements, or over the joints of a matrix of their number"
-)]
-
 use super::control_loop::ControlLoop;
 pub use super::control_loop::no_control;
 pub(crate) use super::equilibrium::gravity_gradient;
@@ -46,7 +41,6 @@ pub struct Linear {
 
 impl Linear {
     /// The loop at `position`, as if it were an equilibrium. `integrating` marks the joints whose integral is active.
-    #[must_use]
     pub fn at<const N: usize>(
         control: &ControlLoop<N>,
         position: &[f64; N],
@@ -79,20 +73,17 @@ impl Linear {
     }
 
     /// The loop at the equilibrium that belongs to a setpoint.
-    #[must_use]
     pub fn at_setpoint<const N: usize>(control: &ControlLoop<N>) -> Self {
         let rest = equilibrium(control);
         Self::at(control, &rest.position, &rest.integrating)
     }
 
     /// The loop at any pose, with every integral active.
-    #[must_use]
     pub fn at_pose<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Self {
         Self::at(control, position, &control.integrating())
     }
 
     /// One joint of unit inertia: `v̇ = -stiffness x + u`, `u = -kp x - kd v + ki s`.
-    #[must_use]
     pub fn oscillator(stiffness: f64, kp: f64, ki: f64, kd: f64) -> Self {
         Self {
             gravity: Matrix::from_fn(1, |_, _| stiffness),
@@ -111,19 +102,16 @@ impl Linear {
     }
 
     /// Number of joints.
-    #[must_use]
     pub fn joints(&self) -> usize {
         self.gravity.size()
     }
 
     /// Number of states: positions, velocities, active integrals.
-    #[must_use]
     pub fn states(&self) -> usize {
         2 * self.joints() + self.integrals.len()
     }
 
     /// The matrix `A` of `ẋ = A x` with the law in continuous time; `x` holds positions, velocities, integrals.
-    #[must_use]
     pub fn flow(&self) -> Matrix {
         self.closed(&self.plant(), 0.0)
     }
@@ -152,7 +140,6 @@ impl Linear {
     }
 
     /// The matrix of the arm alone under constant efforts: `x` holds positions, velocities, efforts \[N m\].
-    #[must_use]
     pub fn plant(&self) -> Matrix {
         let n = self.joints();
         let mut plant = Matrix::zeros(3 * n);

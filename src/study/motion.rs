@@ -27,11 +27,6 @@
 //!
 //! [`max_rotation_per_step`]: crate::math::integrator::Method::max_rotation_per_step
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 use std::ops::RangeInclusive;
 
@@ -55,7 +50,6 @@ pub struct Motion {
 
 impl Motion {
     /// The coming motion of an arm in this state, under this loop.
-    #[must_use]
     pub fn ahead<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> Self {
         let ControlLoop {
             arm,
@@ -106,7 +100,7 @@ impl Motion {
 }
 
 /// The potential energy of the hanging arm \[J\].
-fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
+pub(crate) fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
     let mut hanging = [0.0; N];
     if let Some(first) = hanging.first_mut() {
         *first = -FRAC_PI_2;

@@ -79,6 +79,8 @@ pub struct Candidate {
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
+    /// The cheapest run.
+    pub best: Candidate,
     /// The runs that were within the error, the cheapest last. Methods without a candidate are more expensive, or
     /// exceed the error.
     pub candidates: Vec<Candidate>,
@@ -86,51 +88,32 @@ pub struct Planned {
     pub uncertainty: f64,
 }
 
-impl Planned {
-    /// The cheapest run.
-    #[must_use]
-    pub fn best(&self) -> Option<&Candidate> {
-        self.candidates.last()
-    }
-}
-
 /// Why there is no plan.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// A duration that is too long.
-    #[error("duration must be at most {MAX_DURATION} s, got {}", shown_against(*.duration, MAX_DURATION))]
-    TooLong {
-        /// The given duration \[s\].
-        duration: f64,
-    },
-    /// The motion amplifies rounding beyond the allowed error, or changes too fast to be computed.
-    #[error("error must be larger or duration shorter: {}", known(*.uncertainty))]
-    Unknown {
-        /// Distance between two truths \[m\]; infinite if there are no two.
-        uncertainty: f64,
-    },
-    /// No method stays within the error.
-    #[error("error must be larger: no method stays within {} m in {MAX_STEPS} steps", Shown(*.error))]
-    NotFound {
-        /// The given error \[m\].
-        error: f64,
-    },
+    /// A duration that is too long \[s\].
+    #[error("duration must be at most {MAX_DURATION} s, got {}", shown_against(*.0, MAX_DURATION))]
+    TooLong(f64),
+    /// The motion amplifies rounding beyond the allowed error, or changes too fast to be computed. The distance between
+    /// two truths \[m\]; infinite if there are no two.
+    #[error("error must be larger or duration shorter: {}", known(*.0))]
+    Unknown(f64),
+    /// No method stays within the given error \[m\].
+    #[error("error must be larger: no method stays within {} m in {MAX_STEPS} steps", Shown(*.0))]
+    NotFound(f64),
     /// Nothing was simulated, since the loop is unstable at every timestep.
     #[error(
         "gains or control_period must be changed: the loop is unstable at every timestep, at the setpoint or in a pose \
          on the way (/study/stability returns the pose), so nothing was simulated"
     )]
     Unstable,
-    /// Nothing was simulated, since the largest stable timestep is too small.
+    /// Nothing was simulated, since the longest timestep that is stable with any method is too small \[s\].
     #[error(
         "duration must be shorter: at the largest stable timestep, {} s, it takes more than {MAX_STEPS} steps, so \
          nothing was simulated",
-        Shown(*.timestep)
+        Shown(*.0)
     )]
-    TooManySteps {
-        /// The longest timestep that is stable with any method \[s\].
-        timestep: f64,
-    },
+    TooManySteps(f64),
 }
 
 /// The resolution of a truth.
@@ -152,7 +135,6 @@ impl Fineness {
 }
 
 /// The most memory of [`plan`], in bytes: a run, its truth, and a search for limits.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
 }
@@ -169,7 +151,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         ..
     } = task;
     if duration.is_nan() || duration > MAX_DURATION {
-        return Err(PlanError::TooLong { duration });
+        return Err(PlanError::TooLong(duration));
     }
     let truth = Truth::known_to(PART_OF_TRUTH * error, task).await?;
     let uncertainty = truth.uncertainty;
@@ -180,7 +162,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         let control = control.with_method(method);
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);
-        let least = ceiling(truth.whole / most * (1.0 - count::ROUNDING));
+        let least = count::whole((truth.whole / most * (1.0 - count::ROUNDING)).ceil());
         // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
         let affordable = cheapest.map_or(u64::MAX, |least| {
@@ -197,18 +179,18 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         has_run |= trials.has_run;
         candidates.extend(trials.best);
     }
-    if candidates.is_empty() {
+    candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
+    let Some(&best) = candidates.last() else {
         return Err(if has_run {
-            PlanError::NotFound { error }
+            PlanError::NotFound(error)
         } else if longest_stable > 0.0 {
-            let timestep = longest_stable;
-            PlanError::TooManySteps { timestep }
+            PlanError::TooManySteps(longest_stable)
         } else {
             PlanError::Unstable
         });
-    }
-    candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
+    };
     Ok(Planned {
+        best,
         candidates,
         uncertainty,
     })
@@ -279,7 +261,7 @@ impl<const N: usize> Truth<N> {
         } = task;
         let (count, whole) = if is_sampled(&control) {
             let period = control.period.period;
-            (ceiling((duration / period).round()).max(1), period)
+            (count::whole((duration / period).round()).max(1), period)
         } else {
             (1, duration)
         };
@@ -318,8 +300,7 @@ impl<const N: usize> Truth<N> {
                 return Ok(truth);
             }
             if !can_be_finer {
-                let uncertainty = truth.uncertainty;
-                return Err(PlanError::Unknown { uncertainty });
+                return Err(PlanError::Unknown(truth.uncertainty));
             }
         }
     }
@@ -358,7 +339,11 @@ impl<const N: usize> Truth<N> {
 
 /// Number of comparisons of truths per whole \[s\], for `count` wholes.
 fn spans(whole: f64, count: u64) -> u64 {
-    ceiling((whole / LONGEST_SPAN).max(FEWEST_SPANS / in_f64(count)))
+    count::whole(
+        (whole / LONGEST_SPAN)
+            .max(FEWEST_SPANS / in_f64(count))
+            .ceil(),
+    )
 }
 
 /// Whether the control period is given.
@@ -373,14 +358,4 @@ fn known(uncertainty: f64) -> String {
     } else {
         "the motion itself cannot be computed this accurately over this duration".to_owned()
     }
-}
-
-/// The smallest integer that is at least `x`.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count of steps; a cast saturates"
-)]
-fn ceiling(x: f64) -> u64 {
-    x.ceil() as u64
 }

@@ -14,11 +14,6 @@
 //!
 //! **Invariant:** the work is bounded: [`cells`] poses, and at most one climb from each.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "digits are taken modulo the grid's own length, cells below their number"
-)]
-
 use crate::math::count::length_in_f64;
 use std::f64::consts::{PI, TAU};
 
@@ -29,9 +24,6 @@ use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 
 /// Angles of the first joint for the gravity load, among them hanging and upright.
 const DIRECTIONS: usize = 8;
-
-/// Most poses of the outer joints, whatever the number of links.
-const MAX_POSES: usize = 1024;
 
 /// Parts of the smallest limit so far. A pose that is stable at all of them needs no search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
@@ -105,7 +97,7 @@ pub(super) async fn smallest_of_all_poses<const N: usize>(
 
 /// The most memory of a search \[bytes\]: the cells, and the list of cells from which the climbs start.
 pub(super) const fn most_bytes<const N: usize>() -> usize {
-    2 * MAX_POSES * size_of::<(PoseCandidate<N>, f64)>()
+    2 * cells::<N>() * size_of::<(PoseCandidate<N>, f64)>()
 }
 
 struct PoseSearch<const N: usize> {
@@ -298,25 +290,20 @@ fn summits<const N: usize>(cells: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandida
         .collect()
 }
 
-/// Number of poses of the outer joints: all of the grid, or the most allowed beyond three links.
-fn cells<const N: usize>() -> (usize, usize) {
-    let half = grid::<N>() / 2 + 1;
-    let outer = u32::try_from(N.saturating_sub(2)).unwrap_or(u32::MAX);
-    let all = if N < 2 {
-        1
-    } else {
-        half.saturating_mul(grid::<N>().saturating_pow(outer))
-    };
-    (all, all.min(MAX_POSES))
+/// Number of poses of the outer joints.
+const fn cells<const N: usize>() -> usize {
+    let (mut cells, mut joint) = (grid::<N>() / 2 + 1, 2);
+    while joint < N {
+        (cells, joint) = (cells * grid::<N>(), joint + 1);
+    }
+    cells
 }
 
 /// One of the poses of the outer joints, the first joint at zero; `None` beyond the last. By mirror symmetry about the
 /// vertical the second joint needs only half of its circle.
 fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
-    let (all, taken) = cells::<N>();
     let half = grid::<N>() / 2 + 1;
-    // Beyond three links the grid is thinned evenly.
-    let mut index = (index < taken).then(|| index.saturating_mul(all / taken))?;
+    let mut index = Some(index).filter(|index| *index < cells::<N>())?;
     Some(std::array::from_fn(|joint| match joint {
         0 => 0.0,
         1 => {

@@ -36,11 +36,6 @@
 //! **Invariant:** the bound holds whenever the search ends, under gravity if the estimate holds. The number of boxes is
 //! bounded.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements"
-)]
-
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -19,11 +19,6 @@
 //! **Invariant:** the result is the end of the stable interval that begins at zero. Stable intervals beyond it are
 //! ignored.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over the states of matrices that are made for them"
-)]
-
 pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{
     ADVISED_PART, Limits, Rest, limit_held, limits, most_bytes, search_limits,
@@ -75,13 +70,11 @@ impl Sampling {
 }
 
 /// The largest stable timestep of a linear loop \[s\]: see [`Limits`] for `None` and zero.
-#[must_use]
 pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> Option<f64> {
     Stepping::new(linear, method, sampling).limit()
 }
 
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
-#[must_use]
 pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {
     Stepping::new(linear, method, sampling).matrix(h)
 }
@@ -159,7 +152,6 @@ impl<'a> Stepping<'a> {
 
     /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as with a bus
     /// or a slow controller. A late law has no integral.
-    #[must_use]
     pub fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
         Self {
             substeps: substeps.max(1),
@@ -169,13 +161,11 @@ impl<'a> Stepping<'a> {
     }
 
     /// The largest stable period \[s\]: see [`Limits`] for `None` and zero.
-    #[must_use]
     pub fn limit(&self) -> Option<f64> {
         self.search(&Modes::of(self.linear))
     }
 
     /// The matrix by which one period \[s\] changes a deviation; states as in [`Linear::flow`].
-    #[must_use]
     pub fn matrix(&self, period: f64) -> Matrix {
         self.generator(period).shifted_identity(period)
     }

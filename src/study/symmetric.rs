@@ -4,11 +4,6 @@
 //!
 //! **Invariant:** the sweeps are bounded; infinities and NaN are passed on.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of N×N matrices, as they do in the formulas"
-)]
-
 use crate::math::elementary::hypot;
 
 /// A symmetric matrix, row by row.

@@ -152,7 +152,7 @@ fn the_plans_of_the_study_are_runs() {
         ),
     ] {
         let planned = plan(task).unwrap();
-        let best = planned.best().unwrap();
+        let best = planned.best;
         assert_eq!(best.method, method, "{planned:?}");
         assert!(
             (printed(STUDY, before) / best.timestep - 1.0).abs() < 5e-3,

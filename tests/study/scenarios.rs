@@ -7,18 +7,14 @@ fn check(scenes: impl Iterator<Item = Scenario>) {
     let mut failed = vec![];
     for scene in scenes {
         let begun = std::time::Instant::now();
-        let verdict = scene.run();
-        let mark = if verdict.holds {
-            "holds"
-        } else {
-            "FALLS SHORT"
-        };
+        let (holds, observed) = scene.run();
+        let mark = if holds { "holds" } else { "FALLS SHORT" };
         let line = format!(
             "{} {mark}: {} (expected: {})",
-            scene.id, verdict.observed, scene.expected
+            scene.id, observed, scene.expected
         );
         println!("{line} [{:.2?}]", begun.elapsed());
-        if !verdict.holds {
+        if !holds {
             failed.push(line);
         }
     }

@@ -18,8 +18,8 @@ use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
 use crate::services::study::Computed;
 pub use crate::services::study::{
-    NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
-    RunOffline, SuggestGains, Suggested,
+    PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline, SuggestGains,
+    Suggested,
 };
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;

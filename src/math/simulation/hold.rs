@@ -9,7 +9,7 @@
 //! **Invariant:** with a period of one step and no delay the law runs in every step, with the timestep as its `dt`.
 
 use crate::math::arm::State;
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, whole};
 use crate::math::pid::{Control, Pid};
 
 /// Most steps of a control period. Whole numbers up to it are exact as `f64`, and this number of steps takes years.
@@ -28,13 +28,7 @@ impl ControlPeriod {
     /// The number of steps of `timestep` \[s\] in it, at least 1.
     #[must_use]
     pub fn steps(&self, timestep: f64) -> u64 {
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a cast to an integer saturates, and NaN becomes 0"
-        )]
-        let steps = (self.period / timestep).round() as u64;
-        steps.clamp(1, MOST_STEPS)
+        whole((self.period / timestep).round()).clamp(1, MOST_STEPS)
     }
 
     /// Its length in whole steps of `timestep` \[s\].

@@ -45,7 +45,6 @@ pub struct Budget {
 
 impl Budget {
     /// The free swing, or with `control` the reach with its effort held for each step.
-    #[must_use]
     pub fn new(control: bool, duration: f64) -> Self {
         let control = if control {
             ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT)
@@ -61,7 +60,6 @@ impl Budget {
     }
 
     /// The parts for each of `methods` at one timestep. The motion under the held effort is the same for all of them.
-    #[must_use]
     pub fn parts(&self, methods: &[Method], steps: u64) -> Vec<Parts> {
         let (arm, start) = (&self.control.arm, State::rest());
         let timestep = self.duration / in_f64(steps);

@@ -2,11 +2,6 @@
 //!
 //! **Invariant:** every run starts at a stated state and uses the live arm's stepper.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};
@@ -20,7 +15,6 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::taylor::series::{differences, sums};
 
 /// Energy drift over the energy scale, largest so far, at step counts that grow by a constant factor: `(time, drift)`.
-#[must_use]
 pub fn energy_drift<const N: usize>(
     arm: &Arm<N>,
     start: &State<N>,
@@ -36,7 +30,6 @@ pub fn energy_drift<const N: usize>(
 }
 
 /// The same for implicit midpoint, a baseline of this report: it is symplectic, since it steps angles and momenta.
-#[must_use]
 pub fn symplectic_drift<const N: usize>(
     arm: &Arm<N>,
     start: &State<N>,

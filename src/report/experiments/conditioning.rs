@@ -6,11 +6,6 @@
 //!
 //! **Invariant:** every solver gets the same states.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 use std::f64::consts::PI;
 
 use super::reference::{DoubleDouble, exact_acceleration, largest_difference};
@@ -42,7 +37,6 @@ pub struct Lost {
 }
 
 /// Digits lost by a 3-link arm of unit lengths whose last link weighs `ratio` times the others, over `count` states.
-#[must_use]
 pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
     let arm = Arm::<3>::new([1.0; 3], [1.0, 1.0, ratio], 9.81).ok()?;
     // A fixed seed makes the report reproducible.

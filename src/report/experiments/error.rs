@@ -62,7 +62,6 @@ pub struct Scene {
 }
 
 /// All scenes, in the order in which they are shown.
-#[must_use]
 pub fn scenes() -> Vec<Scene> {
     let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap_or_default();
     let whirling = State {

@@ -11,11 +11,6 @@
 //!
 //! **Invariant:** no prediction enters a measurement but the equilibrium and a value to start the search from.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
-)]
-
 use std::fmt;
 
 use crate::math::arm::{Arm, State};
@@ -67,7 +62,6 @@ pub struct LimitPair {
 
 impl LimitPair {
     /// Of the timestep, with the law held for a step or in every stage.
-    #[must_use]
     pub fn of_timestep<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Self {
         let linear = Linear::at_setpoint(control);
         let predicted = largest_timestep(&linear, control.method, sampling);
@@ -77,7 +71,6 @@ impl LimitPair {
     }
 
     /// Of the control period, with `substeps` steps of the method in each; `delay`: every effort acts one period late.
-    #[must_use]
     pub fn of_period<const N: usize>(control: &ControlLoop<N>, substeps: u32, delay: bool) -> Self {
         let linear = Linear::at_setpoint(control);
         let stepping = Stepping::held(&linear, control.method, substeps, delay);
@@ -98,14 +91,12 @@ impl LimitPair {
     }
 
     /// Relative difference of the measured limit from the predicted one; `None` without a limit.
-    #[must_use]
     pub fn off(&self) -> Option<f64> {
         let measured = self.measured.unwrap_or(f64::INFINITY);
         Some((measured / self.predicted? - 1.0).abs())
     }
 
     /// Whether both exist and agree to 1 %.
-    #[must_use]
     pub fn agrees(&self) -> bool {
         self.off().is_some_and(|off| off < 0.01)
     }
@@ -124,13 +115,11 @@ pub(super) fn short(value: Option<f64>) -> String {
 }
 
 /// Whether a deviation with this growth of its energy dies out.
-#[must_use]
 pub fn decays(growth: Option<f64>) -> bool {
     growth.is_some_and(|growth| growth < 1.0)
 }
 
 /// The 2-link arm with the default gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
-#[must_use]
 pub fn stiffened(factor: f64) -> ControlLoop<2> {
     let Gains { kp, ki, kd } = Gains::<2>::default();
     let gains = Gains {
@@ -143,7 +132,6 @@ pub fn stiffened(factor: f64) -> ControlLoop<2> {
 
 /// Largest energy of the deviation in the last eighth of the periods, per largest in the second eighth. The first
 /// eighth is skipped, in which the fast modes decay. Zero once the deviation has decayed, `None` once it has escaped.
-#[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
     const WINDOW: u64 = STEPS / 8;
     let rest = equilibrium(control);
@@ -227,7 +215,6 @@ pub(super) fn live_at<const N: usize>(
 
 /// The same loop with its timestep \[s\] as its control period, in `substeps` steps; `delay`: every effort acts one
 /// period late.
-#[must_use]
 pub fn in_substeps<const N: usize>(
     control: &ControlLoop<N>,
     substeps: u32,
@@ -254,7 +241,6 @@ fn nudged<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Stat
 
 /// Mean factor by which a deviation grows per control period of `substeps` steps, the effort held over it; the loop's
 /// timestep is the period. `None` if it is not finite.
-#[must_use]
 pub fn growth_per_period<const N: usize>(control: &ControlLoop<N>, substeps: u32) -> Option<f64> {
     let period = control.timestep;
     let control = in_substeps(control, substeps, false);

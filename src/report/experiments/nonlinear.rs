@@ -9,20 +9,17 @@
 //!
 //! **Invariant:** no prediction enters a measurement.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over two joints and the four states of a 2-link arm"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::{energy, potential_energy};
+use crate::math::count::{in_f64, whole};
+use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::state_after;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{Complex, Matrix};
+use crate::study::motion::lowest;
 
 /// Time of a move \[s\].
 const MOVE: f64 = 6.0;
@@ -38,7 +35,6 @@ pub const ENERGY_FACTOR: f64 = 2.0;
 
 /// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default
 /// gains.
-#[must_use]
 pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> {
     let setpoint = Setpoint::at([amplitude, -0.75 * amplitude]);
     ControlLoop::new(Arm::default(), Gains::default(), setpoint)
@@ -47,7 +43,6 @@ pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> 
 }
 
 /// Whether a move arrives and is there at its end.
-#[must_use]
 pub fn arrives(control: &ControlLoop<2>) -> bool {
     let mut live = control.simulation(State::rest());
     while live.time() < MOVE && live.step() {}
@@ -56,7 +51,6 @@ pub fn arrives(control: &ControlLoop<2>) -> bool {
 }
 
 /// A free swing of a 2-link arm from the horizontal, turning at `spin` \[rad/s\].
-#[must_use]
 pub fn spun(spin: f64) -> State<2> {
     State {
         position: [0.0, 0.5],
@@ -65,10 +59,9 @@ pub fn spun(spin: f64) -> State<2> {
 }
 
 /// Whether a free swing keeps its energy above that of the hanging arm to a factor of [`ENERGY_FACTOR`] for [`SWING`].
-#[must_use]
 pub fn is_carried(control: &ControlLoop<2>, start: State<2>) -> bool {
     let arm = &control.arm;
-    let lowest = potential_energy(arm, &[-FRAC_PI_2, 0.0]);
+    let lowest = lowest(arm);
     let first = energy(arm, &start) - lowest;
     let kept = first / ENERGY_FACTOR..=first * ENERGY_FACTOR;
     let mut live = control.simulation(start);
@@ -93,29 +86,19 @@ pub struct PeriodicSwing {
 const STRIDE: f64 = 0.02;
 const NEAR: f64 = 0.05;
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bounded below by 1 and above by 1000"
-)]
-fn strides(amplitude: f64) -> u32 {
-    (amplitude / STRIDE).ceil().clamp(1.0, 1000.0) as u32
-}
-
 /// Steps to the hanging pose while a swing is looked for.
 const FINE: f64 = 1e-3;
 
 impl PeriodicSwing {
     /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest, continued from the one of small
     /// amplitude; none where it can't be continued so far.
-    #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
-        let strides = strides(amplitude);
+        let strides = (amplitude / STRIDE).ceil().clamp(1.0, 1000.0);
         // The slow mode of two equal rods: q₂ per q₁.
         let (mut before, mut ratio) = (0.44, 0.44);
         let mut swing = None;
-        for stride in 1..=strides {
-            let reached = amplitude * f64::from(stride) / f64::from(strides);
+        for stride in 1..=whole(strides) {
+            let reached = amplitude * in_f64(stride) / strides;
             let found = Self::near(reached, reached * (2.0 * ratio - before))?;
             (before, ratio) = (ratio, found.start.position[1] / reached);
             swing = Some(found);
@@ -155,7 +138,6 @@ impl PeriodicSwing {
     /// The Floquet multipliers of a method that takes `steps` steps to a period.
     ///
     /// The method's derivative is taken along the true swing, which is followed with far smaller steps.
-    #[must_use]
     pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
         /// Steps of the swing in one of the method's, and a deviation.
         const WITHIN: u32 = 32;
@@ -175,7 +157,6 @@ impl PeriodicSwing {
     }
 
     /// The larger modulus of the pair that is not 1 of the true swing: the two farthest from 1.
-    #[must_use]
     pub fn transverse(&self, method: Method, steps: u32) -> f64 {
         let mut multipliers = self.multipliers(method, steps);
         let from_one = |mu: &Complex| (mu.re - 1.0).hypot(mu.im);

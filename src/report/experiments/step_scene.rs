@@ -9,7 +9,6 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
 
 /// The default gains without damping, and with hardly an integral, which would drive an undamped arm away.
-#[must_use]
 pub fn undamped<const N: usize>() -> Gains<N>
 where
     Gains<N>: Default,
@@ -23,7 +22,6 @@ where
 }
 
 /// The arm before its first step, with the default gains or without their integral part, its controller on or off.
-#[must_use]
 pub fn ready<const N: usize>(
     gravity: f64,
     integral: bool,

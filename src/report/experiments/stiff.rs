@@ -15,11 +15,6 @@
 //!
 //! **Invariant:** every evaluation is counted, those for Jacobians too.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over the four states of arrays of that length"
-)]
-
 use std::f64::consts::FRAC_PI_2;
 
 use super::task::{Task, TaskRun};
@@ -31,8 +26,9 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
+use crate::study::equilibrium::moved;
 use crate::study::linear::{Linear, gravity_gradient};
-use crate::study::matrix::{Matrix, largest};
+use crate::study::matrix::{Matrix, largest, largest_difference};
 use crate::study::stability::{Sampling, largest_timestep};
 
 /// Simulated time of a run \[s\].
@@ -70,7 +66,6 @@ impl Solver {
     ];
 
     /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Explicit(method) => method.name(),
@@ -80,7 +75,6 @@ impl Solver {
     }
 
     /// Whether it is a baseline of the report.
-    #[must_use]
     pub const fn is_baseline(self) -> bool {
         !matches!(self, Self::Explicit(_))
     }
@@ -114,7 +108,6 @@ const START: State<2> = State {
 
 impl StiffScene {
     /// The scene whose elbow is about so many times as fast as its swing.
-    #[must_use]
     pub fn new(by: By, stiffness: f64) -> Self {
         let hanging = [-FRAC_PI_2, 0.0];
         let even = Arm::<2>::default();
@@ -152,7 +145,7 @@ impl StiffScene {
         let differences = fine
             .iter()
             .zip(&other)
-            .map(|(one, other)| apart(one, other));
+            .map(|(one, other)| largest_difference(one, other));
         Self {
             control,
             ratio: brake * mobility / swing,
@@ -165,14 +158,13 @@ impl StiffScene {
                 distance: Box::new(move |done, steps, place| {
                     let output = usize::try_from(done * OUTPUTS / steps).unwrap_or(0);
                     fine.get(output.saturating_sub(1))
-                        .map_or(f64::NAN, |fine| apart(fine, place))
+                        .map_or(f64::NAN, |fine| largest_difference(fine, place))
                 }),
             },
         }
     }
 
     /// The fewest steps that the linearised loop allows an explicit method where it hangs; none for a baseline.
-    #[must_use]
     pub fn fewest_stable_steps(&self, solver: Solver) -> Option<f64> {
         let Solver::Explicit(method) = solver else {
             return None;
@@ -221,7 +213,7 @@ impl TaskRun for Implicit {
     fn advance(&mut self, steps: u64) -> u64 {
         for taken in 0..steps {
             let change = (self.step)(self).unwrap_or([f64::NAN; 4]);
-            self.y = moved(&self.y, 1.0, &change);
+            self.y = moved(&self.y, &change, 1.0);
             if !self.y.iter().all(|y| y.is_finite()) {
                 return taken;
             }
@@ -269,10 +261,10 @@ impl Implicit {
         let (mut k, jacobian) = self.jacobian();
         let newton = jacobian.shifted_identity(-0.5 * h);
         for _ in 0..MAX_ITERATIONS {
-            let f = self.slope(&moved(&y, 0.5 * h, &k));
+            let f = self.slope(&moved(&y, &k, 0.5 * h));
             let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();
             let change: Whole = newton.solve(&left)?.try_into().ok()?;
-            k = moved(&k, 1.0, &change);
+            k = moved(&k, &change, 1.0);
             if (0..4).all(|i| (h * change[i]).abs() <= 1e-13 * (1.0 + y[i].abs())) {
                 break;
             }
@@ -294,25 +286,12 @@ impl Implicit {
         };
         let k1 = stage(&start, &[0.0; 4])?;
         let k2 = stage(&start, &k1.map(|k| 4.0 * k))?;
-        let f3 = self.slope(&moved(&y, 2.0, &k1));
+        let f3 = self.slope(&moved(&y, &k1, 2.0));
         let k3 = stage(&f3, &std::array::from_fn(|i| k1[i] - k2[i]))?;
-        let ahead = moved(&moved(&y, 2.0, &k1), 1.0, &k3);
+        let ahead = moved(&moved(&y, &k1, 2.0), &k3, 1.0);
         let f4 = self.slope(&ahead);
         let others = std::array::from_fn(|i| k1[i] - k2[i] - 8.0 / 3.0 * k3[i]);
         let k4 = stage(&f4, &others)?;
         Some(std::array::from_fn(|i| 2.0 * k1[i] + k3[i] + k4[i]))
     }
-}
-
-fn moved(y: &Whole, length: f64, way: &Whole) -> Whole {
-    std::array::from_fn(|i| y[i] + length * way[i])
-}
-
-/// Largest distance of a joint \[rad\].
-fn apart(one: &[f64], other: &[f64]) -> f64 {
-    largest(
-        one.iter()
-            .zip(other)
-            .map(|(one, other)| (one - other).abs()),
-    )
 }

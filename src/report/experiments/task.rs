@@ -62,7 +62,6 @@ pub struct Task<S> {
 
 impl<S: Copy> Task<S> {
     /// Takes `steps` steps and compares. A run whose error exceeds `most` ends there and counts as lost.
-    #[must_use]
     pub fn run(&self, solver: S, steps: u64, most: f64) -> RunOutcome {
         let every = steps.div_ceil(self.looks).max(1);
         let mut run = (self.ready)(solver, steps);
@@ -91,7 +90,6 @@ impl<S: Copy> Task<S> {
 
     /// The run with the fewest steps that keeps within `most`. A search tries step counts between `first` and `last`,
     /// to a `part` of them: see [`fewest`].
-    #[must_use]
     pub fn fewest(
         &self,
         solver: S,
@@ -110,7 +108,6 @@ impl<S: Copy> Task<S> {
     }
 
     /// The same steps without comparing: [`RunOutcome::end`].
-    #[must_use]
     pub fn replay(&self, solver: S, steps: u64) -> f64 {
         let mut run = (self.ready)(solver, steps);
         run.advance(steps);

@@ -37,16 +37,13 @@ pub(super) fn make(section: &mut Section) {
         (title, lost.collect::<Vec<_>>())
     });
     let worst_of = |poses: &[(&str, Vec<(f64, Lost)>)], of: fn(&Lost) -> f64| {
-        worst(
-            poses
-                .iter()
-                .flat_map(|pose| &pose.1)
-                .map(|(_, lost)| of(lost)),
-        )
+        let lost = poses.iter().flat_map(|pose| &pose.1);
+        worst(lost.map(|(_, lost)| of(lost)))
     };
-    let [bent, stretched, folded] = &poses;
-    let straight = worst_of(&[bent.clone(), stretched.clone()], |lost| lost.recursion);
-    let folded = worst_of(std::slice::from_ref(folded), |lost| lost.recursion);
+    // Bent and stretched, and folded.
+    let (straight, folded) = poses.split_at(2);
+    let straight = worst_of(straight, |lost| lost.recursion);
+    let folded = worst_of(folded, |lost| lost.recursion);
     let own = worst_of(&poses, |lost| lost.recursion - lost.inherent);
     let dense = match worst_of(&poses, |lost| lost.dense) {
         all if all.is_infinite() => "all".to_owned(),

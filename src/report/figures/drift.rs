@@ -24,21 +24,18 @@ struct Swing {
 }
 
 impl Swing {
-    fn of<const N: usize>(title: &'static str, start: &State<N>, duration: f64) -> Self {
-        let arm = Arm::default();
+    fn of<const N: usize>(title: &'static str, angles: [f64; N], duration: f64) -> Self {
+        let (arm, start) = (Arm::default(), State::at_rest(angles));
         Self {
             title,
-            methods: Method::ALL.map(|it| energy_drift(&arm, start, it, TIMESTEP, duration)),
-            baseline: symplectic_drift(&arm, start, TIMESTEP, duration),
+            methods: Method::ALL.map(|it| energy_drift(&arm, &start, it, TIMESTEP, duration)),
+            baseline: symplectic_drift(&arm, &start, TIMESTEP, duration),
         }
     }
 
     fn end(&self, method: Method) -> f64 {
-        let mut all = Method::ALL.into_iter().zip(&self.methods);
-        let drift = all.find(|(one, _)| *one == method);
-        drift
-            .and_then(|(_, drift)| drift.last())
-            .map_or(f64::NAN, |point| point.1)
+        let drift = self.methods.get(method as usize).and_then(|it| it.last());
+        drift.map_or(f64::NAN, |point| point.1)
     }
 
     /// Whether the better method keeps energy better. A run that diverged has no final value to compare.
@@ -51,19 +48,11 @@ impl Swing {
 
 pub(super) fn make(section: &mut Section) {
     let duration = section.choose(1000.0, 60.0);
-    let regular = State::at_rest([0.3 - std::f64::consts::FRAC_PI_2, 0.0]);
+    let regular = [0.3 - std::f64::consts::FRAC_PI_2, 0.0];
     let swings = [
-        Swing::of("Regular swing, 2 links from 0.3 rad", &regular, duration),
-        Swing::of::<2>(
-            "Chaotic swing, 2 links from horizontal",
-            &State::rest(),
-            duration,
-        ),
-        Swing::of::<3>(
-            "Chaotic swing, 3 links from horizontal",
-            &State::rest(),
-            duration,
-        ),
+        Swing::of("Regular swing, 2 links from 0.3 rad", regular, duration),
+        Swing::of("Chaotic swing, 2 links from horizontal", [0.0; 2], duration),
+        Swing::of("Chaotic swing, 3 links from horizontal", [0.0; 3], duration),
     ];
     let [regular, chaotic, _] = &swings;
     let headline = format!(

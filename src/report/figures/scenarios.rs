@@ -24,14 +24,14 @@ pub(super) fn make(section: &mut Section) {
         };
         // Slow scenes take seconds each, too long for a quick report.
         let verdict = (!scene.slow || !section.quick).then(|| scene.run());
-        let holds = verdict.as_ref().map(|verdict| verdict.holds);
+        let holds = verdict.as_ref().map(|verdict| verdict.0);
         let name = format!("{} {}", scene.id, live.name);
         run += usize::from(holds.is_some());
         if holds == Some(false) {
             short.push(name.clone());
         }
         let (observed, cell) = match verdict {
-            Some(verdict) => (plain(&verdict.observed), Cell::verdict(verdict.holds)),
+            Some((holds, observed)) => (plain(&observed), Cell::verdict(holds)),
             None => (
                 "not run in a quick report".to_owned(),
                 Cell::new("not run").class("soft"),

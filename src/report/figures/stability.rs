@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::fit::{centres, edges, worst};
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::report::experiments::measure::{
@@ -154,25 +154,17 @@ fn findings(section: &mut Section, rows: &[LimitRow]) {
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
 
-/// The empty map, whose legend has both kinds of control.
-fn map_plot() -> Plot {
-    let plot = Plot::new(
-        "All methods",
-        Axis::log("timestep", Unit::Seconds, TIMESTEPS),
-        Axis::log("stiffness, times the default gains", Unit::Number, FACTORS),
-    );
-    let held = Key::line("soft", "predicted, effort held for the step");
-    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
-    plot.with([held, continuous].map(Curve::named))
-}
-
 /// Decay or growth of a small deviation, by timestep and stiffness, with the predicted limit.
 fn map(section: &mut Section) {
     let columns = section.choose(48, 16);
     let timestep_edges = edges(TIMESTEPS, columns);
     let timesteps = centres(&timestep_edges);
     let factors = centres(&edges(FACTORS, columns * 3 / 4));
-    let mut plot = map_plot();
+    let x = Axis::log("timestep", Unit::Seconds, TIMESTEPS);
+    let y = Axis::log("stiffness, times the default gains", Unit::Number, FACTORS);
+    let held = Key::line("soft", "predicted, effort held for the step");
+    let continuous = Key::line("soft", "predicted, law in every stage").dashed();
+    let mut plot = Plot::new("All methods", x, y).with([held, continuous].map(Curve::named));
     let (mut cells, mut disagreeing, mut undecided) = (0, 0, 0);
     let all = Sampling::ALL.map(|sampling| Method::ALL.map(|method| (method, sampling)));
     for (method, sampling) in all.into_iter().flatten() {
@@ -393,7 +385,7 @@ fn control_period(section: &mut Section) {
 }
 
 impl Growth {
-    fn panel(&mut self, method: Method, dots: u32) -> Plot {
+    fn panel(&mut self, method: Method, dots: usize) -> Plot {
         let control = stiffened(1.0).with_method(method);
         let linear = Linear::at_setpoint(&control);
         let x = Axis::log("control period", Unit::Seconds, PERIODS);
@@ -407,7 +399,7 @@ impl Growth {
                 let stepping = Stepping::held(&linear, method, substeps, false);
                 stepping.matrix(period).spectral_radius()
             };
-            let curve = (0..=200).map(|index| along(index, 200));
+            let curve = edges(PERIODS, 200).into_iter();
             let curve = curve.map(|period| (period, predicted(substeps, period)));
             let key = Key::line(class, label).marked(marker);
             let is_shown = |growth: f64| growth <= GROWTH.1;
@@ -417,13 +409,14 @@ impl Growth {
             ));
             // The dots alternate along the curves, so that no mark hides another. They are denser where the curve
             // rises.
-            let even = (0..dots).map(|index| along(3 * index + turn, 3 * dots));
+            let even = edges(PERIODS, 3 * dots).into_iter().skip(turn).step_by(3);
             let limit = Stepping::held(&linear, method, substeps, false).limit();
             let around = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
             let steep =
-                around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * f64::from(turn)));
+                around.map(|part| limit.unwrap_or(f64::NAN) * (part + 0.002 * length_in_f64(turn)));
             let mut points = Vec::new();
             for period in even
+                .take(dots)
                 .chain(steep)
                 .filter(|period| is_shown(predicted(substeps, *period)))
             {
@@ -446,8 +439,4 @@ impl Growth {
         }
         plot
     }
-}
-
-fn along(index: u32, count: u32) -> f64 {
-    PERIODS.0 * (PERIODS.1 / PERIODS.0).powf(f64::from(index) / f64::from(count))
 }

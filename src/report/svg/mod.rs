@@ -67,10 +67,9 @@ impl Key {
     /// A method's colour and marker.
     pub(crate) fn of(method: Method) -> Self {
         use Marker::{Circle, Diamond, Square, Triangle};
-        let markers = [Circle, Square, Triangle, Diamond];
-        let mut all = Method::ALL.into_iter().zip(markers.into_iter().cycle());
-        let marker = all.find(|(one, _)| *one == method);
-        Self::line(method.name(), method.name()).marked(marker.map_or(Circle, |it| it.1))
+        let mut markers = [Circle, Square, Triangle, Diamond].into_iter().cycle();
+        let marker = markers.nth(method as usize).unwrap_or(Circle);
+        Self::line(method.name(), method.name()).marked(marker)
     }
 
     /// A line without markers.

@@ -5,8 +5,8 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{taken, with_period};
-use super::{Computed, Present, StudyWork};
+use super::reading::{arm_of, taken, with_period};
+use super::{Computed, Present, Refused, StudyWork};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -21,7 +21,7 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::gains::{self, GainsError, GainsRequirements, SuggestedGains, search_gains};
 use crate::study::linear::no_control;
 use crate::study::paused::Paused;
-use crate::study::planner::{self, Candidate, PlanError, Planned, Task, plan};
+use crate::study::planner::{self, PlanError, Planned, Task, plan};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -41,7 +41,7 @@ pub struct SuggestGains<const N: usize> {
 }
 
 impl<const N: usize> Ask for SuggestGains<N> {
-    type Answer = Result<Suggested<N>, NotSuggested>;
+    type Answer = Result<Suggested<N>, Refused<GainsError>>;
 }
 
 /// Simulated gains.
@@ -51,17 +51,6 @@ pub struct Suggested<const N: usize> {
     pub found: SuggestedGains<N>,
     /// The timestep for these gains \[s\].
     pub timestep: f64,
-}
-
-/// Why no gains are suggested.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum NotSuggested {
-    /// The arm is not valid.
-    #[error("params {0}")]
-    Params(#[from] ArmError),
-    /// There are no such gains.
-    #[error(transparent)]
-    Gains(#[from] GainsError),
 }
 
 /// Searches the cheapest method and timestep that keep a run within an error.
@@ -88,33 +77,18 @@ pub struct PlanRun<const N: usize> {
 }
 
 impl<const N: usize> Ask for PlanRun<N> {
-    type Answer = Result<PlannedRun, NotPlanned>;
+    type Answer = Result<PlannedRun, Refused<PlanError>>;
 }
 
 /// A simulated plan.
 #[derive(Debug, Clone)]
 pub struct PlannedRun {
-    /// The cheapest run that was found.
-    pub best: Candidate,
-    /// All simulated runs within the error.
+    /// The cheapest run, and all simulated runs within the error.
     pub planned: Planned,
     /// The control period \[s\], if a controller holds the arm: the timestep, unless another was requested.
     pub control_period: Option<f64>,
 }
 
-/// Why there is no plan.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum NotPlanned {
-    /// The arm is not valid.
-    #[error("params {0}")]
-    Params(#[from] ArmError),
-    /// The request is not valid.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// No run is within the error.
-    #[error("no plan was found")]
-    Nothing,
-}
 // ---- reading and writing --------------------------------------------------------------------------------------------
 
 impl<const N: usize> Callable for SuggestGains<N> {
@@ -135,7 +109,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
 }
 
 impl<const N: usize> Answered for SuggestGains<N> {
-    fn write(answer: Result<Suggested<N>, NotSuggested>, to: &Address) -> Bytes {
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
         #[derive(Serialize)]
         struct Values {
             kp: Vec<f64>,
@@ -178,7 +152,7 @@ impl<const N: usize> Callable for PlanRun<N> {
 }
 
 impl<const N: usize> Answered for PlanRun<N> {
-    fn write(answer: Result<PlannedRun, NotPlanned>, to: &Address) -> Bytes {
+    fn write(answer: Self::Answer, to: &Address) -> Bytes {
         to.outcome(answer.map(PlanValues::from))
     }
 }
@@ -200,10 +174,10 @@ struct PlanValues {
 impl From<PlannedRun> for PlanValues {
     fn from(run: PlannedRun) -> Self {
         let PlannedRun {
-            best,
             planned,
             control_period,
         } = run;
+        let best = planned.best;
         let all = || planned.candidates.iter().rev();
         Self {
             integrator: best.method.name(),
@@ -239,7 +213,8 @@ impl<const N: usize> Computed<N> for SuggestGains<N> {
     fn work(self, present: Present<N>) -> Self::Work {
         let computation = Paused::new(async move {
             let (control, requirements) = demands(&self, &present.control)?;
-            let found = search_gains(control, requirements).await?;
+            let found = search_gains(control, requirements).await;
+            let found = found.map_err(Refused::Study)?;
             let timestep = control.timestep;
             Ok(Suggested { found, timestep })
         });
@@ -255,10 +230,7 @@ fn demands<const N: usize>(
     ask: &SuggestGains<N>,
     present: &ControlLoop<N>,
 ) -> Result<(ControlLoop<N>, GainsRequirements), ArmError> {
-    let arm = match &ask.params {
-        None => present.arm,
-        Some(params) => params.applied_to(&present.arm)?,
-    };
+    let arm = arm_of(ask.params.as_ref(), present.arm)?;
     let control = ControlLoop {
         arm,
         method: ask.method.unwrap_or(present.method),
@@ -281,12 +253,11 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
     fn work(self, present: Present<N>) -> Self::Work {
         let computation = Paused::new(async move {
             let task = task(&self, &present)?;
-            let planned = plan(task).await?;
-            let best = *planned.best().ok_or(NotPlanned::Nothing)?;
+            let planned = plan(task).await.map_err(Refused::Study)?;
             let period = task.control.period.period;
-            let period = if period > 0.0 { period } else { best.timestep };
+            let timestep = planned.best.timestep;
+            let period = if period > 0.0 { period } else { timestep };
             Ok(PlannedRun {
-                best,
                 planned,
                 control_period: (!task.control.is_free()).then_some(period),
             })
@@ -301,10 +272,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
 /// The run to be planned, with the present settings and state for missing fields.
 fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N>, ArmError> {
     let Present { control, state } = present;
-    let arm = match &ask.params {
-        None => control.arm,
-        Some(params) => params.applied_to(&control.arm)?,
-    };
+    let arm = arm_of(ask.params.as_ref(), control.arm)?;
     // With `servo` the present gains apply. Otherwise the arm is free, as in a rollout.
     let missing = if ask.servo {
         control.gains

@@ -11,10 +11,11 @@ mod stability;
 
 use std::time::Duration;
 
-pub use self::advice::{NotPlanned, NotSuggested, PlanRun, PlannedRun, SuggestGains, Suggested};
-pub use self::rollout::{NotRun, Ran, RolloutWork, RunOffline};
+pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
+pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::Ask;
+use crate::math::arm::ArmError;
 use crate::math::arm::State;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
@@ -40,6 +41,17 @@ pub trait Computed<const N: usize>: Ask {
     /// The computation of this request for the `present` arm.
     #[must_use]
     fn work(self, present: Present<N>) -> Self::Work;
+}
+
+/// Why a computation has no result.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Refused<E> {
+    /// The arm is not valid.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// The reason of the study.
+    #[error(transparent)]
+    Study(E),
 }
 
 /// A computation of the study, which needs no clock.

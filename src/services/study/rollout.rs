@@ -10,8 +10,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::reading::{taken, with_period};
-use super::{Computed, NUMBER_BYTES, Present, Work};
+use super::reading::{arm_of, taken, with_period};
+use super::{Computed, NUMBER_BYTES, Present, Refused, Work};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -58,8 +58,11 @@ pub struct RunOffline<const N: usize> {
 }
 
 impl<const N: usize> Ask for RunOffline<N> {
-    type Answer = Result<Box<Ran<N>>, NotRun>;
+    type Answer = RunAnswer<N>;
 }
+
+/// A run, or the reason why there is none.
+pub type RunAnswer<const N: usize> = Result<Box<Ran<N>>, Refused<RolloutError>>;
 
 /// A finished run.
 pub struct Ran<const N: usize> {
@@ -67,17 +70,6 @@ pub struct Ran<const N: usize> {
     pub run: Rollout<N>,
     /// The worker's time for the run alone.
     pub took: Duration,
-}
-
-/// Why there was no run.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum NotRun {
-    /// The arm is not valid.
-    #[error("params {0}")]
-    Params(#[from] ArmError),
-    /// The run is not valid.
-    #[error(transparent)]
-    Rollout(#[from] RolloutError),
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
@@ -103,7 +95,7 @@ impl<const N: usize> Callable for RunOffline<N> {
 }
 
 impl<const N: usize> Answered for RunOffline<N> {
-    fn write(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Bytes {
+    fn write(answer: RunAnswer<N>, to: &Address) -> Bytes {
         /// The samples and the error, in the order of the documentation.
         #[derive(Serialize)]
         struct Values<'a, const N: usize> {
@@ -164,11 +156,11 @@ const COLUMNS: usize = 5;
 pub struct RolloutWork<const N: usize> {
     most_bytes: usize,
     /// The run alone; `None` once it is finished.
-    alone: Option<Paused<Result<Rollout<N>, NotRun>>>,
+    alone: Option<Paused<Result<Rollout<N>, Refused<RolloutError>>>>,
     /// Its time so far.
     took: Duration,
     /// The same run beside a reference, if one is requested.
-    compared: Option<Paused<Result<Rollout<N>, NotRun>>>,
+    compared: Option<Paused<Result<Rollout<N>, Refused<RolloutError>>>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
@@ -181,7 +173,7 @@ impl<const N: usize> RolloutWork<N> {
             let ask = ask.clone();
             Paused::new(async move {
                 let request = request(&ask, &present, reference)?;
-                Ok(rollout(request).await?)
+                rollout(request).await.map_err(Refused::Study)
             })
         };
         Self {
@@ -204,12 +196,12 @@ impl<const N: usize> Computed<N> for RunOffline<N> {
     }
 }
 
-impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
+impl<const N: usize> Work<RunAnswer<N>> for RolloutWork<N> {
     fn most_bytes(&self) -> usize {
         self.most_bytes
     }
 
-    fn advance(&mut self, clock: fn() -> Duration) -> Option<Result<Box<Ran<N>>, NotRun>> {
+    fn advance(&mut self, clock: fn() -> Duration) -> Option<RunAnswer<N>> {
         let run = if let Some(alone) = &mut self.alone {
             let began = clock();
             let run = alone.advance();
@@ -235,10 +227,7 @@ fn request<const N: usize>(
     reference: bool,
 ) -> Result<RolloutRequest<N>, ArmError> {
     let control = &present.control;
-    let arm = match &ask.params {
-        None => control.arm,
-        Some(params) => params.applied_to(&control.arm)?,
-    };
+    let arm = arm_of(ask.params.as_ref(), control.arm)?;
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
     Ok(RolloutRequest {

@@ -8,7 +8,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{taken, with_period};
+use super::reading::{arm_of, taken, with_period};
 use super::{Computed, Present, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
@@ -173,10 +173,7 @@ fn control_loop<const N: usize>(
     ask: &PredictStability<N>,
     present: &ControlLoop<N>,
 ) -> Result<ControlLoop<N>, ArmError> {
-    let arm = match &ask.params {
-        None => present.arm,
-        Some(params) => params.applied_to(&present.arm)?,
-    };
+    let arm = arm_of(ask.params.as_ref(), present.arm)?;
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
     Ok(ControlLoop {

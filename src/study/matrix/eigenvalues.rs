@@ -5,15 +5,9 @@
 //!
 //! **Invariant:** the iteration ends; an eigenvalue that does not converge is NaN.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
-)]
-
 use std::ops::RangeInclusive;
 
-use super::complex::Complex;
-use super::{Matrix, largest};
+use super::{Complex, Matrix, largest};
 use crate::math::elementary::{exp2, log2};
 
 /// QR sweeps per eigenvalue before the iteration gives up. Two or three are usual.
@@ -22,7 +16,6 @@ const MAX_SWEEPS: usize = 60;
 impl Matrix {
     /// All eigenvalues, in no particular order; NaN for an eigenvalue that does not converge, and for every one if an
     /// entry is not finite.
-    #[must_use]
     pub fn eigenvalues(&self) -> Vec<Complex> {
         if !self.entries.iter().all(|entry| entry.is_finite()) {
             return vec![Complex::real(f64::NAN); self.n];

@@ -5,17 +5,11 @@
 //! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
 //! comparison treats as unstable.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
-)]
-
-mod complex;
 mod eigenvalues;
 
-pub use complex::Complex;
-
 use std::ops::{Index, IndexMut};
+
+use crate::math::elementary::hypot;
 
 /// A real square matrix, indexed by `(row, column)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +36,6 @@ impl IndexMut<(usize, usize)> for Matrix {
 
 impl Matrix {
     /// The n×n matrix of zeros.
-    #[must_use]
     pub fn zeros(n: usize) -> Self {
         Self {
             n,
@@ -51,7 +44,6 @@ impl Matrix {
     }
 
     /// The n×n matrix whose entry at `(row, column)` is `entry(row, column)`.
-    #[must_use]
     pub fn from_fn(n: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
         let mut matrix = Self::zeros(n);
         for row in 0..n {
@@ -63,13 +55,11 @@ impl Matrix {
     }
 
     /// Number of rows and of columns.
-    #[must_use]
     pub fn size(&self) -> usize {
         self.n
     }
 
     /// `self · other`; both have the same size.
-    #[must_use]
     pub fn product(&self, other: &Self) -> Self {
         debug_assert_eq!(self.n, other.n, "a product needs matrices of one size");
         let mut product = Self::zeros(self.n);
@@ -110,7 +100,6 @@ impl Matrix {
 
     /// The solution `x` of `self · x = b`, by elimination with partial pivoting; `None` if the matrix is singular or
     /// `b` does not have n entries.
-    #[must_use]
     pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
         let n = self.n;
         if b.len() != n {
@@ -142,7 +131,6 @@ impl Matrix {
     }
 
     /// The inverse; `None` if the matrix is singular.
-    #[must_use]
     pub fn inverse(&self) -> Option<Self> {
         let n = self.n;
         let unit = |column: usize| -> Vec<f64> {
@@ -156,14 +144,42 @@ impl Matrix {
     }
 
     /// Largest modulus of an eigenvalue; NaN if [`Matrix::eigenvalues`] has a NaN.
-    #[must_use]
     pub fn spectral_radius(&self) -> f64 {
         largest(self.eigenvalues().into_iter().map(Complex::modulus))
     }
 }
 
+/// A complex number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Complex {
+    /// Real part.
+    pub re: f64,
+    /// Imaginary part.
+    pub im: f64,
+}
+
+impl Complex {
+    const fn real(re: f64) -> Self {
+        Self { re, im: 0.0 }
+    }
+
+    /// Modulus, without intermediate overflow.
+    #[must_use]
+    pub fn modulus(self) -> f64 {
+        hypot(self.re, self.im)
+    }
+}
+
+/// The largest difference of two entries in the same place; NaN if one is.
+pub(crate) fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
+    largest(
+        one.iter()
+            .zip(other)
+            .map(|(one, other)| (one - other).abs()),
+    )
+}
+
 /// The largest of `values`; NaN if one of them is.
-#[must_use]
 pub fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |max, value| {
         if value > max || value.is_nan() {

@@ -6,17 +6,12 @@
 //!
 //! **Invariant:** it shares no formula with the methods under study, and the work of a span is bounded.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices run over 0..N, and over the coefficients of a series"
-)]
-
 pub(crate) mod series;
 
 use super::matrix::largest;
 use super::paused::{PieceWork, at_once};
 use crate::math::arm::{Arm, State};
-use crate::math::count::length_in_f64;
+use crate::math::count::{length_in_f64, whole};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::elementary::{ln, pow};
 use crate::math::integrator::two_sum;
@@ -255,13 +250,11 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
 
 /// The order of least cost for a tolerance: two more than in Jorba and Zou, section 3.3. Their cost of a step grows
 /// with the square of its order. Here every step also needs an evaluation at its start.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to small whole numbers"
-)]
 fn order_for(tolerance: f64) -> usize {
-    ((3.0 - 0.5 * ln(tolerance)).ceil() as usize).clamp(6, f64::HIGHEST_ORDER)
+    let order = whole((3.0 - 0.5 * ln(tolerance)).ceil());
+    usize::try_from(order).map_or(f64::HIGHEST_ORDER, |order| {
+        order.clamp(6, f64::HIGHEST_ORDER)
+    })
 }
 
 fn power(base: f64, exponent: usize) -> f64 {
@@ -289,14 +282,12 @@ pub struct TaylorReference<const N: usize> {
 
 impl<const N: usize> TaylorReference<N> {
     /// The motion from the given state, computed to rounding.
-    #[must_use]
     pub fn new(state: State<N>) -> Self {
         Self::within(state, ROUNDING)
     }
 
     /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
     /// held between [`ROUNDING`] and 1.
-    #[must_use]
     pub fn within(state: State<N>, tolerance: f64) -> Self {
         let tolerance = if tolerance > ROUNDING {
             tolerance.min(1.0)
@@ -318,13 +309,11 @@ impl<const N: usize> TaylorReference<N> {
     }
 
     /// The arm's state.
-    #[must_use]
     pub fn state(&self) -> &State<N> {
         &self.state
     }
 
     /// Number of series coefficients so far. Each costs about as much as an evaluation of the dynamics.
-    #[must_use]
     pub fn coefficients(&self) -> u64 {
         self.taylor.coefficients
     }

@@ -18,7 +18,6 @@
 //! machine.
 
 #![allow(
-    clippy::indexing_slicing,
     clippy::needless_range_loop,
     reason = "indices run over 0..N, and over the coefficients computed so far, as they do in the recurrences"
 )]

@@ -23,7 +23,7 @@ use pendularm::actors::arm::sim::{
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{
-    NotPlanned, PlanRun, PredictStability, RunOffline, Study, SuggestGains,
+    PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Nodes;
@@ -41,7 +41,7 @@ use pendularm::study::gains::{GainsRequirements, search_gains};
 use pendularm::study::linear::no_control;
 use pendularm::study::motion::Motion;
 use pendularm::study::paused::at_once;
-use pendularm::study::planner::{Task, plan};
+use pendularm::study::planner::{PlanError, Task, plan};
 use pendularm::study::stability::{Limits, limit_held, limits};
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};

@@ -146,10 +146,10 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let planned = at_once(plan(task)).unwrap();
         let run = bench.ask(plan_with(0.05)).await.unwrap();
         assert_eq!(run.planned, planned);
-        assert_eq!(run.control_period, Some(run.best.timestep));
+        assert_eq!(run.control_period, Some(run.planned.best.timestep));
         let args = json!({"error": 0.05, "servo": true});
         let values = client.ask(Service::Plan.name(), args).await;
-        let best = planned.best().unwrap();
+        let best = planned.best;
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
         assert_eq!(
@@ -172,7 +172,10 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
             ..plan_with(0.05)
         };
         let refused = bench.ask(too_long).await.unwrap_err();
-        assert!(matches!(refused, NotPlanned::Plan(_)), "{refused}");
+        assert!(
+            matches!(refused, Refused::Study(PlanError::TooLong(_))),
+            "{refused}"
+        );
     });
 }
 

@@ -82,5 +82,5 @@ fn what_cannot_be_had_is_refused_with_its_reason() {
     );
     let tiny = ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6);
     let why = refusal(&tiny, requirements);
-    assert_eq!(why, GainsError::TooManySteps { steps: 4.0 / 1e-6 });
+    assert_eq!(why, GainsError::TooManySteps(4.0 / 1e-6));
 }

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use pendularm::services::study::{NotRun, Present, Ran, RolloutWork, RunOffline, Work};
+use pendularm::services::study::{Present, Ran, RolloutWork, RunAnswer, RunOffline, Work};
 
 /// The least measured time. A browser's clock has steps of 0.1 ms or 1 ms.
 const LEAST_MEASURED: Duration = Duration::from_millis(20);
@@ -38,12 +38,12 @@ impl<const N: usize> Repeated<N> {
     }
 }
 
-impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for Repeated<N> {
+impl<const N: usize> Work<RunAnswer<N>> for Repeated<N> {
     fn most_bytes(&self) -> usize {
         self.work.most_bytes().saturating_mul(2)
     }
 
-    fn advance(&mut self, clock: fn() -> Duration) -> Option<Result<Box<Ran<N>>, NotRun>> {
+    fn advance(&mut self, clock: fn() -> Duration) -> Option<RunAnswer<N>> {
         let ran = match self.work.advance(clock)? {
             Ok(ran) => ran,
             Err(why) => return Some(Err(why)),

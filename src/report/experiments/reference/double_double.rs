@@ -41,25 +41,21 @@ impl DoubleDouble {
     pub const ONE: Self = Self { hi: 1.0, lo: 0.0 };
 
     /// The nearest double.
-    #[must_use]
     pub const fn to_f64(self) -> f64 {
         self.hi
     }
 
     /// This number less a double, as a double: the difference is rounded once, at the end.
-    #[must_use]
     pub fn minus(self, value: f64) -> f64 {
         (self - Self::from(value)).hi
     }
 
     /// Magnitude.
-    #[must_use]
     pub fn abs(self) -> Self {
         if self.hi < 0.0 { -self } else { self }
     }
 
     /// Held between `-bound` and `bound`.
-    #[must_use]
     pub fn clamp(self, bound: f64) -> Self {
         if self.hi > bound {
             Self::from(bound)
@@ -71,7 +67,6 @@ impl DoubleDouble {
     }
 
     /// Sine and cosine of this angle \[rad\], which is at most some 1e6.
-    #[must_use]
     pub fn sin_cos(self) -> (Self, Self) {
         let turns = (self.hi * std::f64::consts::FRAC_2_PI).round();
         let reduced = HALF_PI.iter().fold(self, |rest, part| {

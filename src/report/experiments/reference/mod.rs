@@ -8,11 +8,6 @@
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
 mod double_double;
 
 pub use double_double::DoubleDouble;
@@ -163,20 +158,17 @@ pub struct ReferenceMotion<const N: usize> {
 impl<const N: usize> ReferenceMotion<N> {
     /// The motion from `start` under `law` for `duration` \[s\], or with a held effort for the number of control
     /// periods that is nearest to it.
-    #[must_use]
     pub fn new(arm: &Arm<N>, start: &State<N>, law: &Law<N>, duration: f64) -> Self {
         let [fine, coarse] = SETTINGS.map(|setting| follow(arm, start, law, duration, setting));
         Self { fine, coarse }
     }
 
     /// The joint angles at `time` \[s\] \[rad\].
-    #[must_use]
     pub fn angles(&self, time: impl Into<DoubleDouble>) -> [DoubleDouble; N] {
         angles(&self.fine, time.into())
     }
 
     /// The state at `time` \[s\], rounded to doubles.
-    #[must_use]
     pub fn state(&self, time: f64) -> State<N> {
         let (piece, after) = at(&self.fine, time.into());
         let zeros = [Real::ZERO; N];
@@ -197,13 +189,11 @@ impl<const N: usize> ReferenceMotion<N> {
     }
 
     /// The largest angle error of `position` at `time` \[s\] \[rad\].
-    #[must_use]
     pub fn angle_error(&self, time: impl Into<DoubleDouble>, position: &[f64]) -> f64 {
         largest_difference(&self.angles(time), position)
     }
 
     /// How far the angles at `time` \[s\] may be off: the largest difference between two settings \[rad\].
-    #[must_use]
     pub fn uncertainty(&self, time: f64) -> f64 {
         let [fine, coarse] = [&self.fine, &self.coarse].map(|pieces| angles(pieces, time.into()));
         distance(&fine, &coarse)
@@ -288,7 +278,6 @@ pub(super) fn distance<const N: usize>(a: &[Real; N], b: &[Real; N]) -> f64 {
 }
 
 /// Joint accelerations \[rad/s²\] under the efforts `tau` \[N m\], with 106 bits.
-#[must_use]
 pub fn exact_acceleration<const N: usize>(
     arm: &Arm<N>,
     state: &State<N>,
@@ -299,7 +288,6 @@ pub fn exact_acceleration<const N: usize>(
 }
 
 /// `max |exact - value|`, the difference rounded only once it is taken; NaN if a value is.
-#[must_use]
 pub fn largest_difference(exact: &[DoubleDouble], values: &[f64]) -> f64 {
     let both = exact.iter().zip(values);
     largest(both.map(|(exact, value)| exact.minus(*value).abs()))
@@ -307,7 +295,6 @@ pub fn largest_difference(exact: &[DoubleDouble], values: &[f64]) -> f64 {
 
 /// Joint angles \[rad\] and rates \[rad/s\] after every `every` steps of `h` \[s\] with `method`, `count` samples in
 /// all. The maps are those of `math::integrator`; under [`Law::Held`] the period is taken to be `h`.
-#[must_use]
 pub fn exact_steps<const N: usize>(
     arm: &Arm<N>,
     start: &State<N>,

@@ -3,34 +3,29 @@
 //! **Invariant:** values that no arm can have are refused by name. A run with accepted values stays finite, or the
 //! scene falls short.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices name the joints of arrays of that length"
-)]
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{
-    Named, Noise, Observation, apart, arm, each, fastest, free, held, is_near, verdict,
+    Check, Noise, Observation, apart, arm, each, fastest, free, gains, held, is_near,
 };
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::{Method, increment};
 use crate::math::pid::Gains;
-use crate::math::simulation::{Simulation, state_after};
+use crate::math::simulation::state_after;
 use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::error_estimate::estimate_step;
 use crate::study::linear::Linear;
-use crate::study::matrix::largest;
+use crate::study::matrix::{largest, largest_difference};
 use crate::study::paused::at_once;
 use crate::study::rollout::{Rollout, RolloutRequest, rollout};
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 use crate::study::taylor::TaylorReference;
 
 /// The checks of S27 to S39.
-pub(super) const CHECKS: [Named; 13] = [
+pub(super) const CHECKS: [(&str, Check); 13] = [
     ("S27", gravity),
     ("S28", tiny_steps),
     ("S29", huge_steps),
@@ -86,18 +81,18 @@ fn gravity() -> Observation {
     each([
         (is_scaled, errors),
         ((fallen - 1.0).abs() < 1e-6, falls),
-        (refused.holds, refused.observed),
+        refused,
     ])
 }
 
 fn tiny_steps() -> Observation {
     let Some((error, made)) = error(9.81, [0.3 - FRAC_PI_2, 0.0], 1e-6, 10.0) else {
-        return verdict(false, "not run");
+        return (false, "not run".to_owned());
     };
     let end = made.times.last().copied().unwrap_or(f64::NAN);
     let late = (end - 1e7 * 1e-6).abs();
     let steps = made.steps;
-    verdict(
+    (
         error < 1e-13 && late == 0.0,
         format!("error {error:.1e} rad, time off by {late:e} s after {steps} steps"),
     )
@@ -143,7 +138,7 @@ fn wound() -> Observation {
     let acceleration =
         |state: &State<2>| forward_dynamics(&arm, &state.position, &state.velocity, &[0.0; 2]);
     let (a, b) = (acceleration(&start), acceleration(&turned));
-    let at_once = largest((0..2).map(|i| (a[i] - b[i]).abs())) / largest(a.iter().map(|a| a.abs()));
+    let at_once = largest_difference(&a, &b) / largest(a.iter().map(|a| a.abs()));
     let [one, mut other] = [start, turned].map(|start| {
         let mut simulation = free(arm, start, Method::Rk4, 0.001);
         simulation.advance(1000);
@@ -152,7 +147,7 @@ fn wound() -> Observation {
     // Both moved by as much; the wound one to the spacing of its doubles.
     other.position[0] = other.position[0] - angle + unwound;
     let after = apart(&one, &other);
-    verdict(
+    (
         at_once < 1e-13 && after < 1.5e-7,
         format!("accelerations apart by {at_once:.1e}, after 1 s states by {after:.1e}"),
     )
@@ -172,22 +167,19 @@ fn huge_setpoints() -> Observation {
 }
 
 fn subnormal_start() -> Observation {
-    let gains = Gains {
-        kp: [100.0; 2],
-        ki: [0.0; 2],
-        kd: [10.0; 2],
+    let control = ControlLoop {
+        arm: arm([1.0; 2], 0.0),
+        ..held(gains(100.0, 0.0, [10.0; 2]), [0.0; 2])
     };
     let [tiny, small] = [1e-310, 1e-300].map(|off: f64| {
-        let mut live = Simulation::new(arm([1.0; 2], 0.0), gains);
-        live.set_state(State::at_rest([off, 0.0]));
-        live.enable(true);
+        let mut live = control.simulation(State::at_rest([off, 0.0]));
         live.advance(200);
         *live.state()
     });
     // 1e-310 is 2e13 times the smallest double; a few hundred roundings of half of that.
     let off = (0..2).map(|i| (tiny.position[i] - 1e-10 * small.position[i]).abs() / 1e-310);
     let worst = largest(off);
-    verdict(
+    (
         tiny.is_finite() && worst < 1e-10,
         format!("apart by {worst:.1e} of the start"),
     )
@@ -195,7 +187,7 @@ fn subnormal_start() -> Observation {
 
 fn subnormal_inertia() -> Observation {
     let Ok(arm) = Arm::new([1e-160; 2], [1.0; 2], 9.81) else {
-        return verdict(false, "no such arm");
+        return (false, "no such arm".to_owned());
     };
     let mut simulation = free(arm, State::rest(), Method::Rk4, 0.001);
     let taken = simulation.advance(1000);
@@ -203,7 +195,7 @@ fn subnormal_inertia() -> Observation {
         || "goes on".to_owned(),
         |divergence| format!("refuses step {}", divergence.step),
     );
-    verdict(
+    (
         simulation.state().is_finite(),
         format!("takes {taken} steps and {end}"),
     )
@@ -214,7 +206,7 @@ fn refusal(arm: Result<Arm<2>, impl std::fmt::Display>, begins: &str) -> Observa
     let said = arm
         .err()
         .map_or_else(|| "taken".to_owned(), |error| error.to_string());
-    verdict(said.starts_with(begins), said)
+    (said.starts_with(begins), said)
 }
 
 fn refused() -> Observation {
@@ -230,10 +222,10 @@ fn refused() -> Observation {
     let gravity = values.iter().take(3);
     let gravity = gravity.map(|&bad| refusal(Arm::new([1.0; 2], [1.0; 2], bad), "gravity must be"));
     let all: Vec<_> = parts.chain(gravity).collect();
-    let named = all.iter().filter(|one| one.holds).count();
+    let named = all.iter().filter(|one| one.0).count();
     let count = all.len();
-    let first = all.first().map_or("", |one| one.observed.as_str());
-    verdict(
+    let first = all.first().map_or("", |one| one.1.as_str());
+    (
         named == count,
         format!("{named} of {count} by name, such as: {first}"),
     )
@@ -297,7 +289,7 @@ fn one_joint() -> Observation {
             }
         }
     }
-    verdict(
+    (
         off < 2e-15 && mismatches == 0 && close < 10,
         format!("steps apart by {off:.1e}; {mismatches} of 80 000 verdicts differ"),
     )
@@ -340,7 +332,7 @@ fn changes() -> Observation {
     };
     let slope = (error(500) / error(1000)).log2();
     let bits = if kept { "kept" } else { "lost" };
-    verdict(
+    (
         kept && (slope - 2.0).abs() < 0.2,
         format!("bits {bits}; slope of the mixed swing {slope:.2}"),
     )
@@ -387,7 +379,7 @@ fn step_doubling() -> Observation {
             let mut exact = TaylorReference::new(state);
             let is_followed = exact.follow(&arm, &effort, h);
             let exact = exact.state().position;
-            let error = largest((0..3).map(|i| (end.position[i] - exact[i]).abs()));
+            let error = largest_difference(&end.position, &exact);
             let estimate = estimate.filter(|_| is_followed);
             estimate.map_or(f64::NAN, |estimate| estimate.local_error / error)
         });

@@ -2,22 +2,17 @@
 //!
 //! **Invariant:** a limit is predicted before it is measured, and both are shown.
 
-#![allow(
-    clippy::indexing_slicing,
-    reason = "indices name the joints of arrays of that length"
-)]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::support::{
-    Named, Observation, apart, arm, digits_lost, each, fastest, free, held, is_near, states,
-    verdict,
+    Check, Observation, apart, arm, digits_lost, each, fastest, free, gains, held, is_near, states,
 };
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::state_after;
+use crate::report::experiments::error::REACH_GAINS as MODERATE;
 use crate::report::experiments::measure::{
     LimitPair, boundary, growth, in_substeps, live_at, short,
 };
@@ -31,7 +26,7 @@ use crate::study::stability::{Sampling, Stepping, largest_timestep, limits, step
 const DIGITS: f64 = 2.5;
 
 /// The checks of S01 to S26.
-pub(super) const CHECKS: [Named; 26] = [
+pub(super) const CHECKS: [(&str, Check); 26] = [
     ("S01", rest_without_gravity),
     ("S02", hanging_at_rest),
     ("S03", upright),
@@ -55,7 +50,7 @@ pub(super) const CHECKS: [Named; 26] = [
     ("S21", || heavy_outer_link(1e9)),
     ("S22", heavy_link_stretched),
     ("S23", || each([1e3, 1e-3].map(long_outer_link))),
-    ("S24", || each([loses_few(&Arm::default(), [0.0; 3], 0.0)])),
+    ("S24", || loses_few(&Arm::default(), [0.0; 3], 0.0)),
     ("S25", folded),
     ("S26", || {
         each(
@@ -77,7 +72,8 @@ fn rest_without_gravity() -> Observation {
         simulation.advance(10_000);
         *simulation.state() == start
     });
-    verdict(kept, if kept { "every bit kept" } else { "moved" })
+    let words = if kept { "every bit kept" } else { "moved" };
+    (kept, words.to_owned())
 }
 
 /// The rate at which a deviation grows under a method at 1 ms \[1/s\], as the step matrix says.
@@ -186,23 +182,12 @@ fn chaotic<const N: usize>(expected: f64) -> Observation {
     let reached = 36.0 / rate;
     let words =
         format!("{rate:.2} per second: a unit of rounding is a radian after {reached:.0} s");
-    verdict(is_near(Some(rate), expected, 0.25), words)
+    (is_near(Some(rate), expected, 0.25), words)
 }
 
 // ---- S07 to S15: the controller ------------------------------------------------------------------------------------
 
 const POSE: [f64; 2] = [0.5, 0.8];
-
-const MODERATE: Gains<2> = Gains {
-    kp: [200.0, 100.0],
-    ki: [0.0; 2],
-    kd: [30.0, 12.0],
-};
-
-fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
-    let (kp, ki) = ([kp; 2], [ki; 2]);
-    Gains { kp, ki, kd }
-}
 
 /// Whether prediction and measurement agree to 1 % for all methods, and the limits of Runge-Kutta 4, held and
 /// continuous, in words.
@@ -231,7 +216,7 @@ fn furthest_off(pairs: &[LimitPair]) -> f64 {
 
 fn limits_hold(gains: Gains<2>) -> Observation {
     let (holds, _, words) = compare(gains);
-    verdict(holds, words)
+    (holds, words)
 }
 
 fn overdamped() -> Observation {
@@ -239,7 +224,7 @@ fn overdamped() -> Observation {
     let (holds, limit, words) = compare(gains);
     let chatter = limit.and_then(|limit| chatter(&held(gains, POSE).with_timestep(1.01 * limit)));
     let words = format!("{words}; beyond: chatter of {} rad/s", short(chatter));
-    verdict(holds && chatter.is_some(), words)
+    (holds && chatter.is_some(), words)
 }
 
 /// How fast the arm goes to and fro after a long while, if it does so at every step.
@@ -308,7 +293,7 @@ fn slow_control() -> Observation {
     });
     let worst = furthest_off(&measured);
     let range = format!("{lowest:.5} to {highest:.5} s over methods and substeps");
-    verdict(
+    (
         worst < 0.01 && highest / lowest < 1.01,
         format!("{range}; measured within {:.4} %", 100.0 * worst),
     )
@@ -327,7 +312,7 @@ fn held_push() -> Observation {
     };
     let (slow, fast) = (grows(0.02, 100), grows(2e-4, 1));
     let words = |grows| if grows { "grows" } else { "decays" };
-    verdict(
+    (
         slow && !fast && limit.is_some_and(|limit| limit < 0.02),
         format!(
             "limit of the period {} s; at 20 ms it {}, at 0.2 ms it {}",
@@ -345,7 +330,7 @@ fn late_control() -> Observation {
     let is_less = late.predicted.zip(prompt);
     let is_less = is_less.is_some_and(|(late, prompt)| late < 0.5 * prompt);
     let words = format!("{late}; without delay {} s", short(prompt));
-    verdict(is_less && late.agrees(), words)
+    (is_less && late.agrees(), words)
 }
 
 /// The shipped law has no cap on the effort; this scene puts one behind it.
@@ -380,7 +365,7 @@ fn windup() -> Observation {
     });
     let back = recovered.map_or_else(|| "never".to_owned(), |s| format!("after {s} s"));
     let integrals = format!("integral {limited:.1} rad s, unlimited {wound:.1}");
-    verdict(
+    (
         limited <= INTEGRAL_LIMIT && wound > limited && recovered.is_some(),
         format!("{integrals}; released, the arm is back {back}"),
     )
@@ -392,11 +377,11 @@ fn too_much_integral() -> Observation {
     let limits = Sampling::ALL.map(|sampling| largest_timestep(&linear, Method::Rk4, sampling));
     let modes = linear.flow().eigenvalues();
     let Some(mode) = modes.iter().max_by(|a, b| a.re.total_cmp(&b.re)) else {
-        return verdict(false, "no modes");
+        return (false, "no modes".to_owned());
     };
     let rate = growth_rate(&control, TAU / mode.im.abs());
     let eigenvalue = mode.re;
-    verdict(
+    (
         limits == [Some(0.0); 2] && eigenvalue > 0.0 && is_near(Some(rate), eigenvalue, 0.02),
         format!(
             "predicted limit {} s; eigenvalue {eigenvalue:.4}/s, measured at about 0.1 ms {rate:.4}/s",
@@ -426,7 +411,7 @@ fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
 // ---- S16 to S26: uneven arms ---------------------------------------------------------------------------------------
 
 /// Whether an arm loses few digits around a pose, and how many.
-fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> (bool, String) {
+fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> Observation {
     let digits = digits_lost(arm, &states(pose, spread));
     (digits <= DIGITS, format!("{digits:.1} digits lost"))
 }
@@ -434,7 +419,7 @@ fn loses_few<const N: usize>(arm: &Arm<N>, pose: [f64; N], spread: f64) -> (bool
 fn light_outer_link(mass: f64) -> Observation {
     let control = ControlLoop {
         arm: arm([1.0, mass], 9.81),
-        ..held(MODERATE, [0.5, 0.8])
+        ..held(MODERATE, POSE)
     };
     let limit = LimitPair::of_timestep(&control, Sampling::Held);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
@@ -445,10 +430,10 @@ fn light_outer_link(mass: f64) -> Observation {
 }
 
 fn heavy_outer_link(mass: f64) -> Observation {
-    each([loses_few(&arm([1.0, 1.0, mass], 9.81), [0.0; 3], PI)])
+    loses_few(&arm([1.0, 1.0, mass], 9.81), [0.0; 3], PI)
 }
 
-fn long_outer_link(length: f64) -> (bool, String) {
+fn long_outer_link(length: f64) -> Observation {
     let arm = Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).unwrap_or_default();
     let (holds, words) = loses_few(&arm, [0.0; 3], PI);
     (holds, format!("{words} with a tip of {length} m"))
@@ -505,7 +490,7 @@ fn folded() -> Observation {
 
 /// Limits of Verlet and Runge-Kutta 4 as timestep times rate: predicted from the fastest mode of the whirling arm, and
 /// measured.
-fn whirl<const N: usize>([verlet, rk4]: [f64; 2]) -> [(bool, String); 2] {
+fn whirl<const N: usize>([verlet, rk4]: [f64; 2]) -> [Observation; 2] {
     const RATE: f64 = 1000.0;
     let methods = [
         (Method::Verlet, verlet, 2.0),

@@ -18,7 +18,6 @@ pub use support::{Observation, Scenario};
 const SCENES: &str = include_str!("scenes.txt");
 
 /// All scenes, in order.
-#[must_use]
 pub fn all() -> Vec<Scenario> {
     let scene = |line: &'static str| {
         let mut columns = line.split(" | ");

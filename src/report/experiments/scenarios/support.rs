@@ -1,11 +1,6 @@
-//! A named scene and its outcome, and the settings, states and comparisons that scenes share.
+//! A named scene, its observation, and the settings, states and comparisons that scenes share.
 //!
 //! **Invariant:** a seed in the source gives what is random, so a scene does the same every time.
-
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
 
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
@@ -15,7 +10,7 @@ use crate::math::simulation::Simulation;
 use crate::report::experiments::conditioning::lost;
 use crate::report::experiments::reference::exact_acceleration;
 use crate::study::control_loop::ControlLoop;
-use crate::study::matrix::largest;
+use crate::study::matrix::{largest, largest_difference};
 
 /// A named scene.
 #[derive(Debug, Clone, Copy)]
@@ -34,40 +29,31 @@ pub struct Scenario {
 /// Runs a scene.
 pub(super) type Check = fn() -> Observation;
 
-/// A scene's identifier and its check.
-pub(super) type Named = (&'static str, Check);
-
 impl Scenario {
     /// Runs the scene.
-    #[must_use]
     pub fn run(&self) -> Observation {
         (self.check)()
     }
 }
 
-/// The outcome of a scene.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Observation {
-    /// The observation, with its figures.
-    pub observed: String,
-    /// Whether that is what was expected.
-    pub holds: bool,
-}
+/// Whether a scene, or a case of it, is as expected, and the observation with its figures.
+pub type Observation = (bool, String);
 
-pub(super) fn verdict(holds: bool, observed: impl Into<String>) -> Observation {
-    let observed = observed.into();
-    Observation { observed, holds }
-}
-
-/// The verdict of several cases: each must hold, and says what was seen.
-pub(super) fn each(cases: impl IntoIterator<Item = (bool, String)>) -> Observation {
+/// The observation of several cases, which must all hold.
+pub(super) fn each(cases: impl IntoIterator<Item = Observation>) -> Observation {
     let (holds, words): (Vec<bool>, Vec<String>) = cases.into_iter().unzip();
-    verdict(holds.into_iter().all(|holds| holds), words.join(", "))
+    (holds.into_iter().all(|holds| holds), words.join(", "))
 }
 
 /// Whether `value` is there, and within `part` of `expected`.
 pub(super) fn is_near(value: Option<f64>, expected: f64, part: f64) -> bool {
     value.is_some_and(|value| (value / expected - 1.0).abs() < part)
+}
+
+/// Gains of two joints, with the same springs and integrals.
+pub(super) fn gains(kp: f64, ki: f64, kd: [f64; 2]) -> Gains<2> {
+    let (kp, ki) = ([kp; 2], [ki; 2]);
+    Gains { kp, ki, kd }
 }
 
 /// Links of 1 m and 1 kg, held with these gains in this pose, by Runge-Kutta 4 at a millisecond.
@@ -93,9 +79,8 @@ pub(super) fn free<const N: usize>(
 
 /// Largest difference of positions \[rad\] and velocities \[rad/s\].
 pub(super) fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
-    let positions = (0..N).map(|i| (a.position[i] - b.position[i]).abs());
-    let velocities = (0..N).map(|i| (a.velocity[i] - b.velocity[i]).abs());
-    largest(positions.chain(velocities))
+    let [one, other] = [a, b].map(|it| [it.position, it.velocity]);
+    largest_difference(one.as_flattened(), other.as_flattened())
 }
 
 /// Speed of the fastest joint \[rad/s\].

@@ -2,36 +2,140 @@
 //!
 //! The run is the live loop, [`Simulation`], from any state. Its reference has the same control law, evaluated at the
 //! same instants and held for the same period. In between it follows the arm to rounding ([`TaylorReference`]). The
-//! difference is therefore the error of the method alone. Against a continuous-time law ([`Rollout::from_ideal`]) a
-//! held effort causes an error of first order in the control period, which no method can reduce.
+//! difference is therefore the error of the method alone. [`Rollout::from_ideal`] has the error of the held effort too.
 //!
 //! Three more references estimate the uncertainty of the first. Their arms differ in the last digits, and one of them
 //! takes steps half as long. On a chaotic swing the reference is usable for some twenty seconds. All errors are along
 //! the one growing direction. Two references may be close by chance, but four hardly ever are. The truth is therefore
 //! within `SPREAD` times the largest distance between any two of them.
 //!
-//! **Invariant:** the request bounds the steps, samples and work of a run.
-
-#![allow(
-    clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
-)]
-
-mod request;
-
-pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
+//! **Invariant:** an accepted request has only finite numbers, and bounds the steps, samples and work of its run.
 
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
-use super::matrix::largest;
+use super::matrix::{largest, largest_difference};
 use super::paused::PieceWork;
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, steps_in, whole};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
-use crate::math::pid::Pid;
+use crate::math::pid::{Gains, Pid};
+use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::{Divergence, Held, Hold, Simulation};
+
+/// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
+pub const MAX_STEPS: u64 = 10_000_000;
+
+/// Most samples of one run, some 30 MB of JSON.
+pub const MAX_SAMPLES: u64 = 100_000;
+
+/// The request for a run: its loop, its start, its length and its samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RolloutRequest<const N: usize> {
+    /// The loop of the run.
+    pub control: ControlLoop<N>,
+    /// The arm's state at the start.
+    pub start: State<N>,
+    /// Duration \[s\]; the run has the nearest number of steps.
+    pub duration: f64,
+    /// The number of samples, with start and end; fewer if the run has fewer steps.
+    pub samples: u64,
+    /// Whether to compute a reference too.
+    pub reference: bool,
+}
+
+/// Why a request is rejected. The field names are those of the request.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RolloutError {
+    /// A number that is NaN or infinite, a negative gain, or a time that is not positive.
+    #[error("{field} must be {bound}, got {}", Shown(*.value))]
+    OutOfBounds {
+        /// `q0`, `qdot0`, `duration`, `timestep`, `kp`, `ki`, `kd` or `setpoint`.
+        field: &'static str,
+        /// `finite`, `at least 0` or `greater than 0`.
+        bound: &'static str,
+        /// The given value.
+        value: f64,
+    },
+    /// Less than one step.
+    #[error(
+        "duration must be at least the timestep {}, got {}",
+        shown_against(*.timestep, *.duration),
+        shown_against(*.duration, *.timestep)
+    )]
+    TooShort {
+        /// The given time \[s\].
+        duration: f64,
+        /// The given time \[s\].
+        timestep: f64,
+    },
+    /// More steps than [`MAX_STEPS`].
+    #[error(
+        "duration / timestep must be at most {MAX_STEPS:e} steps, got {}",
+        shown_against(*.0, in_f64(MAX_STEPS))
+    )]
+    TooManySteps(f64),
+    /// Fewer than 2 samples, or more than [`MAX_SAMPLES`].
+    #[error("samples must be between 2 and {MAX_SAMPLES}, got {0}")]
+    Samples(u64),
+}
+
+impl<const N: usize> RolloutRequest<N> {
+    /// The number of steps that is nearest to the duration.
+    ///
+    /// # Errors
+    /// The first value that is out of bounds.
+    pub fn steps(&self) -> Result<u64, RolloutError> {
+        let ControlLoop {
+            gains: Gains { kp, ki, kd },
+            setpoint,
+            timestep,
+            ..
+        } = self.control;
+        let fields: [(&'static str, &[f64]); 9] = [
+            ("q0", &self.start.position),
+            ("qdot0", &self.start.velocity),
+            ("duration", &[self.duration]),
+            ("timestep", &[timestep]),
+            ("kp", &kp),
+            ("ki", &ki),
+            ("kd", &kd),
+            ("setpoint", &setpoint.position),
+            ("setpoint", &setpoint.velocity),
+        ];
+        for (field, values) in fields {
+            let is_gain = field.starts_with('k');
+            let is_time = field == "duration" || field == "timestep";
+            for &value in values {
+                let bound = match value {
+                    value if !value.is_finite() => "finite",
+                    value if is_gain && value < 0.0 => "at least 0",
+                    value if is_time && value <= 0.0 => "greater than 0",
+                    _ => continue,
+                };
+                return Err(RolloutError::OutOfBounds {
+                    field,
+                    bound,
+                    value,
+                });
+            }
+        }
+        let duration = self.duration;
+        let steps = steps_in(duration, timestep);
+        if steps < 1.0 {
+            return Err(RolloutError::TooShort { duration, timestep });
+        }
+        let steps = steps.round();
+        if steps > in_f64(MAX_STEPS) {
+            return Err(RolloutError::TooManySteps(steps));
+        }
+        if !(2..=MAX_SAMPLES).contains(&self.samples) {
+            return Err(RolloutError::Samples(self.samples));
+        }
+        Ok(whole(steps))
+    }
+}
 
 /// Longest span of one call of a reference without control \[s\].
 const MAX_SPAN: f64 = 0.05;
@@ -58,7 +162,6 @@ const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
     /// The largest error \[rad\]; `None` if it is not clearly larger than the distance between the references.
-    #[must_use]
     pub fn known(&self) -> Option<f64> {
         (self.error >= ABOVE_UNCERTAINTY * self.uncertainty).then_some(self.error)
     }
@@ -97,7 +200,6 @@ pub struct Rollout<const N: usize> {
 }
 
 /// The most memory of [`rollout`] without its samples, in bytes.
-#[must_use]
 pub const fn most_bytes<const N: usize>() -> usize {
     size_of::<[Reference<N>; REFERENCES]>() + size_of::<[Ideal<N>; 2]>()
 }
@@ -155,16 +257,11 @@ pub async fn rollout<const N: usize>(
 
 /// Steps per call: one if references evaluate the law in every step. Otherwise at most [`MAX_SPAN`] of them, so that
 /// the spans of a reference and the pieces stay short.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bounded below by 1 and above by 1000"
-)]
 fn stride<const N: usize>(request: &RolloutRequest<N>) -> u64 {
     if request.reference && !request.control.is_free() {
         1
     } else {
-        (MAX_SPAN / request.control.timestep).clamp(1.0, 1000.0) as u64
+        whole(MAX_SPAN / request.control.timestep).clamp(1, 1000)
     }
 }
 
@@ -187,19 +284,20 @@ impl<const N: usize> Rollout<N> {
         {
             let states = references.each_ref().map(|one| one.taylor.state());
             let spread = SPREAD * largest_distance(&states);
-            deviation.take(apart(state, states[0]), spread.max(last_digit));
+            let error = largest_difference(&state.position, &states[0].position);
+            deviation.take(error, spread.max(last_digit));
         }
         if let (Some(deviation), Some([first, second])) = (&mut self.from_ideal, ideals)
             && let (Some(first), Some(second)) = (&first.run, &second.run)
         {
-            let uncertainty = apart(&first.state, &second.state).max(last_digit);
-            deviation.take(apart(state, &second.state), uncertainty);
+            let [first, second] = [&first.state.position, &second.state.position];
+            let uncertainty = largest_difference(first, second).max(last_digit);
+            deviation.take(largest_difference(&state.position, second), uncertainty);
         }
     }
 
     /// The largest error of a deviation of this run and its uncertainty \[rad\], if they are known for all samples. An
     /// error over some of the samples is not comparable with that of another run.
-    #[must_use]
     pub fn known(&self, deviation: Option<&Deviation>) -> (Option<f64>, Option<f64>) {
         let whole = deviation.filter(|deviation| deviation.samples == self.times.len());
         let uncertainty = whole.map(|deviation| deviation.uncertainty);
@@ -211,26 +309,21 @@ impl<const N: usize> Rollout<N> {
 const LONGEST_STEP: f64 = 2.5e-4;
 
 /// Most of its steps per step of the run. With longer steps of the run the error is reported as unknown.
-const MOST_STEPS: u32 = 256;
+const MOST_STEPS: u64 = 256;
 
 /// The loop with a continuous-time law. Its timestep divides that of the run.
 struct Ideal<const N: usize> {
     /// `None` once it has diverged.
     run: Option<ContinuousLoop<N>>,
-    parts: u32,
+    parts: u64,
 }
 
 impl<const N: usize> Ideal<N> {
     /// The loop from `start` on, with steps divided by `cuts`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a cast to an integer saturates, and the result is bounded"
-    )]
-    fn new(control: &ControlLoop<N>, start: State<N>, cuts: u32) -> Self {
-        let parts = (control.timestep / LONGEST_STEP).ceil() as u32;
+    fn new(control: &ControlLoop<N>, start: State<N>, cuts: u64) -> Self {
+        let parts = whole((control.timestep / LONGEST_STEP).ceil());
         let parts = parts.clamp(1, MOST_STEPS) * cuts;
-        let timestep = control.timestep / f64::from(parts);
+        let timestep = control.timestep / in_f64(parts);
         let control = control.with_method(Method::Rk4).with_timestep(timestep);
         Self {
             run: Some(ContinuousLoop::new(control, start, [0.0; N])),
@@ -240,7 +333,7 @@ impl<const N: usize> Ideal<N> {
 
     /// Follows the run by this number of its steps.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
-        for _ in 0..steps * u64::from(self.parts) {
+        for _ in 0..steps * self.parts {
             self.run.take_if(|run| !run.step());
             if self.run.is_none() {
                 return;
@@ -325,7 +418,9 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
 fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
     let pairs = states.iter().enumerate().flat_map(|(index, one)| {
         let others = &states[..index];
-        others.iter().map(|other| apart(one, other))
+        others
+            .iter()
+            .map(|other| largest_difference(&one.position, &other.position))
     });
     largest(pairs)
 }
@@ -334,9 +429,4 @@ fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
 fn last_digit<const N: usize>(state: &State<N>) -> f64 {
     let largest = largest(state.position.iter().map(|q| q.abs()));
     f64::EPSILON * largest.max(1.0)
-}
-
-/// Largest difference of a joint position \[rad\].
-fn apart<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
-    largest((0..N).map(|i| (a.position[i] - b.position[i]).abs()))
 }
