@@ -8,10 +8,8 @@
 
 mod actions;
 mod entry;
-mod nested;
 mod node;
-mod parameter_types;
-mod ros2_types;
+mod parts;
 pub mod rosapi;
 mod services;
 mod table;
@@ -20,8 +18,10 @@ pub mod types;
 
 pub use actions::Action;
 pub use entry::{Direction, Field};
+pub(crate) use entry::{field, message};
 pub use node::Node;
 pub use rosapi::Rosapi;
 pub use services::Service;
+pub(crate) use table::fields;
 pub(in crate::protocol) use table::table;
 pub use topics::Topic;
