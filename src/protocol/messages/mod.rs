@@ -9,7 +9,6 @@ pub mod goal;
 pub mod republished;
 pub mod scene;
 mod telemetry;
-pub mod trajectory;
 
 use bytes::Bytes;
 use serde::Serialize;

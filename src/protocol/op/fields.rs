@@ -352,7 +352,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
+pub(super) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
     let Some(value) = json::number(raw) else {
         return Err(Reason::Mistyped {
             expected: "a number".into(),

@@ -11,7 +11,7 @@ use crate::actors::wire::Nodes;
 use crate::actors::wire::action_client::ActionClient;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
-use crate::protocol::op::follow::{FollowGoal, JointTolerance};
+use crate::protocol::op::trajectory::{FollowGoal, JointTolerance};
 
 /// Default position tolerance of each joint at the end \[rad\].
 const GOAL_TOLERANCE: f64 = 0.05;
