@@ -157,11 +157,7 @@ impl CancelRequest {
     pub fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
-        if fields.accepted() {
-            Ok(Self { goal_id })
-        } else {
-            Err(fields.finish())
-        }
+        fields.accept(Self { goal_id })
     }
 
     /// Writes the response.

@@ -105,13 +105,13 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The fields of a request with only one field.
+    /// The fields of a request with at most one field.
     #[must_use]
-    pub fn single(service: Service, name: &str, value: &'a RawValue) -> Self {
+    pub fn single(service: Service, name: &str, value: Option<&'a RawValue>) -> Self {
         let mut fields = Self::of(service);
         let given = fields.fields.iter().zip(&mut fields.values);
         for (field, entry) in given {
-            *entry = (field.name == name).then_some(value);
+            *entry = value.filter(|_| field.name == name);
         }
         fields
     }
@@ -301,6 +301,17 @@ impl<'a> Fields<'a> {
     #[must_use]
     pub fn finish(self) -> Rejections {
         self.rejections
+    }
+
+    /// The request, unless a field was rejected.
+    ///
+    /// # Errors
+    /// All rejected fields.
+    pub fn accept<T>(self, request: T) -> Result<T, Rejections> {
+        match self.accepted() {
+            true => Ok(request),
+            false => Err(self.rejections),
+        }
     }
 
     /// Whether every field read so far was valid: the `result` of the response.

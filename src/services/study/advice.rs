@@ -5,7 +5,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{taken, with_period};
+use super::with_period;
 use super::{Computed, Present, StudyWork};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
@@ -130,7 +130,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
         if ask.margin.is_some_and(|margin| margin < 1.0) {
             fields.refuse("margin", &"must be at least 1");
         }
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 
@@ -173,7 +173,7 @@ impl<const N: usize> Callable for PlanRun<N> {
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

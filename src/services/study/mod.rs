@@ -5,7 +5,6 @@
 //! **Invariant:** a computation is done in pieces, each of a fraction of a millisecond.
 
 mod advice;
-mod reading;
 mod rollout;
 mod stability;
 
@@ -16,6 +15,7 @@ pub use self::rollout::{NotRun, Ran, RolloutWork, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::Ask;
 use crate::math::arm::State;
+use crate::math::simulation::ControlPeriod;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 
@@ -65,4 +65,12 @@ pub struct Present<const N: usize> {
     pub control: ControlLoop<N>,
     /// The arm's positions and velocities.
     pub state: State<N>,
+}
+
+/// The present control period, with another length \[s\] if one is given.
+fn with_period(present: ControlPeriod, period: Option<f64>) -> ControlPeriod {
+    ControlPeriod {
+        period: period.unwrap_or(present.period),
+        ..present
+    }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::reading::{taken, with_period};
+use super::with_period;
 use super::{Computed, NUMBER_BYTES, Present, Work};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
@@ -98,7 +98,7 @@ impl<const N: usize> Callable for RunOffline<N> {
             samples: fields.count("samples", MAX_SAMPLES),
             reference: fields.boolean("reference"),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

@@ -8,7 +8,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{taken, with_period};
+use super::with_period;
 use super::{Computed, Present, StudyWork};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
@@ -70,7 +70,7 @@ impl<const N: usize> Callable for PredictStability<N> {
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

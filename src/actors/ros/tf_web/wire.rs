@@ -66,11 +66,7 @@ impl Callable for RepublishTfs {
         }
         // The topic has its own rate.
         let _ = fields.number("rate", Bound::NonNegative);
-        if fields.accepted() {
-            Ok(Self)
-        } else {
-            Err(fields.finish())
-        }
+        fields.accept(Self)
     }
 }
 
