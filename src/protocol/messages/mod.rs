@@ -6,7 +6,6 @@
 //! **Invariant:** one frame is one line of valid JSON.
 
 pub mod goal;
-pub mod republished;
 pub mod scene;
 mod telemetry;
 

@@ -25,8 +25,7 @@ use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::republished::{frames, seen_from};
-use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::scene::{WORLD, frames, seen_from};
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
