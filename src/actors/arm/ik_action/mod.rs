@@ -12,6 +12,8 @@ mod active;
 mod messages;
 mod services;
 
+use std::sync::Arc;
+
 use actix::prelude::*;
 use serde::Serialize;
 
@@ -19,12 +21,14 @@ use self::active::ActiveGoal;
 pub use self::messages::{
     CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, Meant, SendGoal,
 };
+use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
     AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
+use crate::actors::wire::action_client::{CancelSent, Pursue};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Node, Service, Topic};
 use crate::protocol::messages::goal::setpoint_trajectory;
@@ -94,8 +98,7 @@ impl<const N: usize> IkAction<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
         nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
-        let (send, cancel) = (address.clone().recipient(), address.clone().recipient());
-        services::attach::<N>(send, cancel, nodes);
+        nodes.carry_out::<SendGoal<N>, _>(address.clone());
         for topic in [Topic::IkFeedback, Topic::IkResult] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
@@ -121,6 +124,34 @@ impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
     fn handle(&mut self, call: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
         let pursuit = self.pursue(call.ask, call.reply, ctx.address());
         ctx.wait(pursuit);
+    }
+}
+
+impl<const N: usize> Handler<Pursue<SendGoal<N>>> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, pursue: Pursue<SendGoal<N>>, ctx: &mut Context<Self>) {
+        let Pursue { goal, client, done } = pursue;
+        let client = Arc::new(client);
+        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
+        let owner = Some(GoalOwner::Client(client));
+        let pursuit = self.pursue(SendGoal { owner, ..goal }, reply, ctx.address());
+        ctx.wait(pursuit);
+    }
+}
+
+impl<const N: usize> Handler<CancelSent> for IkAction<N> {
+    type Result = ();
+
+    /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
+    fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
+        let cancellation = self.end(&Meant::Sent(from.goal.clone()), GoalStatus::Canceled);
+        ctx.wait(cancellation.map(move |outcome, _, _| {
+            if let Err(why @ CancelRejected::NotSent) = outcome {
+                from.refuse(&why.to_string());
+            }
+            drop(done);
+        }));
     }
 }
 
