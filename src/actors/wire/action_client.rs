@@ -19,15 +19,8 @@ use crate::protocol::wire::json::Payload;
 
 /// A client's goal or cancellation, forwarded by the registry.
 pub enum ActionRequest {
-    /// A goal.
-    Goal {
-        /// Its fields, not parsed yet.
-        arguments: Arguments,
-        /// The client that sent it.
-        client: ActionClient,
-        /// Dropped when the goal has started or is refused. The client's next frame is read then.
-        done: Done,
-    },
+    /// A goal whose fields are not parsed yet.
+    Goal(Pursue<Arguments>),
     /// A cancellation.
     Cancel(CancelSent),
 }
@@ -52,7 +45,7 @@ pub struct Pursue<G> {
     pub goal: G,
     /// The client that sent it.
     pub client: ActionClient,
-    /// Dropped when the goal has started or is refused.
+    /// Dropped when the goal has started or is refused. The client's next frame is read then.
     pub done: Done,
 }
 

@@ -76,14 +76,10 @@ impl Nodes {
         A: Actor<Context = Context<A>> + Handler<Pursue<G>> + Handler<CancelSent>,
     {
         let take = move |request| match request {
-            ActionRequest::Goal {
-                arguments,
-                client,
-                done,
-            } => {
+            ActionRequest::Goal(Pursue { goal, client, done }) => {
                 let node = node.clone();
-                let length = arguments.payload().get().len();
-                let read = move || match G::read(&arguments) {
+                let length = goal.payload().get().len();
+                let read = move || match G::read(&goal) {
                     Ok(goal) => node.do_send(Pursue { goal, client, done }),
                     Err(rejections) => client.refuse(&rejections.status()),
                 };

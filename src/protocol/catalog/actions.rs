@@ -88,16 +88,4 @@ impl Action {
     pub const fn goal_fields(self) -> &'static [Field] {
         self.entry().goal.fields
     }
-
-    /// The fields of a result.
-    #[must_use]
-    pub const fn result_fields(self) -> &'static [Field] {
-        self.entry().result.fields
-    }
-
-    /// The fields of feedback.
-    #[must_use]
-    pub const fn feedback_fields(self) -> &'static [Field] {
-        self.entry().feedback.fields
-    }
 }

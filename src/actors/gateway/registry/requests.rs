@@ -17,7 +17,7 @@ use crate::actors::gateway::messages::{Handled, Tapped};
 use crate::actors::node::{Feedback, guard};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, Canceller, SentGoal,
+    ActionClient, ActionRequest, CancelSent, Canceller, Pursue, SentGoal,
 };
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
@@ -139,11 +139,11 @@ impl Registry {
         match route {
             Ok(node) => {
                 let (done, ended) = guard();
-                node(ActionRequest::Goal {
-                    arguments: goal.args,
+                node(ActionRequest::Goal(Pursue {
+                    goal: goal.args,
                     client: action_client,
                     done,
-                });
+                }));
                 Handled::with(ended)
             }
             Err(why) => {
