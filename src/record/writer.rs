@@ -152,8 +152,7 @@ impl<W: Write> McapWriter<W> {
                 id,
                 args,
             } => {
-                let mut msg = call(*client, *service, id, args);
-                msg["is_answer"] = false.into();
+                let msg = call(*client, *service, id, args, None);
                 self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
             }
             Content::Answered {
@@ -163,10 +162,8 @@ impl<W: Write> McapWriter<W> {
             } => {
                 let frame: ResponseFrame = serde_json::from_slice(frame)?;
                 let id = frame.id.map_or("", RawValue::get);
-                let mut msg = call(*client, *service, id, frame.values.get());
-                msg["is_answer"] = true.into();
-                msg["result"] = frame.result.into();
-                msg["status"] = frame.status.into();
+                let answer = Some((frame.result, &*frame.status));
+                let msg = call(*client, *service, id, frame.values.get(), answer);
                 self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
             }
             Content::Input { step, note } => {
@@ -270,13 +267,23 @@ fn qos_profiles(is_latched: bool) -> String {
     )
 }
 
-/// The fields that a call and its answer have. Absent fields are written as empty ones.
-fn call(client: u64, service: Service, id: &str, content: &str) -> Value {
+/// A call, or an answer with its result and its status.
+fn call(
+    client: u64,
+    service: Service,
+    id: &str,
+    content: &str,
+    answer: Option<(bool, &str)>,
+) -> Value {
+    let (result, status) = answer.unwrap_or_default();
     json!({
         "client": client,
         "id": id,
         "service": service.name(),
         "type": service.type_name(),
+        "is_answer": answer.is_some(),
         "content": content,
+        "result": result,
+        "status": status,
     })
 }

@@ -50,8 +50,6 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
     let unknown = || AnswerError::UnknownType {
         field: fields.first().map_or("", |field| field.name),
     };
-    let absolute = names::absolute(asked);
-    let topic = || topics(census).into_iter().find(|row| row.name == absolute);
     let type_of = |rows| {
         let row = named(rows, asked);
         row.and_then(|row| row.type_name)
@@ -66,35 +64,12 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         rows.filter(|row| row.is_of(asked)).collect()
     };
     Ok(match question {
-        Rosapi::Topics | Rosapi::TopicsAndRawTypes => {
-            let rows = topics(census);
-            let (topics, types): (Vec<_>, Vec<_>) =
-                rows.iter().map(|row| (row.name, row.type_name)).unzip();
-            let mut values = json!({"topics": topics, "types": types});
-            if question == Rosapi::TopicsAndRawTypes {
-                // There are few types, but thousands of topics with them.
-                let mut known = BTreeMap::new();
-                let mut text = |name| {
-                    let text = known.entry(name);
-                    let text = text.or_insert_with(|| types::full_text(name).unwrap_or_default());
-                    Value::from(text.as_str())
-                };
-                values["typedefs_full_text"] = types.into_iter().map(&mut text).collect();
-            }
-            values
-        }
-        Rosapi::TopicsForType => {
-            let rows = topics(census).into_iter();
-            let rows = rows.filter(|row| names::same_type(row.type_name, asked));
-            json!({"topics": rows.map(|row| row.name).collect::<Vec<_>>()})
-        }
-        Rosapi::TopicType => json!({"type": topic().map_or("", |row| row.type_name)}),
-        Rosapi::Publishers => {
-            json!({"publishers": node_names(topic().iter().flat_map(|row| &row.publishers))})
-        }
-        Rosapi::Subscribers => {
-            json!({"subscribers": node_names(topic().iter().flat_map(|row| &row.subscribers))})
-        }
+        Rosapi::Topics
+        | Rosapi::TopicsAndRawTypes
+        | Rosapi::TopicsForType
+        | Rosapi::TopicType
+        | Rosapi::Publishers
+        | Rosapi::Subscribers => about_topics(question, asked, census),
         Rosapi::Services => json!({"services": listed(services(census))}),
         Rosapi::ServicesForType => json!({"services": listed(of_type())}),
         Rosapi::ServiceType => {
@@ -133,4 +108,37 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
             return Err(AnswerError::OfTheArm);
         }
     })
+}
+
+/// The `values` for a question about topics.
+fn about_topics(question: Rosapi, asked: &str, census: &Census) -> Value {
+    let rows = topics(census);
+    let absolute = names::absolute(asked);
+    let topic = rows.iter().find(|row| row.name == absolute);
+    let (names, types): (Vec<_>, Vec<_>) = rows.iter().map(|row| (row.name, row.type_name)).unzip();
+    match question {
+        Rosapi::TopicsForType => {
+            let of_type = rows.iter();
+            let of_type = of_type.filter(|row| names::same_type(row.type_name, asked));
+            json!({"topics": of_type.map(|row| row.name).collect::<Vec<_>>()})
+        }
+        Rosapi::TopicType => json!({"type": topic.map_or("", |row| row.type_name)}),
+        Rosapi::Publishers => {
+            json!({"publishers": node_names(topic.iter().flat_map(|row| &row.publishers))})
+        }
+        Rosapi::Subscribers => {
+            json!({"subscribers": node_names(topic.iter().flat_map(|row| &row.subscribers))})
+        }
+        Rosapi::TopicsAndRawTypes => {
+            // There are few types, but thousands of topics with them.
+            let mut known = BTreeMap::new();
+            for name in &types {
+                let text = known.entry(*name);
+                text.or_insert_with(|| types::full_text(name).unwrap_or_default());
+            }
+            let texts: Vec<_> = types.iter().filter_map(|name| known.get(name)).collect();
+            json!({"topics": names, "types": types, "typedefs_full_text": texts})
+        }
+        _ => json!({"topics": names, "types": types}),
+    }
 }
