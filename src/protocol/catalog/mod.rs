@@ -22,6 +22,7 @@ pub(crate) use entry::{field, message};
 pub use node::Node;
 pub use rosapi::Rosapi;
 pub use services::Service;
+#[cfg(feature = "record")]
 pub(crate) use table::fields;
 pub(in crate::protocol) use table::table;
 pub use topics::Topic;
