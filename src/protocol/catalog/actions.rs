@@ -5,9 +5,10 @@
 
 use super::entry::{Field, Type, message};
 use super::node::Node;
-use super::services::{Service, WISH};
+use super::parts::{TRANSFORMS, WISH};
+use super::services::Service;
 use super::table::{fields, named, table};
-use super::topics::{TRANSFORMS, Topic};
+use super::topics::Topic;
 
 table! {
     /// An action of the runtime's own.

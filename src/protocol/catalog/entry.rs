@@ -3,7 +3,6 @@
 //! **Invariant:** a row is a constant. The catalog does not change while the program runs.
 
 use super::node::Node;
-use super::parts;
 
 /// One field of a message, a request or a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,14 +30,6 @@ pub enum Count {
 }
 
 impl Field {
-    /// The members of an object field of a request or a response, in documented order; empty for every other field.
-    #[must_use]
-    pub fn members(&self) -> &'static [Self] {
-        let mut types = parts::TYPES.iter();
-        let kind = types.find(|one| one.name == self.kind);
-        kind.map_or(&[], |one| one.fields)
-    }
-
     /// The field's type without brackets, and its number of values.
     #[must_use]
     pub fn element(&self) -> (&'static str, Count) {

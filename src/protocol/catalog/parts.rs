@@ -4,9 +4,7 @@
 //! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
 
 use super::entry::{Constant, Field, Type, byte, message};
-use super::services::WISH;
 use super::table::fields;
-use super::topics::TRANSFORMS;
 
 /// The members of `params` in a request are the fields of `/arm_sim/set_params`.
 pub(super) const PARAMS: &[Field] = fields![
@@ -20,6 +18,17 @@ pub(super) const GAINS: &[Field] = fields![
     "float64[] ki?  # N m/(rad s)",
     "float64[] kd?  # N m s/rad",
 ];
+
+/// A viewer's request: frames relative to another frame.
+pub(super) const WISH: &[Field] = fields![
+    "string[] source_frames",
+    "string target_frame",
+    "float32 angular_thres?",
+    "float32 trans_thres?",
+    "float32 rate?  # Hz",
+];
+/// Frames.
+pub(super) const TRANSFORMS: &[Field] = fields!["geometry_msgs/msg/TransformStamped[] transforms"];
 
 /// Defines a list of types, one row each: the name, and the fields or a constant with them.
 macro_rules! types {
@@ -172,3 +181,13 @@ const HEALTH: &[Constant] = &[
     byte("ERROR", "2"),
     byte("STALE", "3"),
 ];
+
+impl Field {
+    /// The members of an object field of a request or a response, in documented order; empty for every other field.
+    #[must_use]
+    pub fn members(&self) -> &'static [Self] {
+        let mut types = TYPES.iter();
+        let kind = types.find(|one| one.name == self.kind);
+        kind.map_or(&[], |one| one.fields)
+    }
+}

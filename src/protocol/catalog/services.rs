@@ -288,15 +288,6 @@ const TRIAL: &[Field] = fields![
     "float64 success_hold?  # s",
 ];
 
-/// A viewer's request: frames relative to another frame.
-pub(super) const WISH: &[Field] = fields![
-    "string[] source_frames",
-    "string target_frame",
-    "float32 angular_thres?",
-    "float32 trans_thres?",
-    "float32 rate?  # Hz",
-];
-
 named!(Service, |name: &str| Rosapi::from_name(name)
     .map(Self::Rosapi));
 

@@ -6,6 +6,7 @@ use super::entry::{
     Constant, Direction, Field, TopicEntry, Type, byte, message, published, subscribed,
 };
 use super::node::Node;
+use super::parts::TRANSFORMS;
 use super::table::{fields, named, table};
 
 table! {
@@ -135,8 +136,6 @@ const LOG_LEVELS: &[Constant] = &[
 
 /// A goal's name in ROS 1.
 const GOAL_ID: &[Field] = fields!["builtin_interfaces/msg/Time stamp  # s, ns", "string id",];
-
-pub(super) const TRANSFORMS: &[Field] = fields!["geometry_msgs/msg/TransformStamped[] transforms"];
 
 /// The names of topics, in both spellings.
 macro_rules! spellings {

@@ -1,5 +1,5 @@
-//! Messages for 3D tools and log viewers: frames, the arm's description, warnings. Web viewers that do not combine chains
-//! of frames get them relative to another frame.
+//! Messages for 3D tools and log viewers: frames, the arm's description, warnings. Web viewers that do not combine
+//! chains of frames get them relative to another frame.
 //!
 //! **Invariant:** frames and their parents are those of the [description](crate::protocol::ros::urdf). A frame is found
 //! with and without a leading slash, and is sent under the requested name.

@@ -1,8 +1,8 @@
 //! Reads `trajectory_msgs/msg/JointTrajectory`: the setpoint of a message on `/joint_trajectory`, and the goal of
 //! `control_msgs/action/FollowJointTrajectory` with its tolerances.
 //!
-//! **Invariant:** every returned setpoint and point has a finite position of each joint, in the arm's order. Every error
-//! names its field.
+//! **Invariant:** every returned setpoint and point has a finite position of each joint, in the arm's order. Every
+//! error names its field.
 
 use serde_json::value::RawValue;
 

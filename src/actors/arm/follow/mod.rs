@@ -6,13 +6,14 @@
 //!
 //! **Invariant:** at most one goal is active, and each accepted goal has exactly one result.
 
+mod answers;
 mod wire;
 
 use std::time::Duration;
 
 use actix::prelude::*;
 
-use self::wire::{ResultCode, feedback, result};
+use self::answers::{ResultCode, feedback, result};
 #[cfg(doc)]
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};

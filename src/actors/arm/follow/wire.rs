@@ -1,20 +1,15 @@
-//! Goals, feedback and results of `control_msgs/action/FollowJointTrajectory` in JSON.
+//! Goals of `control_msgs/action/FollowJointTrajectory` in JSON.
 //!
-//! **Invariant:** the fields are those of the catalog, and the codes those of the action. A long goal is read on another
-//! thread, and its client's later frames wait.
+//! **Invariant:** a long goal is read on another thread, and its client's later frames wait.
 
 use actix::prelude::*;
-use serde::Serialize;
 
 use super::{FollowPath, PathFollower};
 use crate::actors::arm::sim::joint_names;
 use crate::actors::wire::Nodes;
 use crate::actors::wire::action_client::Goal;
-use crate::math::arm::State;
-use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
-use crate::protocol::messages::{Header, Stamp};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::trajectory::{FollowGoal, JointTolerance};
@@ -82,83 +77,4 @@ fn tolerance<const N: usize>(
         }
     }
     tolerance
-}
-
-// ---- writing --------------------------------------------------------------------------------------------------------
-
-/// The result codes of the action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ResultCode {
-    Successful = 0,
-    InvalidGoal = -1,
-    PathToleranceViolated = -4,
-    GoalToleranceViolated = -5,
-}
-
-/// `control_msgs/action/FollowJointTrajectory_Result`.
-#[derive(Serialize)]
-pub(super) struct FollowResult {
-    error_code: i32,
-    error_string: String,
-}
-
-pub(super) fn result(code: ResultCode, why: &str) -> FollowResult {
-    FollowResult {
-        error_code: code as i32,
-        error_string: why.to_owned(),
-    }
-}
-
-/// `control_msgs/action/FollowJointTrajectory_Feedback`.
-#[derive(Serialize)]
-pub(super) struct FollowFeedback {
-    header: Header<'static>,
-    joint_names: Vec<&'static str>,
-    desired: PointMessage,
-    actual: PointMessage,
-    error: PointMessage,
-}
-
-/// `trajectory_msgs/msg/JointTrajectoryPoint`.
-#[derive(Serialize)]
-struct PointMessage {
-    positions: Vec<f64>,
-    velocities: Vec<f64>,
-    accelerations: [f64; 0],
-    effort: [f64; 0],
-    time_from_start: Stamp,
-}
-
-/// The feedback at simulation time `now`, `time` after the start \[s\].
-pub(super) fn feedback<const N: usize>(
-    now: f64,
-    time: f64,
-    desired: &Setpoint<N>,
-    actual: &State<N>,
-) -> FollowFeedback {
-    let time_from_start = Stamp::from_seconds(time);
-    let point = |positions: Vec<f64>, velocities: Vec<f64>| PointMessage {
-        positions,
-        velocities,
-        accelerations: [],
-        effort: [],
-        time_from_start,
-    };
-    let off = |wanted: &[f64], is: &[f64]| -> Vec<f64> {
-        wanted
-            .iter()
-            .zip(is)
-            .map(|(wanted, is)| wanted - is)
-            .collect()
-    };
-    FollowFeedback {
-        header: Header::world(now),
-        joint_names: joint_names::<N>().to_vec(),
-        desired: point(desired.position.to_vec(), desired.velocity.to_vec()),
-        actual: point(actual.position.to_vec(), actual.velocity.to_vec()),
-        error: point(
-            off(&desired.position, &actual.position),
-            off(&desired.velocity, &actual.velocity),
-        ),
-    }
 }

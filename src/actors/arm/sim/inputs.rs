@@ -1,8 +1,9 @@
-//! Setpoints and efforts of clients, published on `/joint_trajectory` and `/effort_controller/commands`, and the setpoint
-//! of the node that moves the arm along a path.
+//! Setpoints and efforts of clients, published on `/joint_trajectory` and `/effort_controller/commands`, and the
+//! setpoint of the node that moves the arm along a path.
 //!
 //! **Invariant:** an input is accepted as a whole, or answered with a status that names the fault. A setpoint is moved
-//! only if it is still the mover's last one. An effort acts only while the controller is off and its client is connected.
+//! only if it is still the mover's last one. An effort acts only while the controller is off and its client is
+//! connected.
 
 use std::sync::Weak;
 

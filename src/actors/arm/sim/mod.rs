@@ -12,6 +12,7 @@ mod node;
 mod requests;
 mod steps;
 mod turn;
+mod waiting;
 mod world;
 
 pub use self::inputs::{ArmMotion, CommandEffort, JointMotion, MoveSetpoint, SetSetpoint};

@@ -18,8 +18,8 @@ use tokio::time::Instant;
 use super::messages::{
     ArmSettings, Barrier, Consult, HeldLimit, SimulationTime, Snapshot, TakeSnapshot, Tell,
 };
-use super::steps::Steps;
 use super::turn::Turn;
+use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::gauges::Gauges;

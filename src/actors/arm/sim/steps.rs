@@ -8,16 +8,9 @@
 use actix::prelude::*;
 
 use super::node::ArmSim;
-use crate::actors::node::{Call, Reply, ShutDown, Unserved};
-use crate::live::StepsAsked;
-use crate::protocol::op::fields::Rejections;
-use crate::services::arm::{Step, Stepped};
-
-/// Requested steps that are not all taken, with the reply.
-pub(super) struct Steps<const N: usize> {
-    asked: StepsAsked<N>,
-    reply: Reply<Result<Stepped<N>, Rejections>>,
-}
+use super::waiting::Steps;
+use crate::actors::node::{Call, ShutDown, Unserved};
+use crate::services::arm::Step;
 
 impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     type Result = ();

@@ -1,5 +1,5 @@
-//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar services,
-//! which every node of ROS 2 has.
+//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar
+//! services, which every node of ROS 2 has.
 //!
 //! All these services are one question, which names parameters. The arm's own services read and change them, so checks
 //! and texts are the same.

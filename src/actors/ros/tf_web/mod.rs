@@ -9,6 +9,7 @@
 //! **Invariant:** nothing is requested from the arm without a request and a subscriber. A connection has
 //! at most [`MAX_WISHES`] requests.
 
+mod answers;
 mod wire;
 
 use std::collections::VecDeque;
@@ -297,7 +298,7 @@ impl<const N: usize> TfRepublisher<N> {
             match &wish.by {
                 FrameReceiver::Client(client) => client.feed_back(message),
                 FrameReceiver::Topic { id, .. } => {
-                    let message = wire::feedback(stamp, id.clone(), message);
+                    let message = answers::feedback(stamp, id.clone(), message);
                     publish(&self.publish, Topic::TfWebFeedback, message);
                 }
             }

@@ -1,4 +1,4 @@
-//! Requests for frames in JSON, and the feedback of published ones.
+//! Requests for frames in JSON.
 //!
 //! **Invariant:** a request names only frames of the arm. Others are refused by name.
 
@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use serde::Serialize;
 use serde_json::json;
 use serde_json::value::RawValue;
 
@@ -18,8 +17,7 @@ use crate::actors::wire::action_client::Goal;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
-use crate::protocol::messages::scene::{TfMessage, WORLD, is_frame};
-use crate::protocol::messages::{Header, Stamp};
+use crate::protocol::messages::scene::{WORLD, is_frame};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::wire::{json, text};
@@ -150,42 +148,4 @@ fn members<'a, const M: usize>(
 
 fn refused(field: &str, why: &impl std::fmt::Display) -> Rejections {
     RejectedField::refused(field, why).into()
-}
-
-/// `tf2_web_republisher/TFSubscriptionActionFeedback`.
-#[derive(Serialize)]
-pub(super) struct FramesFeedback {
-    header: Header<'static>,
-    status: WishStatus,
-    feedback: TfMessage,
-}
-
-/// `actionlib_msgs/GoalStatus`.
-#[derive(Serialize)]
-struct WishStatus {
-    goal_id: WishId,
-    status: u8,
-    text: &'static str,
-}
-
-/// `actionlib_msgs/GoalID`.
-#[derive(Serialize)]
-struct WishId {
-    stamp: Stamp,
-    id: String,
-}
-
-/// The feedback of a published request, under the id of the request.
-pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesFeedback {
-    let frame_id = "";
-    FramesFeedback {
-        header: Header { stamp, frame_id },
-        status: WishStatus {
-            goal_id: WishId { stamp, id },
-            // The status `active` of ROS 1.
-            status: 1,
-            text: "",
-        },
-        feedback,
-    }
 }

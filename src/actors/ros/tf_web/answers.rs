@@ -1,0 +1,45 @@
+//! The feedback of a published request, under the id of the request.
+//!
+//! **Invariant:** the fields are those of the catalog.
+
+use serde::Serialize;
+
+use crate::protocol::messages::scene::TfMessage;
+use crate::protocol::messages::{Header, Stamp};
+
+/// `tf2_web_republisher/TFSubscriptionActionFeedback`.
+#[derive(Serialize)]
+pub(super) struct FramesFeedback {
+    header: Header<'static>,
+    status: WishStatus,
+    feedback: TfMessage,
+}
+
+/// `actionlib_msgs/GoalStatus`.
+#[derive(Serialize)]
+struct WishStatus {
+    goal_id: WishId,
+    status: u8,
+    text: &'static str,
+}
+
+/// `actionlib_msgs/GoalID`.
+#[derive(Serialize)]
+struct WishId {
+    stamp: Stamp,
+    id: String,
+}
+
+pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesFeedback {
+    let frame_id = "";
+    FramesFeedback {
+        header: Header { stamp, frame_id },
+        status: WishStatus {
+            goal_id: WishId { stamp, id },
+            // The status `active` of ROS 1.
+            status: 1,
+            text: "",
+        },
+        feedback,
+    }
+}
