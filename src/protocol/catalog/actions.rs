@@ -3,11 +3,11 @@
 //! **Invariant:** an action has the fields of the services and topics with the same effect. Without such services, it
 //! has those of ROS 2.
 
-use super::entry::{Field, Type, message};
+use super::entry::{Field, Type, fields, message};
 use super::node::Node;
 use super::parts::{TRANSFORMS, WISH};
 use super::services::Service;
-use super::table::{fields, named, table};
+use super::table::{named, table};
 use super::topics::Topic;
 
 table! {

@@ -73,6 +73,12 @@ const fn cut(text: &'static str, mark: u8) -> (&'static str, &'static str) {
     (text, "")
 }
 
+/// A list of fields. It is a separate constant, because a row borrows its lists for `'static`.
+macro_rules! fields {
+    ($($field:literal),* $(,)?) => { const { &[$($crate::protocol::catalog::field($field)),*] } };
+}
+pub(crate) use fields;
+
 /// A message type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Type {

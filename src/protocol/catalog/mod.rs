@@ -17,12 +17,12 @@ mod topics;
 pub mod types;
 
 pub use actions::Action;
+#[cfg(feature = "record")]
+pub(crate) use entry::fields;
 pub use entry::{Direction, Field};
 pub(crate) use entry::{field, message};
 pub use node::Node;
 pub use rosapi::Rosapi;
 pub use services::Service;
-#[cfg(feature = "record")]
-pub(crate) use table::fields;
 pub(in crate::protocol) use table::table;
 pub use topics::Topic;

@@ -3,8 +3,7 @@
 //!
 //! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
 
-use super::entry::{Constant, Field, Type, byte, message};
-use super::table::fields;
+use super::entry::{Constant, Field, Type, byte, fields, message};
 
 /// The members of `params` in a request are the fields of `/arm_sim/set_params`.
 pub(super) const PARAMS: &[Field] = fields![

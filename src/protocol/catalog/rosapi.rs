@@ -4,9 +4,9 @@
 //!
 //! **Invariant:** every row has a name under [`PREFIX`]. The other spelling is derived from it.
 
-use super::entry::{Field, ServiceEntry, service};
+use super::entry::{Field, ServiceEntry, fields, service};
 use super::node::Node;
-use super::table::{fields, table};
+use super::table::table;
 use super::topics::ARM_STATE;
 
 /// The prefix of the services' names.

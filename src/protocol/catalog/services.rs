@@ -3,11 +3,11 @@
 //! **Invariant:** every service that a client can call is a row here. A row that no node serves fails
 //! `tests/actors/rosapi.rs`.
 
-use super::entry::{Field, ServiceEntry, service};
+use super::entry::{Field, ServiceEntry, fields, service};
 use super::node::Node;
 use super::parts::{GAINS, PARAMS};
 use super::rosapi::Rosapi;
-use super::table::{fields, named, table};
+use super::table::{named, table};
 use super::topics::{ARM_STATE, ARM_STATE_AND_FEEDBACK};
 
 table! {

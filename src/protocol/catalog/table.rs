@@ -1,4 +1,4 @@
-//! The macros that define a table of the catalog: rows and their fields.
+//! The macros that define a table of the catalog, and the members that tables have in common.
 //!
 //! **Invariant:** a table is an enum, so a `match` on rows must handle every row.
 
@@ -34,12 +34,6 @@ macro_rules! table {
     };
 }
 pub(in crate::protocol) use table;
-
-/// A list of fields. It is a separate constant, because a row borrows its lists for `'static`.
-macro_rules! fields {
-    ($($field:literal),* $(,)?) => { const { &[$($crate::protocol::catalog::field($field)),*] } };
-}
-pub(crate) use fields;
 
 /// The members of a table whose rows have a name, a type and a node. `nested` finds a row of the nested table.
 macro_rules! named {

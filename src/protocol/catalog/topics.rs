@@ -3,11 +3,11 @@
 //! **Invariant:** a row has the whole type of its messages, so every topic has a definition.
 
 use super::entry::{
-    Constant, Direction, Field, TopicEntry, Type, byte, message, published, subscribed,
+    Constant, Direction, Field, TopicEntry, Type, byte, fields, message, published, subscribed,
 };
 use super::node::Node;
 use super::parts::TRANSFORMS;
-use super::table::{fields, named, table};
+use super::table::{named, table};
 
 table! {
     /// A topic of the runtime's own.
