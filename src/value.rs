@@ -63,6 +63,17 @@ pub(crate) fn needed<T>(value: Option<T>, needs: &str, text: &str) -> Result<T, 
     value.ok_or_else(|| format!("must be {needs}, got {text:?}"))
 }
 
+/// The value of one of these names.
+pub(crate) fn one_of<T: Copy>(values: &[(&str, T)], text: &str) -> Result<T, String> {
+    let value = values.iter().find(|(name, _)| *name == text);
+    let names: Vec<&str> = values.iter().map(|(name, _)| *name).collect();
+    let needs = match names.split_last() {
+        Some((last, others)) => format!("{} or {last}", others.join(", ")),
+        None => String::new(),
+    };
+    needed(value.map(|(_, value)| *value), &needs, text)
+}
+
 /// The number of links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Links {
@@ -84,10 +95,5 @@ impl Links {
 }
 
 pub(crate) fn read_links(text: &str) -> Result<Links, String> {
-    let links = match text {
-        "2" => Some(Links::Two),
-        "3" => Some(Links::Three),
-        _ => None,
-    };
-    needed(links, "2 or 3", text)
+    one_of(&[("2", Links::Two), ("3", Links::Three)], text)
 }

@@ -15,7 +15,7 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::TcpStream;
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Instant, timeout_at};
 
 use super::output::{CommandError, plain, print};
 use super::yaml::{json_line, write_yaml};
@@ -29,6 +29,8 @@ use crate::value::{ValueReader, needed, within};
 
 /// Longest time for each address of the host to accept the connection.
 const CONNECT: Duration = Duration::from_secs(5);
+/// Without `--timeout`: longer than any command runs.
+const NO_LIMIT: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
 
 /// Longest frame that is read \[bytes\]. The runtime's longest answer is a trajectory of a million steps. Each has
 /// three numbers of 25 bytes with their commas, 75 MB together.
@@ -78,7 +80,7 @@ pub(super) struct Session {
     calls: u64,
     patience: Option<Duration>,
     /// Deadline of the next awaited frame.
-    deadline: Option<Instant>,
+    deadline: Instant,
     /// Whether JSON is printed.
     pub(super) is_json: bool,
 }
@@ -131,7 +133,7 @@ impl RuntimeOptions {
             line: Vec::new(),
             calls: 0,
             patience,
-            deadline: None,
+            deadline: Instant::now(),
             is_json: self.json,
         };
         let mut opening = json!({"op": "auth", "command": true});
@@ -146,10 +148,7 @@ impl RuntimeOptions {
 async fn dial(address: &str, patience: Duration) -> io::Result<TcpStream> {
     let mut why = io::Error::new(ErrorKind::NotFound, "that name has no address");
     for one in address.to_socket_addrs()? {
-        match timeout(patience, TcpStream::connect(one))
-            .await
-            .unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
-        {
+        match in_time(Instant::now() + patience, TcpStream::connect(one)).await {
             Ok(stream) => return stream.set_nodelay(true).map(|()| stream),
             Err(error) => why = error,
         }
@@ -158,22 +157,15 @@ async fn dial(address: &str, patience: Duration) -> io::Result<TcpStream> {
 }
 
 /// Runs `work` until the deadline.
-async fn in_time<T>(
-    deadline: Option<Instant>,
-    work: impl Future<Output = io::Result<T>>,
-) -> io::Result<T> {
-    match deadline {
-        None => work.await,
-        Some(deadline) => timeout_at(deadline, work)
-            .await
-            .unwrap_or_else(|_| Err(ErrorKind::TimedOut.into())),
-    }
+async fn in_time<T>(deadline: Instant, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {
+    let outcome = timeout_at(deadline, work).await;
+    outcome.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
 }
 
 impl Session {
     /// Sets the deadline of the next awaited frame to `--timeout` from now.
     pub(super) fn await_next(&mut self) {
-        self.deadline = self.patience.map(|patience| Instant::now() + patience);
+        self.deadline = Instant::now() + self.patience.unwrap_or(NO_LIMIT);
     }
 
     /// Sends a frame, and sets the deadline of its answer.

@@ -10,7 +10,7 @@ use crate::address;
 use crate::logging::LogFormat;
 use crate::protocol::limits::MAX_CLIENTS;
 use crate::protocol::op::token::Token;
-use crate::value::{needed, within};
+use crate::value::{needed, one_of, within};
 #[cfg(feature = "web")]
 use crate::web::authority::Authority;
 
@@ -38,18 +38,20 @@ pub(super) fn read_seed(text: &str) -> Result<u64, String> {
 }
 
 pub(super) fn read_level(text: &str) -> Result<LevelFilter, String> {
-    let is_name = ["off", "error", "warn", "info", "debug", "trace"].contains(&text);
-    let level = text.parse().ok().filter(|_| is_name);
-    needed(level, "off, error, warn, info, debug or trace", text)
+    let levels = [
+        ("off", LevelFilter::OFF),
+        ("error", LevelFilter::ERROR),
+        ("warn", LevelFilter::WARN),
+        ("info", LevelFilter::INFO),
+        ("debug", LevelFilter::DEBUG),
+        ("trace", LevelFilter::TRACE),
+    ];
+    one_of(&levels, text)
 }
 
 pub(super) fn read_log_format(text: &str) -> Result<LogFormat, String> {
-    let format = match text {
-        "text" => Some(LogFormat::Text),
-        "json" => Some(LogFormat::Json),
-        _ => None,
-    };
-    needed(format, "text or json", text)
+    let formats = [("text", LogFormat::Text), ("json", LogFormat::Json)];
+    one_of(&formats, text)
 }
 
 /// A token is a secret, so a refusal does not show it.

@@ -2,8 +2,8 @@
 //!
 //! **Invariant:** a number keeps its 64 bits: in CDR, or as the shortest text that is read back as the same number.
 
-use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types::Type;
+use crate::protocol::catalog::{fields, message};
 
 /// The channel of inputs to the arm.
 pub const INPUTS: &str = "/recorder/inputs";
@@ -12,46 +12,34 @@ pub const STATES: &str = "/recorder/states";
 /// The channel of calls and their answers.
 pub const CALLS: &str = "/recorder/calls";
 
-const fn field(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
-    Field {
-        name,
-        kind,
-        unit,
-        required: true,
-    }
-}
-
 /// An input with the number of steps before it.
-pub(super) const INPUT: Type = Type {
-    name: "pendularm_interfaces/msg/RecordedInput",
-    fields: &[field("step", "uint64", ""), field("input", "string", "")],
-    constants: &[],
-};
+pub(super) const INPUT: Type = message(
+    "pendularm_interfaces/msg/RecordedInput",
+    fields!["uint64 step", "string input"],
+);
 
 /// The arm's state after a number of steps.
-pub(super) const STATE: Type = Type {
-    name: "pendularm_interfaces/msg/RecordedState",
-    fields: &[
-        field("step", "uint64", ""),
-        field("position", "float64[]", "rad"),
-        field("velocity", "float64[]", "rad/s"),
-        field("effort", "float64[]", "N m"),
+pub(super) const STATE: Type = message(
+    "pendularm_interfaces/msg/RecordedState",
+    fields![
+        "uint64 step",
+        "float64[] position  # rad",
+        "float64[] velocity  # rad/s",
+        "float64[] effort  # N m",
     ],
-    constants: &[],
-};
+);
 
 /// A call, or an answer. In an answer `content` is `values`.
-pub(super) const CALL: Type = Type {
-    name: "pendularm_interfaces/msg/RecordedCall",
-    fields: &[
-        field("client", "uint64", ""),
-        field("id", "string", ""),
-        field("service", "string", ""),
-        field("type", "string", ""),
-        field("is_answer", "bool", ""),
-        field("content", "string", ""),
-        field("result", "bool", ""),
-        field("status", "string", ""),
+pub(super) const CALL: Type = message(
+    "pendularm_interfaces/msg/RecordedCall",
+    fields![
+        "uint64 client",
+        "string id",
+        "string service",
+        "string type",
+        "bool is_answer",
+        "string content",
+        "bool result",
+        "string status",
     ],
-    constants: &[],
-};
+);

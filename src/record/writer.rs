@@ -9,8 +9,8 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Deserialize;
-use serde_json::json;
 use serde_json::value::RawValue;
+use serde_json::{Value, json};
 
 use super::schema::{CALL, CALLS, INPUT, INPUTS, STATE, STATES};
 use super::{Content, RecordEntry};
@@ -151,14 +151,20 @@ impl<W: Write> McapWriter<W> {
                 service,
                 id,
                 args,
-            } => self.call(at, *client, *service, &Said::call(id, args)),
+            } => {
+                let msg = call(*client, *service, id, args, None);
+                self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
+            }
             Content::Answered {
                 client,
                 service,
                 frame,
             } => {
                 let frame: ResponseFrame = serde_json::from_slice(frame)?;
-                self.call(at, *client, *service, &Said::answer(&frame))
+                let id = frame.id.map_or("", RawValue::get);
+                let answer = Some((frame.result, &*frame.status));
+                let msg = call(*client, *service, id, frame.values.get(), answer);
+                self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
             }
             Content::Input { step, note } => {
                 let msg = json!({"step": step, "input": note});
@@ -215,26 +221,6 @@ impl<W: Write> McapWriter<W> {
         self.put(at, topic.name(), one, &cdr::encode_tree(one, msg.root()))
     }
 
-    fn call(
-        &mut self,
-        at: u64,
-        client: u64,
-        service: Service,
-        said: &Said<'_>,
-    ) -> Result<(), RecordError> {
-        let msg = json!({
-            "client": client,
-            "id": said.id,
-            "service": service.name(),
-            "type": service.type_name(),
-            "is_answer": said.is_answer,
-            "content": said.content,
-            "result": said.result,
-            "status": said.status,
-        });
-        self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
-    }
-
     fn put(
         &mut self,
         at: u64,
@@ -281,33 +267,23 @@ fn qos_profiles(is_latched: bool) -> String {
     )
 }
 
-/// A recorded call or answer.
-struct Said<'a> {
-    id: &'a str,
-    is_answer: bool,
-    content: &'a str,
-    result: bool,
-    status: &'a str,
-}
-
-impl<'a> Said<'a> {
-    fn call(id: &'a str, args: &'a str) -> Self {
-        Self {
-            id,
-            is_answer: false,
-            content: args,
-            result: false,
-            status: "",
-        }
-    }
-
-    fn answer(frame: &'a ResponseFrame<'a>) -> Self {
-        Self {
-            id: frame.id.map_or("", RawValue::get),
-            is_answer: true,
-            content: frame.values.get(),
-            result: frame.result,
-            status: &frame.status,
-        }
-    }
+/// A call, or an answer with its result and its status.
+fn call(
+    client: u64,
+    service: Service,
+    id: &str,
+    content: &str,
+    answer: Option<(bool, &str)>,
+) -> Value {
+    let (result, status) = answer.unwrap_or_default();
+    json!({
+        "client": client,
+        "id": id,
+        "service": service.name(),
+        "type": service.type_name(),
+        "is_answer": answer.is_some(),
+        "content": content,
+        "result": result,
+        "status": status,
+    })
 }

@@ -4,15 +4,14 @@
 //! the target and the setpoint with which it was accepted.
 
 use bytes::Bytes;
+use serde_json::json;
 
 use super::{Address, Answered, Ask, Callable};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::{Target, Unreachable};
 use crate::protocol::catalog::{Node, Service};
 use crate::protocol::messages::Empty;
-use crate::protocol::messages::goal::{
-    GoalValues, IkFeedback, IkResult, SolutionValues, TargetMessage,
-};
+use crate::protocol::messages::goal::{IkFeedback, IkResult, TargetMessage};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -48,10 +47,7 @@ impl<const N: usize> Callable for Solve<N> {
 
 impl<const N: usize> Answered for Solve<N> {
     fn write(answer: Result<[f64; N], SolveError>, to: &Address) -> Bytes {
-        let values = answer
-            .as_ref()
-            .map(|positions| SolutionValues { positions });
-        to.outcome(values)
+        to.outcome(answer.map(|positions| json!({"positions": positions.to_vec()})))
     }
 }
 
@@ -123,8 +119,7 @@ impl GoalRequest {
     /// Writes the response: the id of the accepted goal.
     #[must_use]
     pub fn write(answer: &Result<String, GoalRejected>, to: &Address) -> Bytes {
-        let values = answer.as_ref().map(|goal_id| GoalValues { goal_id });
-        to.outcome(values)
+        to.outcome(answer.as_ref().map(|goal_id| json!({"goal_id": goal_id})))
     }
 }
 
@@ -157,11 +152,7 @@ impl CancelRequest {
     pub fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
-        if fields.accepted() {
-            Ok(Self { goal_id })
-        } else {
-            Err(fields.finish())
-        }
+        fields.accept(Self { goal_id })
     }
 
     /// Writes the response.

@@ -5,13 +5,14 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use serde_json::json;
 
 use super::goals::target_message;
 use super::{Address, Answered, Ask, Callable};
 use crate::math::trial::{Changes, Rejection, Settings, Status};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
-use crate::protocol::messages::goal::{TrialStatus, TrialValues};
+use crate::protocol::messages::goal::TrialStatus;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -84,11 +85,11 @@ impl Callable for StartTrial {
 impl Answered for StartTrial {
     fn write(Terms { settings, outcome }: Terms, to: &Address) -> Bytes {
         let Settings { duration, criteria } = settings;
-        let values = TrialValues {
-            duration,
-            epsilon: criteria.epsilon,
-            success_hold: criteria.success_hold,
-        };
+        let values = json!({
+            "duration": duration,
+            "epsilon": criteria.epsilon,
+            "success_hold": criteria.success_hold,
+        });
         let status = outcome.map_or_else(|why| why.to_string(), |()| String::new());
         to.response(&values, &status)
     }

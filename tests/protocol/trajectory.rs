@@ -2,15 +2,14 @@
 //!
 //! **Invariant:** the joints are named as a 3-link arm's or a 2-link arm's are.
 
-use pendularm::protocol::messages::trajectory::{
-    SetpointRequest, TrajectoryError, joint_trajectory,
-};
+use pendularm::protocol::op::fields::RejectedField;
+use pendularm::protocol::op::trajectory::{SetpointRequest, joint_trajectory};
 use proptest::prelude::*;
 use serde_json::value::RawValue;
 
 const JOINTS: [&str; 3] = ["joint1", "joint2", "joint3"];
 
-fn read(msg: &str) -> Result<SetpointRequest, TrajectoryError> {
+fn read(msg: &str) -> Result<SetpointRequest, RejectedField> {
     joint_trajectory(
         &RawValue::from_string(msg.to_owned()).expect("valid JSON"),
         &JOINTS,

@@ -5,17 +5,15 @@
 use std::path::PathBuf;
 
 use actix::prelude::*;
+use serde::Serialize;
 
 use crate::actors::node::Ask;
-use crate::protocol::op::fields::Rejections;
 
 /// Starts a record in the operator's folder.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StartRecording {
     /// The file's name, without a folder. Without one, a name is generated.
     pub name: Option<String>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
 }
 
 impl Ask for StartRecording {
@@ -31,7 +29,7 @@ impl Ask for StopRecording {
 }
 
 /// A finished record.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Recorded {
     /// The file's name.
     pub file: String,
@@ -56,9 +54,6 @@ pub struct EndRecord;
 /// Why a record was not started or not ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotRecorded {
-    /// Rejected fields.
-    #[error("{0}")]
-    Rejected(Rejections),
     /// The operator has set no folder.
     #[error("recording by service needs a folder: start the program with --record-dir")]
     NoFolder,

@@ -89,9 +89,6 @@ impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
 
     fn handle(&mut self, call: Call<StartRecording>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
-        if !ask.rejected.is_empty() {
-            return reply.answer(Err(NotRecorded::Rejected(ask.rejected)));
-        }
         let Some(folder) = &self.folder else {
             return reply.answer(Err(NotRecorded::NoFolder));
         };

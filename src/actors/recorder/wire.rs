@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 use bytes::Bytes;
-use serde::Serialize;
+use serde_json::json;
 
 use super::Recorder;
 use super::limits::MAX_FILE_NAME;
@@ -32,20 +32,13 @@ impl Callable for StartRecording {
             );
             fields.refuse("name", &rule);
         }
-        Ok(Self {
-            name,
-            rejected: fields.finish(),
-        })
+        fields.accept(Self { name })
     }
 }
 
 impl Answered for StartRecording {
     fn write(answer: Result<String, NotRecorded>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            file: String,
-        }
-        to.outcome(answer.map(|file| Values { file }))
+        to.outcome(answer.map(|file| json!({"file": file})))
     }
 }
 
@@ -58,20 +51,7 @@ impl Callable for StopRecording {
 
 impl Answered for StopRecording {
     fn write(answer: Result<Recorded, NotRecorded>, to: &Address) -> Bytes {
-        #[derive(Serialize)]
-        struct Values {
-            file: String,
-            messages: u64,
-            bytes: u64,
-            dropped: u64,
-        }
-        let values = answer.map(|recorded| Values {
-            file: recorded.file,
-            messages: recorded.messages,
-            bytes: recorded.bytes,
-            dropped: recorded.dropped,
-        });
-        to.outcome(values)
+        to.outcome(answer)
     }
 }
 

@@ -138,16 +138,15 @@ impl Callable for Look {
         let mut fields = Fields::read(arguments, service)?;
         let name = service.fields().first();
         let name = name.and_then(|field| fields.text(field.name));
-        if !fields.accepted() {
-            return Err(fields.finish());
-        }
         let name = name.unwrap_or_default().into_owned();
-        let Service::Rosapi(question) = service else {
-            debug_assert!(false, "{} is not this node's", service.name());
-            let question = Rosapi::Topics;
-            return Ok(Self { question, name });
+        let question = match service {
+            Service::Rosapi(question) => question,
+            other => {
+                debug_assert!(false, "{} is not this node's", other.name());
+                Rosapi::Topics
+            }
         };
-        Ok(Self { question, name })
+        fields.accept(Self { question, name })
     }
 }
 

@@ -11,28 +11,52 @@ use serde::Serialize;
 
 use crate::actors::ConnectionId;
 use crate::actors::node::{Done, Feedback, FrameOut, Respond};
+use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
+use crate::protocol::op::fields::Rejections;
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::json::Payload;
 
 /// A client's goal or cancellation, forwarded by the registry.
 pub enum ActionRequest {
-    /// A goal.
-    Goal {
-        /// Its fields, not parsed yet.
-        arguments: Arguments,
-        /// The client that sent it.
-        client: ActionClient,
-        /// Dropped when the goal has started or is refused. The client's next frame is read then.
-        done: Done,
-    },
-    /// Cancels the goal that the same client has sent with the same id.
-    Cancel {
-        /// The client that cancels. It gets an error status if no such goal is active.
-        from: Canceller,
-        /// Dropped when the goal has ended.
-        done: Done,
-    },
+    /// A goal whose fields are not parsed yet.
+    Goal(Pursue<Arguments>),
+    /// A cancellation.
+    Cancel(CancelSent),
+}
+
+/// A goal that clients send by an action.
+pub trait Goal: Sized + Send + 'static {
+    /// The action.
+    const ACTION: Action;
+
+    /// Reads a goal.
+    ///
+    /// # Errors
+    /// All rejected fields, by name.
+    fn read(arguments: &Arguments) -> Result<Self, Rejections>;
+}
+
+/// A goal with its client. From clients, by the action.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Pursue<G> {
+    /// The goal.
+    pub goal: G,
+    /// The client that sent it.
+    pub client: ActionClient,
+    /// Dropped when the goal has started or is refused. The client's next frame is read then.
+    pub done: Done,
+}
+
+/// Cancels the goal that the same client has sent. From clients, by the action.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CancelSent {
+    /// The client that cancels. It gets an error status if no such goal is active.
+    pub from: Canceller,
+    /// Dropped when the goal has ended.
+    pub done: Done,
 }
 
 /// A goal of the action: its client and the client's id.

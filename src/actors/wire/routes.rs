@@ -6,12 +6,11 @@ use std::collections::HashMap;
 
 use actix::prelude::*;
 
-use super::action_client::{ActionClient, ActionRequest, Canceller};
+use super::action_client::{ActionRequest, CancelSent, Goal, Pursue};
 use super::caller::{ClientAsker, ServiceCall, TopicMessage};
-use crate::actors::node::{Call, Done, Interest, Reply};
+use crate::actors::node::{Call, Interest, Reply};
 use crate::actors::resources::aside::{WorkKind, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
-use crate::protocol::op::Arguments;
 use crate::services::Answered;
 
 /// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
@@ -71,26 +70,24 @@ impl Nodes {
         self.listeners.insert(topic, Box::new(take));
     }
 
-    /// Goals of `action` are read by `take`, and ended by `cancel`.
-    pub fn carry_out(
-        &mut self,
-        action: Action,
-        take: impl Fn(Arguments, ActionClient, Done) + Clone + Send + 'static,
-        cancel: impl Fn(Canceller, Done) + Send + 'static,
-    ) {
+    /// Goals of this kind, and their cancellations, are for this node.
+    pub fn carry_out<G: Goal, A>(&mut self, node: Addr<A>)
+    where
+        A: Actor<Context = Context<A>> + Handler<Pursue<G>> + Handler<CancelSent>,
+    {
         let take = move |request| match request {
-            ActionRequest::Goal {
-                arguments,
-                client,
-                done,
-            } => {
-                let take = take.clone();
-                let length = arguments.payload().get().len();
-                read_arguments(length, move || take(arguments, client, done));
+            ActionRequest::Goal(Pursue { goal, client, done }) => {
+                let node = node.clone();
+                let length = goal.payload().get().len();
+                let read = move || match G::read(&goal) {
+                    Ok(goal) => node.do_send(Pursue { goal, client, done }),
+                    Err(rejections) => client.refuse(&rejections.status()),
+                };
+                read_arguments(length, read);
             }
-            ActionRequest::Cancel { from, done } => cancel(from, done),
+            ActionRequest::Cancel(cancel) => node.do_send(cancel),
         };
-        self.actions.insert(action, Box::new(take));
+        self.actions.insert(G::ACTION, Box::new(take));
     }
 }
 

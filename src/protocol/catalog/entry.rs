@@ -44,23 +44,40 @@ impl Field {
     }
 }
 
-/// A field that a request must have, or any field of a message or a response.
-pub(super) const fn required(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
+/// A field in the notation of `.msg` files, with its unit as a comment: `float64 x  # m`. A request may omit a field
+/// whose name ends with `?`.
+pub(crate) const fn field(text: &'static str) -> Field {
+    let (kind, rest) = cut(text, b' ');
+    let (spelled, unit) = cut(rest, b' ');
+    let (name, _) = cut(spelled, b'?');
+    let (_, unit) = cut(unit.trim_ascii(), b' ');
     Field {
         name,
         kind,
         unit,
-        required: true,
+        required: name.len() == spelled.len(),
     }
 }
 
-/// An optional field of a request.
-pub(super) const fn optional(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
-    Field {
-        required: false,
-        ..required(name, kind, unit)
+/// The text before the first `mark`, and the text after it; the whole text if there is none.
+const fn cut(text: &'static str, mark: u8) -> (&'static str, &'static str) {
+    let mut rest = text.as_bytes();
+    let mut at = 0;
+    while let [first, behind @ ..] = rest {
+        if *first == mark {
+            return (text.split_at(at).0, text.split_at(at + 1).1);
+        }
+        rest = behind;
+        at += 1;
     }
+    (text, "")
 }
+
+/// A list of fields. It is a separate constant, because a row borrows its lists for `'static`.
+macro_rules! fields {
+    ($($field:literal),* $(,)?) => { const { &[$($crate::protocol::catalog::field($field)),*] } };
+}
+pub(crate) use fields;
 
 /// A message type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +111,7 @@ pub(super) const fn byte(name: &'static str, value: &'static str) -> Constant {
 }
 
 /// A message type without constants.
-pub(super) const fn message(name: &'static str, fields: &'static [Field]) -> Type {
+pub(crate) const fn message(name: &'static str, fields: &'static [Field]) -> Type {
     Type {
         name,
         fields,
@@ -121,8 +138,11 @@ pub enum Direction {
 /// A row of the table of topics.
 pub(super) struct TopicEntry {
     pub(super) name: &'static str,
+    /// The node that publishes the topic or subscribes to it. The arm owns `/diagnostics`; the gateway adds a status.
     pub(super) owner: Node,
-    pub(super) message: Type,
+    pub(super) type_name: &'static str,
+    pub(super) fields: &'static [Field],
+    pub(super) constants: &'static [Constant],
     pub(super) direction: Direction,
     pub(super) latched: bool,
 }
@@ -137,7 +157,9 @@ pub(super) const fn published(
     TopicEntry {
         name,
         owner,
-        message: message(type_name, fields),
+        type_name,
+        fields,
+        constants: &[],
         direction: Direction::Published,
         latched: false,
     }
@@ -167,10 +189,7 @@ impl TopicEntry {
 
     /// The topic's type has constants.
     pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
-        Self {
-            message: self.message.constants(constants),
-            ..self
-        }
+        Self { constants, ..self }
     }
 }
 

@@ -8,10 +8,8 @@
 
 mod actions;
 mod entry;
-mod nested;
 mod node;
-mod parameter_types;
-mod ros2_types;
+mod parts;
 pub mod rosapi;
 mod services;
 mod table;
@@ -19,7 +17,10 @@ mod topics;
 pub mod types;
 
 pub use actions::Action;
+#[cfg(feature = "record")]
+pub(crate) use entry::fields;
 pub use entry::{Direction, Field};
+pub(crate) use entry::{field, message};
 pub use node::Node;
 pub use rosapi::Rosapi;
 pub use services::Service;

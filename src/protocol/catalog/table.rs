@@ -1,4 +1,4 @@
-//! The macros that define a table of the catalog: rows and their fields.
+//! The macros that define a table of the catalog, and the members that tables have in common.
 //!
 //! **Invariant:** a table is an enum, so a `match` on rows must handle every row.
 
@@ -35,8 +35,36 @@ macro_rules! table {
 }
 pub(in crate::protocol) use table;
 
-/// A list of fields in a row. It is a separate constant, because a row borrows its lists for `'static`.
-macro_rules! fields {
-    ($($field:expr),* $(,)?) => { const { &[$($field),*] } };
+/// The members of a table whose rows have a name, a type and a node. `nested` finds a row of the nested table.
+macro_rules! named {
+    ($table:ident, $nested:expr) => {
+        impl $table {
+            /// The name on the wire.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                self.entry().name
+            }
+
+            /// The row of that name, if it is one of the runtime's own. The leading slash is optional.
+            #[must_use]
+            pub fn from_name(name: &str) -> Option<Self> {
+                let name = $crate::protocol::names::absolute(name);
+                let own = Self::ALL.into_iter().find(|row| row.name() == name);
+                own.or_else(|| $nested(&name))
+            }
+
+            /// The type in ROS notation.
+            #[must_use]
+            pub const fn type_name(self) -> &'static str {
+                self.entry().type_name
+            }
+
+            /// The node that serves or publishes it, or subscribes to it.
+            #[must_use]
+            pub const fn owner(self) -> Node {
+                self.entry().owner
+            }
+        }
+    };
 }
-pub(super) use fields;
+pub(super) use named;

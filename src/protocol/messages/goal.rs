@@ -21,31 +21,6 @@ pub struct TargetMessage {
     pub phi: Option<f64>,
 }
 
-/// `values` of `/ik/solve`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SolutionValues<'a> {
-    /// Joint positions \[rad\], each in (-π, π].
-    pub positions: &'a [f64],
-}
-
-/// `values` of `/ik_action/send_goal`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct GoalValues<'a> {
-    /// Identifies the goal in feedback, result and cancellation.
-    pub goal_id: &'a str,
-}
-
-/// `values` of `/ik_trial/start`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TrialValues {
-    /// Simulation time that a trial lasts \[s\].
-    pub duration: f64,
-    /// \[m\].
-    pub epsilon: f64,
-    /// \[s\].
-    pub success_hold: f64,
-}
-
 /// A message of `/ik_action/feedback`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IkFeedback {

@@ -6,10 +6,8 @@
 //! **Invariant:** one frame is one line of valid JSON.
 
 pub mod goal;
-pub mod republished;
 pub mod scene;
 mod telemetry;
-pub mod trajectory;
 
 use bytes::Bytes;
 use serde::Serialize;
@@ -18,59 +16,50 @@ pub use self::telemetry::{
     Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState,
     JointTrajectory, JointTrajectoryPoint, KeyValue, Stamp,
 };
+use crate::protocol::catalog::table;
 use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::series;
 
 /// Initial capacity of a frame. The state of a 3-link arm and every status fit.
 const USUAL_FRAME: usize = 512;
 
-/// The severity of a status.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Level {
-    /// Information.
-    Info,
-    /// Something was unexpected, but the operation was done.
-    Warning,
-    /// The operation was not done.
-    Error,
-}
-
-impl Level {
-    /// All levels, the lowest severity first.
-    pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Error];
-
-    /// The level's name on the wire.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Info => "info",
-            Self::Warning => "warning",
-            Self::Error => "error",
-        }
+table! {
+    /// The severity of a status, the lowest first.
+    pub enum Level of &'static str {
+        /// Information.
+        Info = "info",
+        /// Something was unexpected, but the operation was done.
+        Warning = "warning",
+        /// The operation was not done.
+        Error = "error",
     }
 }
 
-/// The form in which `values` of a response with `result: false` gives the reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ErrorForm {
-    /// An object, as in any other response. This is the default over raw TCP.
-    #[default]
-    Object,
-    /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
-    Text,
+table! {
+    /// The form in which `values` of a response with `result: false` gives the reason.
+    #[derive(Default)]
+    pub enum ErrorForm of &'static str {
+        /// An object, as in any other response. This is the default over raw TCP.
+        #[default]
+        Object = "object",
+        /// The text of `status`, as in `rosbridge_suite`. This is the default over WebSocket.
+        Text = "text",
+    }
+}
+
+impl Level {
+    /// The level's name on the wire.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.entry()
+    }
 }
 
 impl ErrorForm {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Object, Self::Text];
-
     /// The form's name on the wire.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Object => "object",
-            Self::Text => "text",
-        }
+        self.entry()
     }
 }
 

@@ -105,13 +105,13 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The fields of a request with only one field.
+    /// The fields of a request with at most one field.
     #[must_use]
-    pub fn single(service: Service, name: &str, value: &'a RawValue) -> Self {
+    pub fn single(service: Service, name: &str, value: Option<&'a RawValue>) -> Self {
         let mut fields = Self::of(service);
         let given = fields.fields.iter().zip(&mut fields.values);
         for (field, entry) in given {
-            *entry = (field.name == name).then_some(value);
+            *entry = value.filter(|_| field.name == name);
         }
         fields
     }
@@ -303,6 +303,17 @@ impl<'a> Fields<'a> {
         self.rejections
     }
 
+    /// The request, unless a field was rejected.
+    ///
+    /// # Errors
+    /// All rejected fields.
+    pub fn accept<T>(self, request: T) -> Result<T, Rejections> {
+        match self.accepted() {
+            true => Ok(request),
+            false => Err(self.rejections),
+        }
+    }
+
     /// Whether every field read so far was valid: the `result` of the response.
     #[must_use]
     pub fn accepted(&self) -> bool {
@@ -352,7 +363,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
+pub(super) fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
     let Some(value) = json::number(raw) else {
         return Err(Reason::Mistyped {
             expected: "a number".into(),

@@ -6,12 +6,12 @@
 //! both cases.
 
 pub mod fields;
-pub mod follow;
 mod goal_status;
 mod reader;
 mod rejections;
 #[cfg(feature = "runtime")]
 pub mod token;
+pub mod trajectory;
 
 use std::time::Duration;
 

@@ -34,12 +34,10 @@ pub fn encode_tree(one: Type, msg: Branch<'_, '_>) -> Vec<u8> {
 /// The bytes of a message, unless there are more than `most`. Two bytes of JSON (`{}`) may become a hundred.
 #[must_use]
 pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<u8>> {
-    let mut writer = Writer {
-        sink: Sink::new(most),
-    };
-    writer.sink.extend(&HEADER);
-    writer.message(one, msg);
-    writer.sink.finish()
+    let mut sink = Sink::new(most);
+    sink.extend(&HEADER);
+    sink.message(one, msg);
+    sink.finish()
 }
 
 /// The type of that name, if it is a message. Such a name begins with a package.
@@ -47,11 +45,7 @@ pub(super) fn message_type(kind: &str) -> Option<Type> {
     kind.contains('/').then(|| types::find(kind)).flatten()
 }
 
-struct Writer {
-    sink: Sink,
-}
-
-impl Writer {
+impl Sink {
     fn message(&mut self, one: Type, msg: Branch<'_, '_>) {
         for field in one.fields {
             let value = member(msg, field.name).unwrap_or(ABSENT);
@@ -64,7 +58,7 @@ impl Writer {
                     let entries = value.entries();
                     self.count(entries.as_ref().map_or(0, ExactSizeIterator::len));
                     for entry in entries.into_iter().flatten() {
-                        if self.sink.is_over() {
+                        if self.is_over() {
                             return;
                         }
                         self.single(kind, inner, entry);
@@ -129,8 +123,8 @@ impl Writer {
 
     /// Writes a primitive at a multiple of its size.
     fn aligned<const SIZE: usize>(&mut self, bytes: [u8; SIZE]) {
-        self.sink.align(HEADER.len(), SIZE);
-        self.sink.extend(&bytes);
+        self.align(HEADER.len(), SIZE);
+        self.extend(&bytes);
     }
 
     fn count(&mut self, count: usize) {
@@ -140,8 +134,8 @@ impl Writer {
     /// The length including the final NUL, the text, the NUL.
     fn string(&mut self, text: &str) {
         self.count(text.len() + 1);
-        self.sink.extend(text.as_bytes());
-        self.sink.push(0);
+        self.extend(text.as_bytes());
+        self.push(0);
     }
 }
 

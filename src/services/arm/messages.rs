@@ -4,9 +4,10 @@
 
 use crate::math::pid::Setpoint;
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::trajectory::{TrajectoryError, joint_trajectory};
+
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
+use crate::protocol::op::trajectory::joint_trajectory;
 use crate::protocol::wire::json::Payload;
 
 /// Names of the joints, base first.
@@ -22,7 +23,7 @@ pub fn joint_names<const N: usize>() -> [&'static str; N] {
 ///
 /// # Errors
 /// If the message holds none for this arm.
-pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, TrajectoryError> {
+pub fn read_setpoint<const N: usize>(msg: &Payload) -> Result<Setpoint<N>, RejectedField> {
     let request = joint_trajectory(msg.raw(), &joint_names::<N>())?;
     // The reader has checked how many they are.
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));

@@ -5,8 +5,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{arm_of, taken, with_period};
-use super::{Computed, Present, Refused, StudyWork};
+use super::{Computed, Present, Refused, StudyWork, arm_of, with_period};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -104,7 +103,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
         if ask.margin.is_some_and(|margin| margin < 1.0) {
             fields.refuse("margin", &"must be at least 1");
         }
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 
@@ -147,7 +146,7 @@ impl<const N: usize> Callable for PlanRun<N> {
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

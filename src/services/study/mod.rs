@@ -5,7 +5,6 @@
 //! **Invariant:** a computation is done in pieces, each of a fraction of a millisecond.
 
 mod advice;
-mod reading;
 mod rollout;
 mod stability;
 
@@ -15,8 +14,10 @@ pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::Ask;
-use crate::math::arm::ArmError;
+use super::arm::SetParams;
 use crate::math::arm::State;
+use crate::math::arm::{Arm, ArmError};
+use crate::math::simulation::ControlPeriod;
 use crate::study::control_loop::ControlLoop;
 use crate::study::paused::Paused;
 
@@ -77,4 +78,20 @@ pub struct Present<const N: usize> {
     pub control: ControlLoop<N>,
     /// The arm's positions and velocities.
     pub state: State<N>,
+}
+
+/// The present control period, with another length \[s\] if one is given.
+fn with_period(present: ControlPeriod, period: Option<f64>) -> ControlPeriod {
+    ControlPeriod {
+        period: period.unwrap_or(present.period),
+        ..present
+    }
+}
+
+/// The present arm, with the given parameters in place of its own.
+fn arm_of<const N: usize>(
+    params: Option<&SetParams<N>>,
+    present: Arm<N>,
+) -> Result<Arm<N>, ArmError> {
+    params.map_or(Ok(present), |params| params.applied_to(&present))
 }

@@ -10,8 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde::{Serialize, Serializer};
 
-use super::reading::{arm_of, taken, with_period};
-use super::{Computed, NUMBER_BYTES, Present, Refused, Work};
+use super::{Computed, NUMBER_BYTES, Present, Refused, Work, arm_of, with_period};
 use crate::math::arm::{ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -90,7 +89,7 @@ impl<const N: usize> Callable for RunOffline<N> {
             samples: fields.count("samples", MAX_SAMPLES),
             reference: fields.boolean("reference"),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

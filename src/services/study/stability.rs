@@ -8,8 +8,8 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::reading::{arm_of, taken, with_period};
 use super::{Computed, Present, StudyWork};
+use super::{arm_of, with_period};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
@@ -70,7 +70,7 @@ impl<const N: usize> Callable for PredictStability<N> {
             setpoint: fields.array("setpoint", Bound::Finite),
             control_period: fields.number("control_period", Bound::NonNegative),
         };
-        taken(ask, fields)
+        fields.accept(ask)
     }
 }
 

@@ -14,7 +14,7 @@ use pendularm::actors::gateway::limits::{
 use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
 use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME, MEDIUM, SHORT};
-use pendularm::protocol::op::follow::MAX_POINTS;
+use pendularm::protocol::op::trajectory::MAX_POINTS;
 use pendularm::protocol::ros::parameters::MAX_NAMED;
 #[cfg(feature = "web")]
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};

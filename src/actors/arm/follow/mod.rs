@@ -18,7 +18,7 @@ use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, Canceller};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, Pursue};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
@@ -90,9 +90,7 @@ impl<const N: usize> PathFollower<N> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// A path to follow. From clients, by the action.
-#[derive(Message)]
-#[rtype(result = "()")]
+/// A path to follow.
 pub struct FollowPath<const N: usize> {
     /// The points after the present pose.
     pub points: Vec<Waypoint<N>>,
@@ -102,20 +100,6 @@ pub struct FollowPath<const N: usize> {
     pub at_the_end: Tolerance<N>,
     /// Time after the end in which the joints must arrive \[s\]; infinite for no limit.
     pub patience: f64,
-    /// The client that sent it.
-    pub client: ActionClient,
-    /// Dropped when the goal has started or is refused.
-    pub done: Done,
-}
-
-/// Cancels the path of the same client.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct StopFollowing {
-    /// The client that cancels. It gets an error status if no such goal is active.
-    pub from: Canceller,
-    /// Dropped when the goal has ended.
-    pub done: Done,
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -131,10 +115,10 @@ impl<const N: usize> Actor for PathFollower<N> {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
+impl<const N: usize> Handler<Pursue<FollowPath<N>>> for PathFollower<N> {
     type Result = ();
 
-    fn handle(&mut self, goal: FollowPath<N>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, goal: Pursue<FollowPath<N>>, ctx: &mut Context<Self>) {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.begin(goal, &motion, ctx),
@@ -143,10 +127,10 @@ impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
     }
 }
 
-impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
+impl<const N: usize> Handler<CancelSent> for PathFollower<N> {
     type Result = ();
 
-    fn handle(&mut self, StopFollowing { from, done }: StopFollowing, ctx: &mut Context<Self>) {
+    fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
         let is_meant = |goal: &ActivePath<N>| goal.client.is(&from.goal);
         let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
             return from.refuse(NOT_ACTIVE);
@@ -195,18 +179,24 @@ impl<const N: usize> ActivePath<N> {
 
 impl<const N: usize> PathFollower<N> {
     /// Starts a goal in place of the previous one.
-    fn begin(&mut self, goal: FollowPath<N>, motion: &JointMotion<N>, ctx: &mut Context<Self>) {
+    fn begin(
+        &mut self,
+        pursue: Pursue<FollowPath<N>>,
+        motion: &JointMotion<N>,
+        ctx: &mut Context<Self>,
+    ) {
+        let Pursue { goal, client, done } = pursue;
         let start = Waypoint {
             time: 0.0,
             position: motion.state.position,
             velocity: Some(motion.state.velocity),
         };
         if let Some(obstacle) = motion.obstacle {
-            return goal.client.refuse(&obstacle.to_string());
+            return client.refuse(&obstacle.to_string());
         }
         let path = match JointPath::new(start, goal.points) {
             Ok(path) => path,
-            Err(why) => return goal.client.refuse(&format!("trajectory.{why}")),
+            Err(why) => return client.refuse(&format!("trajectory.{why}")),
         };
         if let Some(before) = self.active.take() {
             let why = "another goal has taken its place";
@@ -220,13 +210,13 @@ impl<const N: usize> PathFollower<N> {
                 patience: goal.patience,
                 dwell: Dwell::default(),
             },
-            client: goal.client,
+            client,
             began: motion.time,
             resets: motion.resets,
             setpoint: motion.setpoint,
             feedback: Cadence::default(),
         });
-        self.lead(motion, Some(goal.done), ctx);
+        self.lead(motion, Some(done), ctx);
     }
 
     /// Checks the arm, and moves its setpoint.

@@ -4,14 +4,15 @@
 
 use actix::prelude::*;
 
-use super::{FollowPath, PathFollower, StopFollowing};
+use super::{FollowPath, PathFollower};
 use crate::actors::arm::sim::joint_names;
-use crate::actors::node::Done;
 use crate::actors::wire::Nodes;
-use crate::actors::wire::action_client::ActionClient;
+use crate::actors::wire::action_client::Goal;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
-use crate::protocol::op::follow::{FollowGoal, JointTolerance};
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::op::trajectory::{FollowGoal, JointTolerance};
 
 /// Default position tolerance of each joint at the end \[rad\].
 const GOAL_TOLERANCE: f64 = 0.05;
@@ -25,39 +26,32 @@ const GOAL_TIME: f64 = 5.0;
 impl<const N: usize> PathFollower<N> {
     /// Adds this node's action to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        let follow: Recipient<FollowPath<N>> = address.clone().recipient();
-        let stop: Recipient<StopFollowing> = address.clone().recipient();
-        nodes.carry_out(
-            Action::FollowJointTrajectory,
-            move |arguments, client, done| match FollowGoal::read(&arguments, &joint_names::<N>()) {
-                Ok(goal) => follow.do_send(path(&goal, client, done)),
-                Err(rejections) => client.refuse(&rejections.status()),
-            },
-            move |from, done| stop.do_send(StopFollowing { from, done }),
-        );
+        nodes.carry_out::<FollowPath<N>, _>(address.clone());
     }
 }
 
-/// The goal for an arm of `N` links. The reader has checked the number of values.
-fn path<const N: usize>(goal: &FollowGoal, client: ActionClient, done: Done) -> FollowPath<N> {
-    let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
-    let points = goal.points.iter().map(|point| Waypoint {
-        time: point.time,
-        position: array(&point.position),
-        velocity: point.velocity.as_deref().map(array),
-    });
-    let points: Vec<Waypoint<N>> = points.collect();
-    FollowPath {
-        points,
-        on_the_way: tolerance([None; 2], &goal.path_tolerance),
-        at_the_end: tolerance(AT_THE_END, &goal.goal_tolerance),
-        patience: match goal.goal_time_tolerance {
-            0.0 => GOAL_TIME,
-            none if none < 0.0 => f64::INFINITY,
-            patience => patience,
-        },
-        client,
-        done,
+impl<const N: usize> Goal for FollowPath<N> {
+    const ACTION: Action = Action::FollowJointTrajectory;
+
+    fn read(arguments: &Arguments) -> Result<Self, Rejections> {
+        let goal = FollowGoal::read(arguments, &joint_names::<N>())?;
+        // The reader has checked the number of values.
+        let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
+        let points = goal.points.iter().map(|point| Waypoint {
+            time: point.time,
+            position: array(&point.position),
+            velocity: point.velocity.as_deref().map(array),
+        });
+        Ok(Self {
+            points: points.collect(),
+            on_the_way: tolerance([None; 2], &goal.path_tolerance),
+            at_the_end: tolerance(AT_THE_END, &goal.goal_tolerance),
+            patience: match goal.goal_time_tolerance {
+                0.0 => GOAL_TIME,
+                none if none < 0.0 => f64::INFINITY,
+                patience => patience,
+            },
+        })
     }
 }
 

@@ -8,26 +8,28 @@
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.
 
-mod active;
 mod messages;
 mod services;
+
+use std::sync::Arc;
 
 use actix::prelude::*;
 use serde::Serialize;
 
-use self::active::ActiveGoal;
 pub use self::messages::{
     CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, Meant, SendGoal,
 };
+use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
     AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
+use crate::actors::wire::action_client::{CancelSent, Pursue};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::messages::goal::setpoint_trajectory;
+use crate::protocol::messages::goal::{IkFeedback, IkResult, setpoint_trajectory};
 use crate::protocol::op::GoalStatus;
 use crate::services::goals::AcceptedGoal;
 
@@ -43,6 +45,15 @@ pub struct IkAction<const N: usize> {
     accepted: u64,
     feedback_wanted: bool,
     result_wanted: bool,
+}
+
+/// The active goal.
+struct ActiveGoal<const N: usize> {
+    goal: AcceptedGoal<N>,
+    /// The receiver of the goal's news besides the subscribers.
+    owner: Option<GoalOwner<N>>,
+    /// The status for its client if it ends before it is reached.
+    if_preempted: GoalStatus,
 }
 
 /// The messages to the arm for goals.
@@ -94,8 +105,7 @@ impl<const N: usize> IkAction<N> {
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
         nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
-        let (send, cancel) = (address.clone().recipient(), address.clone().recipient());
-        services::attach::<N>(send, cancel, nodes);
+        nodes.carry_out::<SendGoal<N>, _>(address.clone());
         for topic in [Topic::IkFeedback, Topic::IkResult] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
@@ -121,6 +131,34 @@ impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
     fn handle(&mut self, call: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
         let pursuit = self.pursue(call.ask, call.reply, ctx.address());
         ctx.wait(pursuit);
+    }
+}
+
+impl<const N: usize> Handler<Pursue<SendGoal<N>>> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, pursue: Pursue<SendGoal<N>>, ctx: &mut Context<Self>) {
+        let Pursue { goal, client, done } = pursue;
+        let client = Arc::new(client);
+        let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
+        let owner = Some(GoalOwner::Client(client));
+        let pursuit = self.pursue(SendGoal { owner, ..goal }, reply, ctx.address());
+        ctx.wait(pursuit);
+    }
+}
+
+impl<const N: usize> Handler<CancelSent> for IkAction<N> {
+    type Result = ();
+
+    /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
+    fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
+        let cancellation = self.end(&Meant::Sent(from.goal.clone()), GoalStatus::Canceled);
+        ctx.wait(cancellation.map(move |outcome, _, _| {
+            if let Err(why @ CancelRejected::NotSent) = outcome {
+                from.refuse(&why.to_string());
+            }
+            drop(done);
+        }));
     }
 }
 
@@ -178,6 +216,58 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 }
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> ActiveGoal<N> {
+    fn is(&self, judged: &GoalJudged<N>) -> bool {
+        self.goal.number == judged.number
+    }
+
+    fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback {
+        self.goal.feedback(judged.distance, judged.elapsed)
+    }
+
+    fn result(&self, judged: &GoalJudged<N>) -> IkResult {
+        self.goal.result(judged.distance, judged.outcome)
+    }
+
+    fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
+        match judged.outcome {
+            Some(Outcome::Reached) => GoalStatus::Succeeded,
+            _ => self.if_preempted,
+        }
+    }
+
+    /// Whether this goal has the given id.
+    fn check(&self, meant: &Meant) -> Result<(), CancelRejected> {
+        match (meant, &self.owner) {
+            (Meant::Active, _) => Ok(()),
+            (Meant::Called(id), _) if *id == self.goal.id => Ok(()),
+            (Meant::Called(_), _) => Err(CancelRejected::OtherGoal {
+                active: self.goal.id.clone(),
+            }),
+            (Meant::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => Ok(()),
+            (Meant::Sent(_), _) => Err(CancelRejected::NotSent),
+        }
+    }
+
+    /// Informs its owner of feedback or of its end.
+    fn inform_owner(&self, judged: &GoalJudged<N>) {
+        match &self.owner {
+            None => {}
+            Some(GoalOwner::Client(client)) => match judged.outcome {
+                None => client.feed_back(self.feedback(judged)),
+                Some(_) => client.conclude(self.result(judged), self.status(judged)),
+            },
+            Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
+                goal_id: self.goal.id.clone(),
+                distance: judged.distance,
+                positions: self.goal.positions,
+                pose: judged.pose,
+                outcome: judged.outcome,
+            }),
+        }
+    }
+}
 
 impl<const N: usize> IkAction<N> {
     /// Solves a goal and starts it. Its sender is answered in between.

@@ -4,47 +4,27 @@
 
 use std::sync::Arc;
 
-use actix::prelude::*;
 use bytes::Bytes;
 
-use super::messages::{CancelGoal, CancelRejected, GoalOwner, GoalRejected, Meant, SendGoal};
-use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
-use crate::actors::wire::action_client::{ActionClient, Canceller};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use super::messages::{CancelGoal, CancelRejected, GoalRejected, Meant, SendGoal};
+use crate::actors::node::{Asker, Done, Unserved};
+use crate::actors::wire::action_client::{ActionClient, Goal};
+use crate::actors::wire::{Address, Answered, Callable};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 use crate::services::goals::{CancelRequest, GoalRequest};
 
-/// Enters the action into the registry's table.
-pub(super) fn attach<const N: usize>(
-    send: Recipient<Call<SendGoal<N>>>,
-    cancel: Recipient<Call<CancelGoal>>,
-    nodes: &mut Nodes,
-) {
-    nodes.carry_out(
-        Action::MoveTo,
-        move |arguments, client, done| match SendGoal::read(Service::SendGoal, &arguments) {
-            Ok(goal) => {
-                let client = Arc::new(client);
-                let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
-                let owner = Some(GoalOwner::Client(client));
-                let ask = SendGoal { owner, ..goal };
-                send.do_send(Call { ask, reply });
-            }
-            Err(rejections) => client.refuse(&rejections.status()),
-        },
-        move |from, done| {
-            let goal = Meant::Sent(from.goal.clone());
-            let reply = Reply::new(GoalCanceller(from), Some(done));
-            let ask = CancelGoal { goal };
-            cancel.do_send(Call { ask, reply });
-        },
-    );
+impl<const N: usize> Goal for SendGoal<N> {
+    const ACTION: Action = Action::MoveTo;
+
+    fn read(arguments: &Arguments) -> Result<Self, Rejections> {
+        <Self as Callable>::read(Service::SendGoal, arguments)
+    }
 }
 
 /// A client that has sent a goal by the action. Feedback shows that it was accepted.
-struct GoalSender(Arc<ActionClient>);
+pub(super) struct GoalSender(pub(super) Arc<ActionClient>);
 
 impl Asker<Result<String, GoalRejected>> for GoalSender {
     fn answer(
@@ -61,22 +41,6 @@ impl Asker<Result<String, GoalRejected>> for GoalSender {
 
     fn warn(&self, why: &str) {
         self.0.warn(why);
-    }
-}
-
-/// A client that cancels a goal of the action. It is informed if that goal is not active. Otherwise the goal's
-/// result is the answer.
-struct GoalCanceller(Canceller);
-
-impl Asker<Result<(), CancelRejected>> for GoalCanceller {
-    fn answer(
-        self: Box<Self>,
-        answer: Result<Result<(), CancelRejected>, Unserved>,
-        _: Option<Done>,
-    ) {
-        if let Ok(Err(why @ CancelRejected::NotSent)) = answer {
-            self.0.refuse(&why.to_string());
-        }
     }
 }
 

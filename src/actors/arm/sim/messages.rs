@@ -6,7 +6,7 @@ use actix::dev::{MessageResponse, OneshotSender};
 use actix::prelude::*;
 use glam::DVec2;
 
-use crate::live::{GoalJudged, Pose, Tracking};
+use crate::live::{ArmListener, GoalJudged, Pose, Tracking};
 use crate::math::goal::Criteria;
 use crate::math::simulation::Simulation;
 use crate::services::study::Present;
@@ -44,6 +44,11 @@ pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
+
+/// Sets the listener of the journal, or none. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 

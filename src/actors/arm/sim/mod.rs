@@ -5,29 +5,22 @@
 //!
 //! **Invariant:** there is no physics here. The live arm and an offline `Simulation` are bit-identical.
 
-mod command;
 mod goals;
-mod limit;
+mod inputs;
 mod messages;
-mod motion;
 mod node;
 mod requests;
-mod setpoint;
 mod steps;
-mod tell;
 mod turn;
 mod waiting;
 mod world;
 
-pub use self::command::CommandEffort;
+pub use self::inputs::{ArmMotion, CommandEffort, JointMotion, MoveSetpoint, SetSetpoint};
 pub use self::messages::{
     AddBarrier, ArmPose, ArmSettings, Barrier, CommandGoal, Consult, EndGoal, HeldLimit,
-    SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
+    SimulationTime, Snapshot, TakeSnapshot, Tell, TrackGoal,
 };
-pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::node::ArmSim;
-pub use self::setpoint::SetSetpoint;
-pub use self::tell::Tell;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
     ArmEvent, ArmListener, ArmNews, BREATHER, GoalJudged, LEAST_PAUSE, Obstacle, PUBLISH_RATE,

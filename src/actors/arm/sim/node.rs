@@ -15,15 +15,18 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{Barrier, HeldLimit, SimulationTime, Snapshot, TakeSnapshot};
+use super::messages::{
+    ArmSettings, Barrier, Consult, HeldLimit, SimulationTime, Snapshot, TakeSnapshot, Tell,
+};
 use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::gauges::Gauges;
-use crate::live::{BREATHER, GoalJudged, LiveArm, PUBLISH_RATE};
+use crate::live::{BREATHER, GoalJudged, Journal, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
+use crate::services::study::Present;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -123,6 +126,35 @@ impl<const N: usize> Handler<TakeSnapshot<N>> for ArmSim<N> {
     }
 }
 
+impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
+    type Result = Present<N>;
+
+    fn handle(&mut self, _: ArmSettings<N>, ctx: &mut Context<Self>) -> Present<N> {
+        self.count_message(ctx);
+        self.arm.present()
+    }
+}
+
+impl<const N: usize> Handler<Consult<N>> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, Consult(study): Consult<N>, _: &mut Context<Self>) {
+        self.study = Some(study);
+    }
+}
+
+impl<const N: usize> Handler<Tell<N>> for ArmSim<N> {
+    type Result = ();
+
+    /// A listener gets the whole simulation first.
+    fn handle(&mut self, Tell(listener): Tell<N>, ctx: &mut Context<Self>) {
+        self.attend(ctx);
+        self.arm.tell_state();
+        self.arm.journal = listener.map(Journal::new);
+        self.arm.tell_state();
+    }
+}
+
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
@@ -169,5 +201,19 @@ impl<const N: usize> ArmSim<N> {
                 Self::breathe(is_behind, ctx);
             });
         }
+    }
+
+    /// Requests the limit of the active loop, if it is needed. `study` predicts it on its workers.
+    pub(super) fn ask_limit(&mut self, ctx: &mut Context<Self>) {
+        let Some(study) = &self.study else {
+            return;
+        };
+        let Some(control) = self.arm.limit_to_predict() else {
+            return;
+        };
+        let answer = study.send(HeldLimit(control)).into_actor(self);
+        ctx.spawn(answer.map(move |answer, node, _| {
+            node.arm.keep_limit(control, answer.ok().flatten());
+        }));
     }
 }

@@ -4,9 +4,8 @@
 
 use actix::prelude::*;
 
-use super::command;
+use super::inputs;
 use super::node::ArmSim;
-use super::setpoint;
 use crate::actors::node::Call;
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;
@@ -18,8 +17,7 @@ use crate::services::arm::{
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        command::attach(address, nodes);
-        setpoint::attach(address, nodes);
+        inputs::attach(address, nodes);
         nodes.serve::<Disturb<N>>(Service::Disturb, address.clone());
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());

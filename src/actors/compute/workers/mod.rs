@@ -9,20 +9,20 @@
 //! **Invariant:** a computation is advanced, refused and dropped outside the lock. A panic ends neither its worker
 //! nor another computation.
 
-mod computation;
-
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-pub use self::computation::{Computation, Progress, SLICE};
 use crate::actors::ConnectionId;
 use crate::actors::panics::contain;
 use crate::actors::resources::priority::give_way;
 use crate::actors::resources::work_clock;
 use crate::options::MAX_CLIENTS;
 
+/// Longest time of one computation on a worker before the next one. It is short compared with the 5 ms by which a
+/// client may be delayed, and long compared with the cost of switching.
+pub const SLICE: Duration = Duration::from_millis(1);
 /// Most computations at once, waiting or running: one for each connection.
 pub const MAX_ADMITTED: usize = MAX_CLIENTS;
 /// The refusal when there are too many computations.
@@ -31,6 +31,31 @@ pub const BUSY: &str = "busy: too many computations of all clients wait; try aga
 const TRY_AGAIN: Duration = Duration::from_millis(10);
 /// Computations that try at the same time.
 const TRIES: usize = 32;
+
+/// The state of a computation after a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// It waits for its next turn.
+    Unfinished,
+    /// It cannot begin yet, and tries again when another has ended, or after a pause.
+    Waiting,
+    /// It has sent its answer and can be dropped.
+    Finished,
+}
+
+/// A long computation that is done in slices.
+pub trait Computation: Send {
+    /// Works until `deadline` or its end, and sends the answer at its end.
+    fn advance(&mut self, deadline: Instant) -> Progress;
+
+    /// Whether the caller has disconnected, so the computation can be dropped.
+    fn is_abandoned(&self) -> bool {
+        false
+    }
+
+    /// Sends the answer that the runtime is ending. The computation is dropped afterwards.
+    fn refuse(&mut self, why: &'static str);
+}
 
 /// The client of a computation; `None` for the runtime's own.
 pub type Owner = Option<ConnectionId>;

@@ -16,7 +16,9 @@ use crate::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_BACKLOG};
 use crate::actors::gateway::messages::{Handled, Tapped};
 use crate::actors::node::{Feedback, guard};
 use crate::actors::resources::memory::cover_message;
-use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller, SentGoal};
+use crate::actors::wire::action_client::{
+    ActionClient, ActionRequest, CancelSent, Canceller, Pursue, SentGoal,
+};
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
 use crate::protocol::messages::{self, Level};
@@ -137,11 +139,11 @@ impl Registry {
         match route {
             Ok(node) => {
                 let (done, ended) = guard();
-                node(ActionRequest::Goal {
-                    arguments: goal.args,
+                node(ActionRequest::Goal(Pursue {
+                    goal: goal.args,
                     client: action_client,
                     done,
-                });
+                }));
                 Handled::with(ended)
             }
             Err(why) => {
@@ -177,16 +179,14 @@ impl Registry {
             return Handled::at_once();
         };
         let (done, ended) = guard();
-        node(ActionRequest::Cancel {
-            from: Canceller {
-                respond: ctx.address().recipient(),
-                goal: SentGoal {
-                    connection: origin.from,
-                    id: origin.id,
-                },
+        let from = Canceller {
+            respond: ctx.address().recipient(),
+            goal: SentGoal {
+                connection: origin.from,
+                id: origin.id,
             },
-            done,
-        });
+        };
+        node(ActionRequest::Cancel(CancelSent { from, done }));
         Handled::with(ended)
     }
 }

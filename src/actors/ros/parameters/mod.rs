@@ -1,8 +1,8 @@
-//! The arm's parameters: `get_param` of rosapi and its like, and `/arm_sim/get_parameters` and its like, which every
-//! node of ROS 2 has.
+//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar
+//! services, which every node of ROS 2 has.
 //!
-//! All these services are one question, which names parameters to be described, read or changed. They are read and
-//! changed by the arm's own questions: the same checks, the same words.
+//! All these services are one question, which names parameters. The arm's own services read and change them, so checks
+//! and texts are the same.
 //!
 //! **Invariant:** the answer has one entry for each entry of the request, in the same order.
 
@@ -10,7 +10,9 @@ mod wire;
 
 use actix::prelude::*;
 
-use crate::actors::arm::sim::{ArmSim, SetGains, SetIntegrator, SetParams, SetPeriod, joint_names};
+use crate::actors::arm::sim::{
+    ArmSim, Echo, SetGains, SetIntegrator, SetParams, SetPeriod, joint_names,
+};
 use crate::actors::node::{Ask, Call, Unserved, ask};
 use crate::protocol::catalog::Node;
 use crate::protocol::op::fields::Rejections;
@@ -22,58 +24,40 @@ use crate::protocol::ros::urdf;
 /// Asks about parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AskParameters<const N: usize> {
-    /// The parameters that are named, and what each is named for.
-    pub entries: Vec<(NamedParameter, ParameterRequest<N>)>,
+    /// The named parameters, and the request to the arm about each. A description needs none.
+    pub entries: Vec<(NamedParameter, Option<ParameterRequest<N>>)>,
 }
 
 impl<const N: usize> Ask for AskParameters<N> {
-    type Answer = Vec<(NamedParameter, ParameterAnswer<N>)>;
+    /// The values after the requests. There is none for a description, and for a parameter that does not exist.
+    type Answer = Vec<(NamedParameter, Result<Option<ParameterValue<N>>, NotSet>)>;
 }
 
 /// A parameter by its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedParameter {
-    /// The name, as it was given.
+    /// The name as the client spells it.
     pub name: String,
-    /// The parameter; none if there is none of that name.
+    /// The parameter, if there is one of that name.
     pub parameter: Option<Parameter>,
-    /// The value, as JSON text, that is wanted where there is none.
+    /// The value, as JSON text, for a parameter that does not exist.
     pub default: String,
 }
 
-/// What a parameter is named for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ParameterRequest<const N: usize> {
-    /// What there is to know about it without its value.
-    Describe,
-    /// Its value.
-    Read,
-    /// A change, or why there can be none.
-    Change(Result<ParameterChange<N>, NotSet>),
-}
+/// A request to the arm, or why there is none.
+pub type ParameterRequest<const N: usize> = Result<ArmQuestion<N>, NotSet>;
 
-/// A change of one parameter, as a question to the arm.
+/// A request to the service that has a parameter as a field: to change that field, or none.
 #[derive(Debug, Clone, PartialEq)]
-pub enum ParameterChange<const N: usize> {
-    /// Gravity, masses or lengths.
+pub enum ArmQuestion<const N: usize> {
+    /// Gravity, masses and lengths.
     Params(SetParams<N>),
     /// Gains.
     Gains(SetGains<N>),
-    /// Method or timestep.
+    /// Method and timestep.
     Integrator(SetIntegrator),
     /// The control period.
     Period(SetPeriod),
-}
-
-/// The answer about a parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ParameterAnswer<const N: usize> {
-    /// Its name says all that was asked.
-    Described,
-    /// Its value; none if there is no such parameter.
-    Value(Option<ParameterValue<N>>),
-    /// Whether it was changed.
-    Changed(Result<(), NotSet>),
 }
 
 /// The value of a parameter.
@@ -119,20 +103,11 @@ pub enum NotSet {
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// Serves the parameters in the name of the arm.
-pub struct Parameters<const N: usize> {
-    arm: ArmParameters<N>,
-}
-
-/// The arm, as far as its parameters are concerned.
 #[derive(Clone)]
-struct ArmParameters<const N: usize> {
-    /// Gravity, masses and lengths.
+pub struct Parameters<const N: usize> {
     params: Recipient<Call<SetParams<N>>>,
-    /// Gains.
     gains: Recipient<Call<SetGains<N>>>,
-    /// Method and timestep.
     integrator: Recipient<Call<SetIntegrator>>,
-    /// The control period.
     period: Recipient<Call<SetPeriod>>,
 }
 
@@ -140,13 +115,12 @@ impl<const N: usize> Parameters<N> {
     /// A node for this arm.
     #[must_use]
     pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
-        let arm = ArmParameters {
+        Self {
             params: arm.clone().recipient(),
             gains: arm.clone().recipient(),
             integrator: arm.clone().recipient(),
             period: arm.clone().recipient(),
-        };
-        Self { arm }
+        }
     }
 }
 
@@ -163,7 +137,7 @@ impl<const N: usize> Handler<Call<AskParameters<N>>> for Parameters<N> {
 
     fn handle(&mut self, call: Call<AskParameters<N>>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
-        let answers = self.arm.clone().answer_all(ask).into_actor(self);
+        let answers = self.clone().answer_all(ask).into_actor(self);
         ctx.spawn(answers.map(move |answers, _, _| match answers {
             Ok(answers) => reply.answer(answers),
             Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
@@ -173,7 +147,7 @@ impl<const N: usize> Handler<Call<AskParameters<N>>> for Parameters<N> {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> ArmParameters<N> {
+impl<const N: usize> Parameters<N> {
     /// Answers for one parameter after the other.
     async fn answer_all(
         self,
@@ -181,76 +155,64 @@ impl<const N: usize> ArmParameters<N> {
     ) -> Result<<AskParameters<N> as Ask>::Answer, Unserved> {
         let mut answers = Vec::with_capacity(ask.entries.len());
         for (named, request) in ask.entries {
-            let answer = match (request, named.parameter) {
-                (ParameterRequest::Describe, _) => ParameterAnswer::Described,
-                (ParameterRequest::Read, None) => ParameterAnswer::Value(None),
-                (ParameterRequest::Read, Some(parameter)) => {
-                    ParameterAnswer::Value(Some(self.value(parameter).await?))
-                }
-                (ParameterRequest::Change(Ok(change)), _) => {
-                    ParameterAnswer::Changed(match self.change(change).await? {
-                        rejected if rejected.is_empty() => Ok(()),
-                        rejected => Err(NotSet::Rejected(rejected)),
-                    })
-                }
-                (ParameterRequest::Change(Err(why)), _) => ParameterAnswer::Changed(Err(why)),
+            let answer = match request {
+                None => Ok(None),
+                Some(Err(why)) => Err(why),
+                Some(Ok(question)) => match self.ask_arm(question).await? {
+                    (values, rejected) if rejected.is_empty() => {
+                        let mut values = values.into_iter();
+                        let own = values.find(|(one, _)| Some(*one) == named.parameter);
+                        Ok(own.map(|(_, value)| value))
+                    }
+                    (_, rejected) => Err(NotSet::Rejected(rejected)),
+                },
             };
             answers.push((named, answer));
         }
         Ok(answers)
     }
 
-    /// The present value of a parameter.
-    async fn value(&self, parameter: Parameter) -> Result<ParameterValue<N>, Unserved> {
+    /// Sends a request to the arm. Returns all values of that service after it, and the rejected fields.
+    async fn ask_arm(
+        &self,
+        question: ArmQuestion<N>,
+    ) -> Result<(Vec<(Parameter, ParameterValue<N>)>, Rejections), Unserved> {
         use ParameterValue::{Number, Numbers, Text};
-        Ok(match parameter {
-            Parameter::Gravity
-            | Parameter::Masses
-            | Parameter::Lengths
-            | Parameter::RobotDescription => {
-                let arm = ask(&self.params, SetParams::default()).await?.values;
-                match parameter {
-                    Parameter::Gravity => Number(arm.gravity()),
-                    Parameter::Masses => Numbers(*arm.masses()),
-                    Parameter::Lengths => Numbers(*arm.lengths()),
-                    _ => Text(urdf::describe(
-                        &joint_names::<N>(),
-                        arm.lengths(),
-                        arm.masses(),
-                    )),
-                }
+        Ok(match question {
+            ArmQuestion::Params(params) => {
+                let Echo { values, rejected } = ask(&self.params, params).await?;
+                let (lengths, masses) = (values.lengths(), values.masses());
+                let description = urdf::describe(&joint_names::<N>(), lengths, masses);
+                let values = vec![
+                    (Parameter::Gravity, Number(values.gravity())),
+                    (Parameter::Masses, Numbers(*masses)),
+                    (Parameter::Lengths, Numbers(*lengths)),
+                    (Parameter::RobotDescription, Text(description)),
+                ];
+                (values, rejected)
             }
-            Parameter::Kp | Parameter::Ki | Parameter::Kd => {
-                let gains = ask(&self.gains, SetGains::default()).await?.values;
-                match parameter {
-                    Parameter::Kp => Numbers(gains.kp),
-                    Parameter::Ki => Numbers(gains.ki),
-                    _ => Numbers(gains.kd),
-                }
+            ArmQuestion::Gains(gains) => {
+                let Echo { values, rejected } = ask(&self.gains, gains).await?;
+                let values = vec![
+                    (Parameter::Kp, Numbers(values.kp)),
+                    (Parameter::Ki, Numbers(values.ki)),
+                    (Parameter::Kd, Numbers(values.kd)),
+                ];
+                (values, rejected)
             }
-            Parameter::Integrator | Parameter::Timestep => {
-                let integrator = ask(&self.integrator, SetIntegrator::default())
-                    .await?
-                    .values;
-                match parameter {
-                    Parameter::Integrator => Text(integrator.method.name().to_owned()),
-                    _ => Number(integrator.timestep),
-                }
+            ArmQuestion::Integrator(change) => {
+                let Echo { values, rejected } = ask(&self.integrator, change).await?;
+                let values = vec![
+                    (Parameter::Integrator, Text(values.method.name().to_owned())),
+                    (Parameter::Timestep, Number(values.timestep)),
+                ];
+                (values, rejected)
             }
-            Parameter::ControlPeriod => {
-                let sampling = ask(&self.period, SetPeriod::default()).await?.values;
-                Number(sampling.period.period)
+            ArmQuestion::Period(change) => {
+                let Echo { values, rejected } = ask(&self.period, change).await?;
+                let period = Number(values.period.period);
+                (vec![(Parameter::ControlPeriod, period)], rejected)
             }
-        })
-    }
-
-    /// Has the arm change a parameter. Returns what was not taken.
-    async fn change(&self, change: ParameterChange<N>) -> Result<Rejections, Unserved> {
-        Ok(match change {
-            ParameterChange::Params(params) => ask(&self.params, params).await?.rejected,
-            ParameterChange::Gains(gains) => ask(&self.gains, gains).await?.rejected,
-            ParameterChange::Integrator(change) => ask(&self.integrator, change).await?.rejected,
-            ParameterChange::Period(period) => ask(&self.period, period).await?.rejected,
         })
     }
 }

@@ -1,7 +1,7 @@
-//! Questions about parameters in JSON, as rosapi and as ROS 2 ask them.
+//! Questions about parameters in JSON, in the forms of rosapi and of ROS 2.
 //!
 //! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration. A question
-//! about a parameter that does not exist gets as far as the node.
+//! about a parameter that does not exist reaches the node.
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -10,10 +10,10 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::{
-    AskParameters, NamedParameter, NotSet, ParameterAnswer, ParameterChange, ParameterRequest,
-    ParameterValue, Parameters,
+    ArmQuestion, AskParameters, NamedParameter, NotSet, ParameterRequest, ParameterValue,
+    Parameters,
 };
-use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams, SetPeriod};
+use crate::actors::arm::sim::FieldByField;
 use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
@@ -29,11 +29,11 @@ const OF_ROS_2: [Service; 5] = [
     Service::DescribeParameters,
     Service::SetParameters,
 ];
-/// The value of a parameter that does not exist, as JSON text: clients parse it, so it has to be some.
+/// The value of a parameter that does not exist, as JSON text, because clients parse it.
 const NO_VALUE: &str = "\"\"";
 
 impl<const N: usize> Parameters<N> {
-    /// Enters the services of parameters into the registry's table.
+    /// Adds the services of parameters to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         let of_rosapi = Rosapi::ALL.into_iter();
         let of_rosapi = of_rosapi.filter(|question| question.is_about_parameters());
@@ -55,8 +55,8 @@ impl NamedParameter {
     }
 }
 
-/// The parameters of a question, and what each is named for.
-type Entries<const N: usize> = Vec<(NamedParameter, ParameterRequest<N>)>;
+/// The parameters of a question, and the request about each.
+type Entries<const N: usize> = Vec<(NamedParameter, Option<ParameterRequest<N>>)>;
 
 impl<const N: usize> Callable for AskParameters<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
@@ -66,38 +66,32 @@ impl<const N: usize> Callable for AskParameters<N> {
             Service::Rosapi(question) => vec![read_rosapi(question, service, &mut fields)],
             Service::ListParameters => {
                 let prefixes = fields.texts("prefixes", MAX_NAMED).unwrap_or_default();
-                // No name of ours has a full stop, so only the name itself can be meant.
+                // No parameter's name has a full stop, so a prefix can only be the name itself.
                 described(|name| prefixes.is_empty() || prefixes.iter().any(|one| one == name))
             }
             Service::SetParameters => read_changes(&mut fields)?,
             _ => {
                 let names = fields.texts("names", MAX_NAMED).unwrap_or_default();
-                let request = match service {
-                    Service::GetParameters => ParameterRequest::Read,
-                    _ => ParameterRequest::Describe,
+                let entry = |name| {
+                    let named = NamedParameter::of(name);
+                    let is_read = service == Service::GetParameters;
+                    let read = named.parameter.filter(|_| is_read);
+                    (named, read.map(|parameter| request(parameter, None)))
                 };
-                let entry = |name| (NamedParameter::of(name), request.clone());
                 names.into_iter().map(entry).collect()
             }
         };
-        if fields.accepted() {
-            Ok(Self { entries })
-        } else {
-            Err(fields.finish())
-        }
+        fields.accept(Self { entries })
     }
 }
 
-/// The parameters whose names are meant.
+/// Descriptions of the parameters that `is_meant` selects by name.
 fn described<const N: usize>(is_meant: impl Fn(&str) -> bool) -> Entries<N> {
-    let meant = Parameter::ALL
-        .into_iter()
-        .filter(|one| is_meant(one.name()));
-    let entry = |one: Parameter| {
-        let named = NamedParameter::of(one.name().to_owned());
-        (named, ParameterRequest::Describe)
-    };
-    meant.map(entry).collect()
+    let names = Parameter::ALL.into_iter().map(Parameter::name);
+    let meant = names.filter(|name| is_meant(name));
+    meant
+        .map(|name| (NamedParameter::of(name.to_owned()), None))
+        .collect()
 }
 
 /// A question of rosapi about one parameter. Its first field is the name, and the second, if there is one, a value.
@@ -105,7 +99,7 @@ fn read_rosapi<const N: usize>(
     question: Rosapi,
     service: Service,
     fields: &mut Fields<'_>,
-) -> (NamedParameter, ParameterRequest<N>) {
+) -> (NamedParameter, Option<ParameterRequest<N>>) {
     let mut text = |index: usize| {
         let field = service.fields().get(index)?;
         fields.text(field.name)
@@ -114,120 +108,84 @@ fn read_rosapi<const N: usize>(
     let mut named = NamedParameter::of(name.unwrap_or_default().into_owned());
     let value = value.unwrap_or_default();
     let request = match (question, named.parameter) {
-        (Rosapi::GetParam, _) => {
+        (Rosapi::GetParam, parameter) => {
             named.default = value.into_owned();
-            ParameterRequest::Read
+            parameter.map(|parameter| request(parameter, None))
         }
-        (Rosapi::SetParam, None) => ParameterRequest::Change(Err(NotSet::Unknown)),
+        (Rosapi::SetParam, None) => Some(Err(NotSet::Unknown)),
         (Rosapi::SetParam, Some(parameter)) => {
-            ParameterRequest::Change(read_json(parameter, &value))
+            // Literals are accepted as in every frame. They are refused by the parameter's name.
+            let text = json::accept_literals(value.into_owned());
+            let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson);
+            Some(value.and_then(|value| request(parameter, Some(&value))))
         }
-        _ => ParameterRequest::Describe,
+        _ => None,
     };
     (named, request)
 }
 
-/// A value in JSON text.
-fn read_json<const N: usize>(
-    parameter: Parameter,
-    text: &str,
-) -> Result<ParameterChange<N>, NotSet> {
-    // As lenient about numbers as every frame: they are refused by the parameter's name.
-    let text = json::accept_literals(text.to_owned());
-    let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
-    read_change(parameter, &value)
-}
-
-/// A value, as the arm's own service would read it.
-fn read_change<const N: usize>(
-    parameter: Parameter,
-    value: &RawValue,
-) -> Result<ParameterChange<N>, NotSet> {
-    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+/// The request to the service that has the parameter as a field: with a `value`, or without one to read it.
+fn request<const N: usize>(parameter: Parameter, value: Option<&RawValue>) -> ParameterRequest<N> {
+    fn read<A: FieldByField>(fields: Fields<'_>, field: &str, parameter: Parameter) -> A {
+        let mut ask = A::request(fields);
+        ask.rejected().rename(field, parameter.name());
+        ask
+    }
+    let (service, field) = match (parameter.field(), value) {
+        (Some(field), _) => field,
+        // It is computed from these.
+        (None, None) => (Service::SetParams, ""),
+        (None, Some(_)) => return Err(NotSet::Derived),
+    };
     let fields = Fields::single(service, field, value);
     Ok(match service {
-        Service::SetParams => ParameterChange::Params(SetParams::request(fields)),
-        Service::SetGains => ParameterChange::Gains(SetGains::request(fields)),
-        Service::SetPeriod => {
-            let mut change = SetPeriod::request(fields);
-            change.rejected.rename(field, parameter.name());
-            ParameterChange::Period(change)
-        }
-        _ => {
-            let mut change = SetIntegrator::request(fields);
-            change.rejected.rename(field, parameter.name());
-            ParameterChange::Integrator(change)
-        }
+        Service::SetParams => ArmQuestion::Params(read(fields, field, parameter)),
+        Service::SetGains => ArmQuestion::Gains(read(fields, field, parameter)),
+        Service::SetPeriod => ArmQuestion::Period(read(fields, field, parameter)),
+        _ => ArmQuestion::Integrator(read(fields, field, parameter)),
     })
 }
 
 /// The changes of `/arm_sim/set_parameters`.
 fn read_changes<const N: usize>(fields: &mut Fields<'_>) -> Result<Entries<N>, Rejections> {
     let entries = fields.entries("parameters", MAX_NAMED).unwrap_or_default();
-    let mut changes = Vec::with_capacity(entries.len());
-    for (index, entry) in entries.into_iter().enumerate() {
-        let Some(given) = GivenParameter::read(entry) else {
+    let read = |(index, entry)| {
+        read_given(entry).ok_or_else(|| {
             let field = format!("parameters[{index}]");
             let reason = "must be a rcl_interfaces/msg/Parameter: name and value, with its type";
-            return Err(RejectedField::refused(&field, &reason).into());
-        };
-        let name = text(given.name).unwrap_or_default().into_owned();
-        changes.push((
-            NamedParameter::of(name),
-            ParameterRequest::Change(given.change()),
-        ));
-    }
-    Ok(changes)
-}
-
-/// The parts of `rcl_interfaces/msg/Parameter` that the parameters here use.
-struct GivenParameter<'a> {
-    name: &'a RawValue,
-    kind: u8,
-    integer: Option<&'a RawValue>,
-    double: Option<&'a RawValue>,
-    text: Option<&'a RawValue>,
-    integers: Option<&'a RawValue>,
-    doubles: Option<&'a RawValue>,
-}
-
-impl<'a> GivenParameter<'a> {
-    /// `None` if it is not a parameter.
-    fn read(entry: &'a RawValue) -> Option<Self> {
-        let [name, value] = json::members(entry.get(), &["name", "value"]).ok()?;
-        let [kind, integer, double, text, integers, doubles] = json::members(
-            value?.get(),
-            &[
-                "type",
-                "integer_value",
-                "double_value",
-                "string_value",
-                "integer_array_value",
-                "double_array_value",
-            ],
-        )
-        .ok()?;
-        Some(Self {
-            name: name?,
-            kind: u8::try_from(json::integer(kind?)?).ok()?,
-            integer,
-            double,
-            text,
-            integers,
-            doubles,
+            RejectedField::refused(&field, &reason).into()
         })
-    }
+    };
+    entries.into_iter().enumerate().map(read).collect()
+}
 
-    fn change<const N: usize>(&self) -> Result<ParameterChange<N>, NotSet> {
-        let name = text(self.name).ok_or(NotSet::Unknown)?;
-        let parameter = Parameter::from_name(&name).ok_or(NotSet::Unknown)?;
+/// Reads a `rcl_interfaces/msg/Parameter`; `None` if it is not one.
+fn read_given<const N: usize>(
+    entry: &RawValue,
+) -> Option<(NamedParameter, Option<ParameterRequest<N>>)> {
+    let [name, value] = json::members(entry.get(), &["name", "value"]).ok()?;
+    let [kind, integer, double, string, integers, doubles] = json::members(
+        value?.get(),
+        &[
+            "type",
+            "integer_value",
+            "double_value",
+            "string_value",
+            "integer_array_value",
+            "double_array_value",
+        ],
+    )
+    .ok()?;
+    let named = NamedParameter::of(text(name?).unwrap_or_default().into_owned());
+    let kind = u8::try_from(json::integer(kind?)?).ok()?;
+    let change = |parameter: Parameter| {
         let expected = parameter.kind();
-        let member = match (expected, self.kind) {
-            (ParameterType::Double, 2) => self.integer,
-            (ParameterType::Double, 3) => self.double,
-            (ParameterType::Text, 4) => self.text,
-            (ParameterType::DoubleArray, 7) => self.integers,
-            (ParameterType::DoubleArray, 8) => self.doubles,
+        let member = match (expected, kind) {
+            (ParameterType::Double, 2) => integer,
+            (ParameterType::Double, 3) => double,
+            (ParameterType::Text, 4) => string,
+            (ParameterType::DoubleArray, 7) => integers,
+            (ParameterType::DoubleArray, 8) => doubles,
             (_, found) => {
                 return Err(NotSet::WrongType {
                     name: parameter.name(),
@@ -237,14 +195,16 @@ impl<'a> GivenParameter<'a> {
                 });
             }
         };
-        read_change(parameter, member.unwrap_or(RawValue::NULL))
-    }
+        request(parameter, Some(member.unwrap_or(RawValue::NULL)))
+    };
+    let change = named.parameter.ok_or(NotSet::Unknown).and_then(change);
+    Some((named, Some(change)))
 }
 
 // ---- writing --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Answered for AskParameters<N> {
-    fn write(answers: Vec<(NamedParameter, ParameterAnswer<N>)>, to: &Address) -> Bytes {
+    fn write(answers: Self::Answer, to: &Address) -> Bytes {
         let values = match to.service() {
             Service::Rosapi(Rosapi::GetParamNames) => {
                 let all = answers.iter().filter_map(|(named, _)| named.parameter);
@@ -259,9 +219,8 @@ impl<const N: usize> Answered for AskParameters<N> {
                 json!({"result": {"names": names, "prefixes": []}})
             }
             Service::GetParameters => {
-                let values = answers
-                    .into_iter()
-                    .map(|(_, answer)| ValueMessage::from(answer));
+                let values = answers.into_iter();
+                let values = values.map(|(_, answer)| ValueMessage::from(answer.ok().flatten()));
                 json!({"values": values.collect::<Vec<_>>()})
             }
             Service::GetParameterTypes => {
@@ -287,27 +246,29 @@ impl<const N: usize> Answered for AskParameters<N> {
 fn rosapi_values<const N: usize>(
     question: Rosapi,
     named: &NamedParameter,
-    answer: ParameterAnswer<N>,
+    answer: Result<Option<ParameterValue<N>>, NotSet>,
 ) -> Value {
-    match (question, answer) {
-        (Rosapi::HasParam, _) => json!({"exists": named.parameter.is_some()}),
-        (_, ParameterAnswer::Value(Some(value))) => {
-            let value = match value {
-                ParameterValue::Number(number) => Value::from(number),
-                ParameterValue::Numbers(numbers) => Value::from(numbers.to_vec()),
-                ParameterValue::Text(text) => Value::from(text),
-            };
-            json!({"value": value.to_string(), "successful": true, "reason": ""})
-        }
-        (_, ParameterAnswer::Value(None)) => {
-            let value = match named.default.as_str() {
-                "" => NO_VALUE,
-                default => default,
-            };
-            json!({"value": value, "successful": false, "reason": NO_SUCH})
-        }
-        (_, answer @ ParameterAnswer::Changed(_)) => change_values(&answer),
-        (_, ParameterAnswer::Described) => {
+    match question {
+        Rosapi::HasParam => json!({"exists": named.parameter.is_some()}),
+        Rosapi::SetParam => change_values(&answer),
+        Rosapi::GetParam => match answer.ok().flatten() {
+            Some(value) => {
+                let value = match value {
+                    ParameterValue::Number(number) => Value::from(number),
+                    ParameterValue::Numbers(numbers) => Value::from(numbers.to_vec()),
+                    ParameterValue::Text(text) => Value::from(text),
+                };
+                json!({"value": value.to_string(), "successful": true, "reason": ""})
+            }
+            None => {
+                let value = match named.default.as_str() {
+                    "" => NO_VALUE,
+                    default => default,
+                };
+                json!({"value": value, "successful": false, "reason": NO_SUCH})
+            }
+        },
+        _ => {
             let reason = match named.parameter {
                 Some(_) => "name: the parameters of the arm can't be deleted",
                 None => NO_SUCH,
@@ -317,10 +278,10 @@ fn rosapi_values<const N: usize>(
     }
 }
 
-fn change_values<const N: usize>(answer: &ParameterAnswer<N>) -> Value {
+fn change_values<T>(answer: &Result<T, NotSet>) -> Value {
     let reason = match answer {
-        ParameterAnswer::Changed(Err(why)) => why.to_string(),
-        _ => String::new(),
+        Err(why) => why.to_string(),
+        Ok(_) => String::new(),
     };
     json!({"successful": reason.is_empty(), "reason": reason})
 }
@@ -360,26 +321,25 @@ struct ValueMessage {
     string_array_value: [String; 0],
 }
 
-impl<const N: usize> From<ParameterAnswer<N>> for ValueMessage {
-    fn from(answer: ParameterAnswer<N>) -> Self {
-        let of = |kind: ParameterType| Self {
-            r#type: kind as u8,
-            ..Self::default()
+impl<const N: usize> From<Option<ParameterValue<N>>> for ValueMessage {
+    fn from(value: Option<ParameterValue<N>>) -> Self {
+        let mut message = Self::default();
+        let kind = match value {
+            None => return message,
+            Some(ParameterValue::Number(number)) => {
+                message.double_value = number;
+                ParameterType::Double
+            }
+            Some(ParameterValue::Numbers(numbers)) => {
+                message.double_array_value = numbers.to_vec();
+                ParameterType::DoubleArray
+            }
+            Some(ParameterValue::Text(text)) => {
+                message.string_value = text;
+                ParameterType::Text
+            }
         };
-        match answer {
-            ParameterAnswer::Value(Some(ParameterValue::Number(double_value))) => Self {
-                double_value,
-                ..of(ParameterType::Double)
-            },
-            ParameterAnswer::Value(Some(ParameterValue::Numbers(numbers))) => Self {
-                double_array_value: numbers.to_vec(),
-                ..of(ParameterType::DoubleArray)
-            },
-            ParameterAnswer::Value(Some(ParameterValue::Text(string_value))) => Self {
-                string_value,
-                ..of(ParameterType::Text)
-            },
-            _ => Self::default(),
-        }
+        message.r#type = kind as u8;
+        message
     }
 }

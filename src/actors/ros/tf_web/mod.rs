@@ -23,10 +23,9 @@ use tokio::time::Instant;
 use crate::actors::ConnectionId;
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, Canceller};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, Pursue};
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::republished::{frames, seen_from};
-use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::scene::{WORLD, frames, seen_from};
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
@@ -57,16 +56,22 @@ impl Ask for RepublishTfs {
     type Answer = ();
 }
 
-/// Sends frames until cancelled. From clients, by the action or by the topic.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct WishFrames {
+/// The requested frames of an arm of `N` links.
+pub struct FrameGoal<const N: usize> {
     /// The frames.
     pub sources: Vec<String>,
     /// The frame to which they are relative.
     pub target: String,
     /// Time between two messages.
     pub period: Duration,
+}
+
+/// Sends frames until cancelled. From clients, by the topic.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct WishFrames<const N: usize> {
+    /// The frames.
+    pub goal: FrameGoal<N>,
     /// The receiver of the frames.
     pub by: FrameReceiver,
 }
@@ -86,15 +91,10 @@ pub enum FrameReceiver {
     },
 }
 
-/// Cancels a request. From clients, in the same ways.
+/// Cancels the published goal with that id, or all of them. From clients, by the topic.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub enum ForgetFrames {
-    /// The same client's goal of the action. The client gets an error status if there is none.
-    Of(Canceller),
-    /// The published goal with that id, or all of them.
-    Published(Option<String>),
-}
+pub struct ForgetFrames(pub Option<String>);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -103,7 +103,7 @@ pub struct TfRepublisher<const N: usize> {
     arm: Recipient<ArmPose<N>>,
     publish: Recipient<Publish>,
     /// Oldest first.
-    wishes: VecDeque<(WishFrames, Instant)>,
+    wishes: VecDeque<(WishFrames<N>, Instant)>,
     /// When the topic is due next, while it has subscribers.
     topic: Option<Instant>,
     timer: Option<SpawnHandle>,
@@ -139,12 +139,12 @@ impl<const N: usize> Handler<Call<RepublishTfs>> for TfRepublisher<N> {
     }
 }
 
-impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
+impl<const N: usize> Handler<WishFrames<N>> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, wish: WishFrames, ctx: &mut Context<Self>) {
+    fn handle(&mut self, wish: WishFrames<N>, ctx: &mut Context<Self>) {
         self.forget_gone();
-        let of_client = |(one, _): &(WishFrames, Instant)| one.client() == wish.client();
+        let of_client = |(one, _): &(WishFrames<N>, Instant)| one.client() == wish.client();
         let oldest = self.wishes.iter().position(of_client);
         if self.wishes.iter().filter(|one| of_client(one)).count() >= MAX_WISHES
             && let Some((oldest, _)) = oldest.and_then(|at| self.wishes.remove(at))
@@ -156,27 +156,41 @@ impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
     }
 }
 
+impl<const N: usize> Handler<Pursue<FrameGoal<N>>> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, pursue: Pursue<FrameGoal<N>>, ctx: &mut Context<Self>) {
+        let Pursue { goal, client, .. } = pursue;
+        let by = FrameReceiver::Client(Box::new(client));
+        self.handle(WishFrames { goal, by }, ctx);
+    }
+}
+
+impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
+        let is_meant = |wish: &WishFrames<N>| match &wish.by {
+            FrameReceiver::Client(client) => client.is(&cancel.from.goal),
+            FrameReceiver::Topic { .. } => false,
+        };
+        let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
+        match at.and_then(|at| self.wishes.remove(at)) {
+            Some((wish, _)) => wish.end(GoalStatus::Canceled, Empty {}),
+            None => cancel.from.refuse(NOT_KEPT),
+        }
+        self.keep_timer(ctx);
+    }
+}
+
 impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, forget: ForgetFrames, ctx: &mut Context<Self>) {
-        match forget {
-            ForgetFrames::Of(who) => {
-                let is_meant = |wish: &WishFrames| match &wish.by {
-                    FrameReceiver::Client(client) => client.is(&who.goal),
-                    FrameReceiver::Topic { .. } => false,
-                };
-                let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
-                match at.and_then(|at| self.wishes.remove(at)) {
-                    Some((wish, _)) => wish.end(GoalStatus::Canceled, Empty {}),
-                    None => who.refuse(NOT_KEPT),
-                }
-            }
-            ForgetFrames::Published(id) => self.wishes.retain(|(wish, _)| match &wish.by {
-                FrameReceiver::Client(_) => true,
-                FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
-            }),
-        }
+    fn handle(&mut self, ForgetFrames(id): ForgetFrames, ctx: &mut Context<Self>) {
+        self.wishes.retain(|(wish, _)| match &wish.by {
+            FrameReceiver::Client(_) => true,
+            FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
+        });
         self.keep_timer(ctx);
     }
 }
@@ -205,7 +219,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl WishFrames {
+impl<const N: usize> WishFrames<N> {
     /// Informs a client with a goal of the action of its end.
     fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
         if let FrameReceiver::Client(client) = &self.by {
@@ -279,8 +293,8 @@ impl<const N: usize> TfRepublisher<N> {
         due.sort_by_key(|(_, due)| *due);
         for (order, (wish, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
             // A nanosecond keeps the order, so requests that are always due take turns.
-            *due = next(*due, wish.period, now + Duration::from_nanos(order));
-            let message = seen(&wish.target, &wish.sources);
+            *due = next(*due, wish.goal.period, now + Duration::from_nanos(order));
+            let message = seen(&wish.goal.target, &wish.goal.sources);
             match &wish.by {
                 FrameReceiver::Client(client) => client.feed_back(message),
                 FrameReceiver::Topic { id, .. } => {

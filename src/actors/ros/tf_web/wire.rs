@@ -10,14 +10,14 @@ use bytes::Bytes;
 use serde_json::json;
 use serde_json::value::RawValue;
 
-use super::{ForgetFrames, FrameReceiver, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames};
-use crate::actors::node::Done;
-use crate::actors::wire::action_client::ActionClient;
+use super::{
+    ForgetFrames, FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames,
+};
+use crate::actors::wire::action_client::Goal;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
-use crate::protocol::messages::republished::is_frame;
-use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::scene::{WORLD, is_frame};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::wire::{json, text};
@@ -31,12 +31,10 @@ impl<const N: usize> TfRepublisher<N> {
     /// Adds this node's service, action and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
         nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
-        let node = address.clone();
-        let cancel = move |from, _| node.do_send(ForgetFrames::Of(from));
-        nodes.carry_out(Action::TfSubscription, goals(address.clone()), cancel);
+        nodes.carry_out::<FrameGoal<N>, _>(address.clone());
         let node = address.clone();
         nodes.listen(Topic::TfWebGoal, move |message| {
-            match read_goal(&message, N) {
+            match read_goal::<N>(&message) {
                 Ok(goal) => node.do_send(goal),
                 Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
             }
@@ -44,7 +42,7 @@ impl<const N: usize> TfRepublisher<N> {
         let node = address.clone();
         nodes.listen(Topic::TfWebCancel, move |message| {
             match read_cancel(message.msg.raw()) {
-                Ok(id) => node.do_send(ForgetFrames::Published(id)),
+                Ok(id) => node.do_send(ForgetFrames(id)),
                 Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
             }
         });
@@ -66,11 +64,7 @@ impl Callable for RepublishTfs {
         }
         // The topic has its own rate.
         let _ = fields.number("rate", Bound::NonNegative);
-        if fields.accepted() {
-            Ok(Self)
-        } else {
-            Err(fields.finish())
-        }
+        fields.accept(Self)
     }
 }
 
@@ -82,54 +76,36 @@ impl Answered for RepublishTfs {
 
 // ---- the action -----------------------------------------------------------------------------------------------------
 
-fn goals<const N: usize>(
-    node: Addr<TfRepublisher<N>>,
-) -> impl Fn(Arguments, ActionClient, Done) + Clone {
-    move |arguments, client, _| match read_wish(&arguments, N) {
-        Ok((sources, target, period)) => node.do_send(WishFrames {
-            sources,
-            target,
-            period,
-            by: FrameReceiver::Client(Box::new(client)),
-        }),
-        Err(rejections) => client.refuse(&rejections.status()),
-    }
-}
+impl<const N: usize> Goal for FrameGoal<N> {
+    const ACTION: Action = Action::TfSubscription;
 
-/// The source frames, the target frame and the period of a request.
-fn read_wish(
-    arguments: &Arguments,
-    links: usize,
-) -> Result<(Vec<String>, String, Duration), Rejections> {
-    let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
-    let sources = fields.texts("source_frames", MAX_FRAMES);
-    let is_long = |name: &String| name.len() > MAX_NAME;
-    if sources.iter().flatten().any(is_long) {
-        let why = format!("must have names of at most {MAX_NAME} bytes");
-        fields.refuse("source_frames", &why);
-    }
-    let target = fields
-        .text("target_frame")
-        .map(std::borrow::Cow::into_owned);
-    let rate = fields.number("rate", Bound::NonNegative);
-    if let Some(target) = target.as_ref().filter(|target| !is_frame(target, links)) {
-        let why = format!("must be a frame of the arm, got {target}");
-        fields.refuse("target_frame", &why);
-    }
-    match (sources, target, fields.accepted()) {
-        (Some(sources), Some(target), true) => {
-            let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
-            let period = Duration::from_secs_f64(rate.max(LEAST_RATE).recip());
-            Ok((sources, target, period))
+    fn read(arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
+        let sources = fields.texts("source_frames", MAX_FRAMES);
+        let is_long = |name: &String| name.len() > MAX_NAME;
+        if sources.iter().flatten().any(is_long) {
+            let why = format!("must have names of at most {MAX_NAME} bytes");
+            fields.refuse("source_frames", &why);
         }
-        _ => Err(fields.finish()),
+        let target = fields.text("target_frame");
+        let rate = fields.number("rate", Bound::NonNegative);
+        if let Some(target) = target.as_ref().filter(|target| !is_frame(target, N)) {
+            let why = format!("must be a frame of the arm, got {target}");
+            fields.refuse("target_frame", &why);
+        }
+        let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
+        fields.accept(Self {
+            sources: sources.unwrap_or_default(),
+            target: target.unwrap_or_default().into_owned(),
+            period: Duration::from_secs_f64(rate.max(LEAST_RATE).recip()),
+        })
     }
 }
 
 // ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
-fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejections> {
+fn read_goal<const N: usize>(message: &TopicMessage) -> Result<WishFrames<N>, Rejections> {
     let [id, goal] = members(message.msg.raw(), &["goal_id", "goal"])?;
     let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
     let id = id.and_then(|[id]| json::text(id?));
@@ -140,18 +116,13 @@ fn read_goal(message: &TopicMessage, links: usize) -> Result<WishFrames, Rejecti
     }
     let id = id.into_owned();
     let goal = goal.ok_or_else(|| refused("goal", &"is required"))?;
-    let (sources, target, period) = read_wish(&Arguments::Object(goal.into()), links)?;
+    let goal = Goal::read(&Arguments::Object(goal.into()))?;
     let by = FrameReceiver::Topic {
         id,
         connection: message.connection,
         listening: Weak::clone(&message.listening),
     };
-    Ok(WishFrames {
-        sources,
-        target,
-        period,
-        by,
-    })
+    Ok(WishFrames { goal, by })
 }
 
 /// `actionlib_msgs/GoalID`: an id, or none for all goals.

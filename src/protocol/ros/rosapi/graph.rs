@@ -3,6 +3,7 @@
 //! **Invariant:** the runtime's entries come first, in the order of the documentation. Clients appear as the
 //! node `/gateway`.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -64,184 +65,129 @@ pub struct ListedService {
     pub type_name: Option<Arc<str>>,
 }
 
-/// All nodes, topics and services.
-pub(super) struct Graph<'a> {
-    pub(super) census: &'a Census,
+/// A topic, and the nodes that use it.
+pub(super) struct TopicRow<'a> {
+    pub(super) name: &'a str,
+    /// Empty if it is not known.
+    pub(super) type_name: &'a str,
+    pub(super) publishers: Vec<Node>,
+    pub(super) subscribers: Vec<Node>,
 }
 
-impl Graph<'_> {
-    /// Topics that only clients use.
-    fn foreign(&self) -> impl Iterator<Item = &ListedTopic> {
-        let topics = self.census.topics.iter();
-        topics.filter(|topic| Topic::from_name(&topic.name).is_none())
-    }
+/// A service or an action, and its node.
+pub(super) struct ServedRow<'a> {
+    pub(super) name: Cow<'a, str>,
+    pub(super) type_name: Option<&'a str>,
+    pub(super) node: Node,
+}
 
-    /// Clients' use of the topic, if there is any.
-    fn listed(&self, name: &str) -> Option<&ListedTopic> {
-        let name = names::absolute(name);
-        let mut topics = self.census.topics.iter();
-        topics.find(|topic| *topic.name == *name)
-    }
-
-    pub(super) fn topics(&self) -> (Vec<String>, Vec<String>) {
-        let own = Topic::ALL
-            .into_iter()
-            .map(|topic| (topic.name().to_owned(), topic.type_name().to_owned()));
-        let foreign = self.foreign().map(|topic| {
-            let type_name = topic.type_name.as_deref().unwrap_or_default();
-            (topic.name.to_string(), type_name.to_owned())
-        });
-        own.chain(foreign).unzip()
-    }
-
-    pub(super) fn topics_of(&self, type_name: &str) -> Vec<String> {
-        let (topics, types) = self.topics();
-        let both = topics.into_iter().zip(types);
-        both.filter(|(_, one)| names::same_type(one, type_name))
-            .map(|(topic, _)| topic)
-            .collect()
-    }
-
-    pub(super) fn topic_type(&self, name: &str) -> String {
-        match Topic::from_name(name) {
-            Some(topic) => topic.type_name().to_owned(),
-            None => self
-                .listed(name)
-                .and_then(|topic| topic.type_name.as_deref())
-                .unwrap_or_default()
-                .to_owned(),
+/// All topics.
+pub(super) fn topics(census: &Census) -> Vec<TopicRow<'_>> {
+    let own = Topic::ALL.into_iter().map(|topic| {
+        let owner = vec![topic.owner()];
+        let (publishers, subscribers) = match (topic, topic.direction()) {
+            // Goals publish their setpoints there.
+            (Topic::JointTrajectory, _) => (vec![Node::IkAction], owner),
+            (_, Direction::Published) => (owner, vec![]),
+            (_, Direction::Subscribed) => (vec![], owner),
+        };
+        TopicRow {
+            name: topic.name(),
+            type_name: topic.type_name(),
+            publishers,
+            subscribers,
+        }
+    });
+    let mut rows: Vec<TopicRow<'_>> = own.collect();
+    for listed in &census.topics {
+        let mut own = rows.iter().take(Topic::ALL.len());
+        let own = own.position(|row| *row.name == *listed.name);
+        let at = own.unwrap_or(rows.len());
+        if own.is_none() {
+            rows.push(TopicRow {
+                name: &listed.name,
+                type_name: listed.type_name.as_deref().unwrap_or_default(),
+                publishers: vec![],
+                subscribers: vec![],
+            });
+        }
+        if let Some(row) = rows.get_mut(at) {
+            row.publishers
+                .extend(listed.published.then_some(Node::Gateway));
+            row.subscribers
+                .extend(listed.subscribed.then_some(Node::Gateway));
         }
     }
+    rows
+}
 
-    pub(super) fn publishers(&self, name: &str) -> BTreeSet<String> {
-        let mut nodes: BTreeSet<String> = Topic::from_name(name)
-            .into_iter()
-            .flat_map(publishing_nodes)
-            .map(node_name)
-            .collect();
-        if self.listed(name).is_some_and(|topic| topic.published) {
-            nodes.insert(node_name(Node::Gateway));
-        }
-        nodes
-    }
+/// All services.
+pub(super) fn services(census: &Census) -> Vec<ServedRow<'_>> {
+    let own = own_services().flat_map(|service| {
+        let names = service_names(service).into_iter();
+        names.map(move |name| ServedRow {
+            name: name.into(),
+            type_name: Some(service.type_name()),
+            node: service.owner(),
+        })
+    });
+    own.chain(of_clients(&census.services)).collect()
+}
 
-    pub(super) fn subscribers(&self, name: &str) -> BTreeSet<String> {
-        let mut nodes: BTreeSet<String> = Topic::from_name(name)
-            .filter(|topic| topic.direction() == Direction::Subscribed)
-            .into_iter()
-            .map(|topic| node_name(topic.owner()))
-            .collect();
-        if self.listed(name).is_some_and(|topic| topic.subscribed) {
-            nodes.insert(node_name(Node::Gateway));
-        }
-        nodes
-    }
+/// All actions.
+pub(super) fn actions(census: &Census) -> Vec<ServedRow<'_>> {
+    let own = Action::ALL.into_iter().map(|action| ServedRow {
+        name: action.name().into(),
+        type_name: Some(action.type_name()),
+        node: action.owner(),
+    });
+    own.chain(of_clients(&census.actions)).collect()
+}
 
-    pub(super) fn services(&self) -> Vec<String> {
-        let foreign = self.census.services.iter().map(|one| one.name.to_string());
-        own_services()
-            .flat_map(service_names)
-            .chain(foreign)
-            .collect()
-    }
+fn of_clients(listed: &[ListedService]) -> impl Iterator<Item = ServedRow<'_>> {
+    listed.iter().map(|one| ServedRow {
+        name: (&*one.name).into(),
+        type_name: one.type_name.as_deref(),
+        node: Node::Gateway,
+    })
+}
 
-    pub(super) fn services_of(&self, type_name: &str) -> Vec<String> {
-        let own = own_services_of(type_name).flat_map(service_names);
-        let foreign = self.foreign_services_of(type_name);
-        own.chain(foreign.map(|one| one.name.to_string())).collect()
-    }
+/// The row of that name.
+pub(super) fn named<'a>(rows: Vec<ServedRow<'a>>, name: &str) -> Option<ServedRow<'a>> {
+    let name = names::absolute(name);
+    rows.into_iter().find(|row| row.name == name)
+}
 
-    /// Services of that type that clients provide.
-    fn foreign_services_of(&self, type_name: &str) -> impl Iterator<Item = &ListedService> {
-        let services = self.census.services.iter();
-        services.filter(move |service| {
-            let own = service.type_name.as_deref();
-            own.is_some_and(|own| names::same_type(own, type_name))
+impl ServedRow<'_> {
+    /// Whether it is of that type.
+    pub(super) fn is_of(&self, type_name: &str) -> bool {
+        self.type_name.is_some_and(|own| match self.node {
+            Node::Gateway => names::same_type(own, type_name),
+            _ => same_service_type(own, type_name),
         })
     }
-
-    /// A service's type and node; both are empty if there is no such service.
-    pub(super) fn service(&self, name: &str) -> (String, String) {
-        let own = Service::from_name(name);
-        if let Some(service) = own {
-            return (service.type_name().to_owned(), node_name(service.owner()));
-        }
-        let name = names::absolute(name);
-        let mut foreign = self.census.services.iter();
-        match foreign.find(|service| *service.name == *name) {
-            None => Default::default(),
-            Some(service) => {
-                let type_name = service.type_name.as_deref().unwrap_or_default();
-                (type_name.to_owned(), node_name(Node::Gateway))
-            }
-        }
-    }
-
-    pub(super) fn providers(&self, type_name: &str) -> BTreeSet<String> {
-        let own = own_services_of(type_name).map(|service| node_name(service.owner()));
-        let foreign = self.foreign_services_of(type_name).take(1);
-        own.chain(foreign.map(|_| node_name(Node::Gateway)))
-            .collect()
-    }
-
-    pub(super) fn actions(&self) -> Vec<String> {
-        let own = Action::ALL.map(|action| action.name().to_owned());
-        let foreign = self.census.actions.iter().map(|one| one.name.to_string());
-        own.into_iter().chain(foreign).collect()
-    }
-
-    /// An action's type; empty if there is no such action or its type is unknown.
-    pub(super) fn action_type(&self, name: &str) -> String {
-        if let Some(action) = Action::from_name(name) {
-            return action.type_name().to_owned();
-        }
-        let name = names::absolute(name);
-        let mut foreign = self.census.actions.iter();
-        let found = foreign.find(|action| *action.name == *name);
-        let type_name = found.and_then(|action| action.type_name.as_deref());
-        type_name.unwrap_or_default().to_owned()
-    }
-
-    /// All lists are empty if there is no such node.
-    pub(super) fn node_details(&self, name: &str) -> Value {
-        let name = names::relative(name);
-        let Some(node) = Node::ALL.into_iter().find(|node| node.name() == name) else {
-            return json!({"subscribing": [], "publishing": [], "services": []});
-        };
-        let own = |chosen: &dyn Fn(Topic) -> bool| -> BTreeSet<String> {
-            let chosen = Topic::ALL.into_iter().filter(|topic| chosen(*topic));
-            chosen.map(|topic| topic.name().to_owned()).collect()
-        };
-        let mut publishing = own(&|topic| publishing_nodes(topic).contains(&node));
-        let mut subscribing =
-            own(&|topic| topic.direction() == Direction::Subscribed && topic.owner() == node);
-        let mut services: Vec<String> = own_services()
-            .filter(|service| service.owner() == node)
-            .flat_map(service_names)
-            .collect();
-        if node == Node::Gateway {
-            for topic in &self.census.topics {
-                if topic.published {
-                    publishing.insert(topic.name.to_string());
-                }
-                if topic.subscribed {
-                    subscribing.insert(topic.name.to_string());
-                }
-            }
-            services.extend(self.census.services.iter().map(|one| one.name.to_string()));
-        }
-        json!({"subscribing": subscribing, "publishing": publishing, "services": services})
-    }
 }
 
-/// The runtime's nodes that publish a topic.
-fn publishing_nodes(topic: Topic) -> Vec<Node> {
-    match (topic, topic.direction()) {
-        // Goals publish their setpoints there.
-        (Topic::JointTrajectory, _) => vec![Node::IkAction],
-        (_, Direction::Published) => vec![topic.owner()],
-        (_, Direction::Subscribed) => vec![],
-    }
+/// The names of nodes, each once.
+pub(super) fn node_names<'a>(nodes: impl IntoIterator<Item = &'a Node>) -> BTreeSet<String> {
+    nodes.into_iter().map(|node| node_name(*node)).collect()
+}
+
+/// The topics and services of a node. All lists are empty if there is no such node.
+pub(super) fn node_details(name: &str, census: &Census) -> Value {
+    let name = names::relative(name);
+    let node = Node::ALL.into_iter().find(|node| node.name() == name);
+    let (topics, services) = (topics(census), services(census));
+    let node = node.as_slice();
+    let of = |nodes: &[Node]| node.iter().any(|node| nodes.contains(node));
+    let publishing = topics.iter().filter(|row| of(&row.publishers));
+    let subscribing = topics.iter().filter(|row| of(&row.subscribers));
+    let services = services.iter().filter(|row| of(&[row.node]));
+    json!({
+        "subscribing": subscribing.map(|row| row.name).collect::<BTreeSet<_>>(),
+        "publishing": publishing.map(|row| row.name).collect::<BTreeSet<_>>(),
+        "services": services.map(|row| &row.name).collect::<Vec<_>>(),
+    })
 }
 
 /// A node's name in the answers.
@@ -253,10 +199,6 @@ pub(super) fn node_name(node: Node) -> String {
 pub(super) fn own_services() -> impl Iterator<Item = Service> {
     let questions = Rosapi::ALL.into_iter().map(Service::Rosapi);
     Service::ALL.into_iter().chain(questions)
-}
-
-fn own_services_of(type_name: &str) -> impl Iterator<Item = Service> {
-    own_services().filter(move |service| same_service_type(service.type_name(), type_name))
 }
 
 /// The names of a service. A service of rosapi has two.

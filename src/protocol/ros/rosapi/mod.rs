@@ -13,10 +13,13 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 pub use self::graph::{Census, ListedService, ListedTopic, MAX_LISTED};
-use self::graph::{Graph, node_name};
+use self::graph::{
+    ServedRow, actions, named, node_details, node_name, node_names, services, topics,
+};
 pub use self::typedef::TypeDef;
 use self::typedef::{details, interfaces};
 use crate::protocol::catalog::{Node, Rosapi, Service, types};
+use crate::protocol::names;
 
 /// The reported ROS version.
 const ROS_VERSION: u8 = 2;
@@ -43,39 +46,44 @@ pub enum AnswerError {
 /// # Errors
 /// If the type is unknown, or if the call is for the arm.
 pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, AnswerError> {
-    let graph = Graph { census };
     let fields = Service::Rosapi(question).fields();
     let unknown = || AnswerError::UnknownType {
         field: fields.first().map_or("", |field| field.name),
     };
+    let type_of = |rows| {
+        let row = named(rows, asked);
+        row.and_then(|row| row.type_name)
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let listed = |rows: Vec<ServedRow<'_>>| -> Vec<String> {
+        rows.into_iter().map(|row| row.name.into_owned()).collect()
+    };
+    let of_type = || -> Vec<ServedRow<'_>> {
+        let rows = services(census).into_iter();
+        rows.filter(|row| row.is_of(asked)).collect()
+    };
     Ok(match question {
-        Rosapi::Topics => {
-            let (topics, types) = graph.topics();
-            json!({"topics": topics, "types": types})
+        Rosapi::Topics
+        | Rosapi::TopicsAndRawTypes
+        | Rosapi::TopicsForType
+        | Rosapi::TopicType
+        | Rosapi::Publishers
+        | Rosapi::Subscribers => about_topics(question, asked, census),
+        Rosapi::Services => json!({"services": listed(services(census))}),
+        Rosapi::ServicesForType => json!({"services": listed(of_type())}),
+        Rosapi::ServiceType => {
+            json!({"type": type_of(services(census))})
         }
-        Rosapi::TopicsForType => json!({"topics": graph.topics_of(asked)}),
-        Rosapi::TopicsAndRawTypes => {
-            let (topics, types) = graph.topics();
-            // There are few types, but thousands of topics with them.
-            let mut known = BTreeMap::new();
-            for name in &types {
-                let text = known.entry(name.as_str());
-                text.or_insert_with(|| types::full_text(name).unwrap_or_default());
-            }
-            let text = |name: &String| known.get(name.as_str());
-            let texts: Vec<_> = types.iter().filter_map(text).collect();
-            json!({"topics": topics, "types": types, "typedefs_full_text": texts})
+        Rosapi::ServiceNode => {
+            let node = named(services(census), asked).map(|row| node_name(row.node));
+            json!({"node": node.unwrap_or_default()})
         }
-        Rosapi::TopicType => json!({"type": graph.topic_type(asked)}),
-        Rosapi::Publishers => json!({"publishers": graph.publishers(asked)}),
-        Rosapi::Subscribers => json!({"subscribers": graph.subscribers(asked)}),
-        Rosapi::Services => json!({"services": graph.services()}),
-        Rosapi::ServicesForType => json!({"services": graph.services_of(asked)}),
-        Rosapi::ServiceType => json!({"type": graph.service(asked).0}),
-        Rosapi::ServiceNode => json!({"node": graph.service(asked).1}),
-        Rosapi::ServiceProviders => json!({"providers": graph.providers(asked)}),
+        Rosapi::ServiceProviders => {
+            json!({"providers": node_names(of_type().iter().map(|row| &row.node))})
+        }
         Rosapi::Nodes => json!({"nodes": Node::ALL.map(node_name)}),
-        Rosapi::NodeDetails => graph.node_details(asked),
+        Rosapi::NodeDetails => node_details(asked, census),
         Rosapi::MessageDetails
         | Rosapi::ServiceRequestDetails
         | Rosapi::ServiceResponseDetails
@@ -84,8 +92,10 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         | Rosapi::ActionFeedbackDetails => {
             json!({"typedefs": details(question, asked).ok_or_else(unknown)?})
         }
-        Rosapi::ActionServers => json!({"action_servers": graph.actions()}),
-        Rosapi::ActionType => json!({"type": graph.action_type(asked)}),
+        Rosapi::ActionServers => json!({"action_servers": listed(actions(census))}),
+        Rosapi::ActionType => {
+            json!({"type": type_of(actions(census))})
+        }
         Rosapi::Interfaces => json!({"interfaces": interfaces()}),
         Rosapi::GetRosVersion => json!({"version": ROS_VERSION, "distro": DISTRO}),
         Rosapi::GetParam
@@ -98,4 +108,37 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
             return Err(AnswerError::OfTheArm);
         }
     })
+}
+
+/// The `values` for a question about topics.
+fn about_topics(question: Rosapi, asked: &str, census: &Census) -> Value {
+    let rows = topics(census);
+    let absolute = names::absolute(asked);
+    let topic = rows.iter().find(|row| row.name == absolute);
+    let (names, types): (Vec<_>, Vec<_>) = rows.iter().map(|row| (row.name, row.type_name)).unzip();
+    match question {
+        Rosapi::TopicsForType => {
+            let of_type = rows.iter();
+            let of_type = of_type.filter(|row| names::same_type(row.type_name, asked));
+            json!({"topics": of_type.map(|row| row.name).collect::<Vec<_>>()})
+        }
+        Rosapi::TopicType => json!({"type": topic.map_or("", |row| row.type_name)}),
+        Rosapi::Publishers => {
+            json!({"publishers": node_names(topic.iter().flat_map(|row| &row.publishers))})
+        }
+        Rosapi::Subscribers => {
+            json!({"subscribers": node_names(topic.iter().flat_map(|row| &row.subscribers))})
+        }
+        Rosapi::TopicsAndRawTypes => {
+            // There are few types, but thousands of topics with them.
+            let mut known = BTreeMap::new();
+            for name in &types {
+                let text = known.entry(*name);
+                text.or_insert_with(|| types::full_text(name).unwrap_or_default());
+            }
+            let texts: Vec<_> = types.iter().filter_map(|name| known.get(name)).collect();
+            json!({"topics": names, "types": types, "typedefs_full_text": texts})
+        }
+        _ => json!({"topics": names, "types": types}),
+    }
 }

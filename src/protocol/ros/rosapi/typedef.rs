@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::graph::{own_services, same_service_type};
 use crate::protocol::catalog::types::{self, Count, Type};
-use crate::protocol::catalog::{Action, Field, Rosapi, Service};
+use crate::protocol::catalog::{Action, Field, Rosapi, Service, message};
 use crate::protocol::names;
 
 /// A type in the format of rosapi, field by field.
@@ -33,38 +33,23 @@ pub struct TypeDef {
 
 /// The type of that name, field by field; `None` if it is unknown.
 pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
-    let service = || service_of_type(name);
+    let service = || own_services().find(|one| same_service_type(one.type_name(), name));
     let action = || {
         let mut all = Action::ALL.into_iter();
-        all.find(|action| names::same_type(action.type_name(), name))
+        let action = all.find(|action| names::same_type(action.type_name(), name));
+        action.map(Action::parts)
     };
     Some(match question {
         Rosapi::MessageDetails => typedefs(types::find(name)?),
-        Rosapi::ServiceRequestDetails => {
-            part_typedefs(service()?.type_name(), "Request", service()?.fields())
+        Rosapi::ServiceRequestDetails => part_typedefs(service()?, "Request", service()?.fields()),
+        Rosapi::ServiceResponseDetails => {
+            part_typedefs(service()?, "Response", service()?.response_fields())
         }
-        Rosapi::ServiceResponseDetails => part_typedefs(
-            service()?.type_name(),
-            "Response",
-            service()?.response_fields(),
-        ),
-        Rosapi::ActionGoalDetails => {
-            part_typedefs(action()?.type_name(), "Goal", action()?.goal_fields())
-        }
-        Rosapi::ActionResultDetails => {
-            part_typedefs(action()?.type_name(), "Result", action()?.result_fields())
-        }
-        Rosapi::ActionFeedbackDetails => part_typedefs(
-            action()?.type_name(),
-            "Feedback",
-            action()?.feedback_fields(),
-        ),
+        Rosapi::ActionGoalDetails => action().map(|[goal, _, _]| typedefs(goal))?,
+        Rosapi::ActionResultDetails => action().map(|[_, result, _]| typedefs(result))?,
+        Rosapi::ActionFeedbackDetails => action().map(|[_, _, feedback]| typedefs(feedback))?,
         _ => return None,
     })
-}
-
-fn service_of_type(name: &str) -> Option<Service> {
-    own_services().find(|service| same_service_type(service.type_name(), name))
 }
 
 /// Every type that the runtime knows, each once.
@@ -82,14 +67,9 @@ fn typedefs(first: Type) -> Vec<TypeDef> {
         .collect()
 }
 
-/// One part of a service's or an action's type, and all types in it.
-fn part_typedefs(type_name: &'static str, part: &str, fields: &'static [Field]) -> Vec<TypeDef> {
-    let first = Type {
-        name: type_name,
-        fields,
-        constants: &[],
-    };
-    let mut all = typedefs(first);
+/// One part of a service's type, and all types in it.
+fn part_typedefs(service: Service, part: &str, fields: &'static [Field]) -> Vec<TypeDef> {
+    let mut all = typedefs(message(service.type_name(), fields));
     if let Some(first) = all.first_mut() {
         first.name = format!("{}_{part}", first.name);
     }
