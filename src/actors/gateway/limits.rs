@@ -73,7 +73,7 @@ pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames of a chunk after which the reader yields.
-pub(super) const FRAMES_IN_A_ROW: usize = 8;
+pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Most waiting computations of one connection, besides the running one. At this limit the client is not read.
