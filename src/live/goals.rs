@@ -70,14 +70,14 @@ pub struct Tracking<const N: usize> {
     /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to publish.
     pub positions: [f64; N],
     /// How the previous goal ended, if there was one.
-    pub before: Option<GoalJudged<N>>,
+    pub before: Option<GoalProgress<N>>,
     /// Why the arm does not follow that setpoint yet; `None` if it does.
     pub obstacle: Option<Obstacle>,
 }
 
 /// The progress of a goal after a step, or its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GoalJudged<const N: usize> {
+pub struct GoalProgress<const N: usize> {
     /// The goal.
     pub number: u64,
     /// Distance between end effector and target \[m\].
@@ -95,7 +95,7 @@ pub struct GoalJudged<const N: usize> {
 pub(crate) struct Goals<const N: usize> {
     pub(super) tracked: Option<Tracked>,
     /// How the latest goal ended, for a query that was sent before its news arrived.
-    pub(super) latest: Option<GoalJudged<N>>,
+    pub(super) latest: Option<GoalProgress<N>>,
     /// A client has sent a setpoint while the controller was off, and the controller is still off.
     pub(crate) setpoint_waits: bool,
     /// The past before the last reset.
@@ -140,7 +140,7 @@ impl<const N: usize> Goals<N> {
     }
 
     /// Ends the goal, if there is one, in the arm's present state.
-    pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalJudged<N>> {
+    pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
         let tracked = self.tracked.take()?;
         let mut judged = tracked.stands(simulation, self.past);
         judged.outcome = Some(Outcome::Preempted);
@@ -155,7 +155,7 @@ impl Tracked {
         &mut self,
         simulation: &Simulation<N>,
         past: Past,
-    ) -> (Option<GoalJudged<N>>, Option<GoalJudged<N>>) {
+    ) -> (Option<GoalProgress<N>>, Option<GoalProgress<N>>) {
         let time = simulation.time();
         let reached = self.goal.judge(time, end_effector(simulation));
         let due = self.feedback.due(time);
@@ -163,15 +163,15 @@ impl Tracked {
             return (None, None);
         }
         let progress = self.stands(simulation, past);
-        let end = GoalJudged {
+        let end = GoalProgress {
             outcome: Some(Outcome::Reached),
             ..progress
         };
         (due.then_some(progress), reached.then_some(end))
     }
 
-    fn stands<const N: usize>(&self, simulation: &Simulation<N>, past: Past) -> GoalJudged<N> {
-        GoalJudged {
+    fn stands<const N: usize>(&self, simulation: &Simulation<N>, past: Past) -> GoalProgress<N> {
+        GoalProgress {
             number: self.number,
             distance: self.goal.distance(end_effector(simulation)),
             elapsed: self.goal.elapsed(simulation.time()),

@@ -33,7 +33,7 @@ use crate::protocol::catalog::Topic;
 use crate::services::study::Present;
 use crate::study::control_loop::ControlLoop;
 
-pub use self::goals::{GoalJudged, GoalOrder, Obstacle, Pose, Tracking};
+pub use self::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
 pub use self::journal::{ArmEvent, ArmListener, ArmNews, Journal};
 pub use self::limit::LEAST_PAUSE;
 pub use self::requests::{ArmRequest, ControllerOn};
@@ -61,7 +61,7 @@ pub trait World<const N: usize> {
     fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static);
 
     /// Sends feedback or the end of the goal to its owner.
-    fn tell(&self, judged: GoalJudged<N>);
+    fn tell(&self, judged: GoalProgress<N>);
 
     /// The number of clients and of dropped messages.
     fn clients(&self) -> (u64, u64);

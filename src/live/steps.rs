@@ -3,7 +3,7 @@
 //! **Invariant:** a row ends with each message about a goal, so the message is sent before the next
 //! step.
 
-use super::{GoalJudged, LiveArm, World};
+use super::{GoalProgress, LiveArm, World};
 use crate::math::simulation::ArmInput;
 use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{DIVERGED, STEPS_IN_A_ROW, Step, Stepped, StepsEnd};
@@ -44,7 +44,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     pub fn take_row(
         &mut self,
         steps: &mut StepsAsked<N>,
-    ) -> (Option<Stepped<N>>, Option<GoalJudged<N>>) {
+    ) -> (Option<Stepped<N>>, Option<GoalProgress<N>>) {
         if !self.paused {
             return (Some(self.stepped(steps, StepsEnd::Resumed)), None);
         }

@@ -7,7 +7,7 @@
 
 use std::ops::ControlFlow;
 
-use super::goals::{GoalJudged, GoalOrder, Obstacle, Pose, Tracked, Tracking, pose};
+use super::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracked, Tracking, pose};
 use super::{LiveArm, World};
 use crate::math::goal::{Cadence, Goal};
 use crate::math::kinematics::nearest_turn;
@@ -58,7 +58,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// Preempts the goal, unless it has ended already. Returns how the latest goal ended.
-    pub fn end_goal(&mut self, number: u64) -> Option<GoalJudged<N>> {
+    pub fn end_goal(&mut self, number: u64) -> Option<GoalProgress<N>> {
         let tracked = self.goals.tracked.as_ref();
         if tracked.is_some_and(|goal| goal.number == number) {
             self.goals.preempt(&self.simulation);
@@ -69,7 +69,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     /// Takes up to `steps` steps, and returns their number. There are fewer if a goal is reached or the simulation
     /// diverges. For a caller that `waits` they also end at feedback, which is returned. While paused, a single step
     /// may be longer than a sixtieth of a second, so each step may have feedback.
-    pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalJudged<N>>) {
+    pub(super) fn advance(&mut self, steps: u64, waits: bool) -> (u64, Option<GoalProgress<N>>) {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {

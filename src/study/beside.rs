@@ -83,20 +83,21 @@ impl<const N: usize> Steppable<N> for FreeMotion<N> {
 }
 
 /// The largest distance \[m\] between the two end effectors after any of the run's `steps`. One step of the run takes
-/// as long as `truth_steps` steps of the truth. Infinite if either diverges. The comparison ends once the distance
-/// exceeds `allowed` \[m\].
+/// as long as `reference_steps` steps of the reference. Infinite if either diverges. The comparison ends once the
+/// distance exceeds `allowed` \[m\].
 pub(super) async fn largest_distance<const N: usize>(
     arm: &Arm<N>,
     (mut run, steps): (Box<dyn Steppable<N>>, u64),
-    (mut truth, truth_steps): (Box<dyn Steppable<N>>, u64),
+    (mut reference, reference_steps): (Box<dyn Steppable<N>>, u64),
     allowed: f64,
 ) -> f64 {
     let (mut largest, mut work, mut piece) = (0.0, 0, PieceWork::default());
     for _ in 0..steps {
-        if run.advance(1) < 1 || truth.advance(truth_steps) < truth_steps {
+        if run.advance(1) < 1 || reference.advance(reference_steps) < reference_steps {
             return f64::INFINITY;
         }
-        let [one, other] = [&run, &truth].map(|it| forward(arm.lengths(), &it.state().position));
+        let [one, other] =
+            [&run, &reference].map(|it| forward(arm.lengths(), &it.state().position));
         let apart = one.position.distance(other.position);
         largest = if apart.is_nan() {
             f64::INFINITY
@@ -106,7 +107,7 @@ pub(super) async fn largest_distance<const N: usize>(
         if largest > allowed {
             break;
         }
-        let before = std::mem::replace(&mut work, run.evaluations() + truth.evaluations());
+        let before = std::mem::replace(&mut work, run.evaluations() + reference.evaluations());
         piece.spend(work - before).await;
     }
     largest
@@ -138,10 +139,10 @@ mod tests {
     fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
         let arm = Arm::default();
         let run = || Box::new(Diverged(State::rest()));
-        let truth = || Box::new(Simulation::new(arm, crate::study::linear::no_control()));
-        let off = largest_distance(&arm, (run(), 1_000_000), (truth(), 1), f64::INFINITY);
+        let reference = || Box::new(Simulation::new(arm, crate::study::linear::no_control()));
+        let off = largest_distance(&arm, (run(), 1_000_000), (reference(), 1), f64::INFINITY);
         assert!(at_once(off).is_infinite());
-        let off = largest_distance(&arm, (truth(), 1_000_000), (run(), 1), f64::INFINITY);
+        let off = largest_distance(&arm, (reference(), 1_000_000), (run(), 1), f64::INFINITY);
         assert!(at_once(off).is_infinite());
     }
 }

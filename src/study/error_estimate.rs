@@ -1,8 +1,8 @@
 //! The local error of a step of `h`, against two steps of `h/2` of Runge-Kutta 4 from the same state.
 //!
-//! For a method of lower order the two half steps serve as the truth. Two half steps of the method itself would not do.
-//! When an arm starts at rest, the leading error term vanishes, and the rest does not scale with the power that step
-//! doubling assumes. The error of Runge-Kutta 4 is `C h⁵`, and that of its two half steps `2 C (h/2)⁵`. Their
+//! For a method of lower order the two half steps serve as the reference. Two half steps of the method itself would not
+//! do. When an arm starts at rest, the leading error term vanishes, and the rest does not scale with the power that
+//! step doubling assumes. The error of Runge-Kutta 4 is `C h⁵`, and that of its two half steps `2 C (h/2)⁵`. Their
 //! difference is 15/16 of the error. Both use the effort that the control law holds for the step. The result is
 //! therefore the method's own error, without that of the sampled law.
 //!

@@ -1,16 +1,16 @@
 //! A plan: the method and the timestep that keep the end effector within an allowed error at least cost.
 //!
-//! | question | the truth that errors are measured from |
+//! | question | the reference that errors are measured from |
 //! | --- | --- |
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): the hold is an error |
 //! | the same with a control period that is given | the loop whose law runs once a period: the hold is no error |
 //!
-//! The truth is refined with smaller steps until two truths agree to a part of the allowed error. For a free arm the
-//! tolerance is reduced instead. Then each method is simulated like the live arm and compared with the truth. A search
-//! ([`fewest`]) finds the fewest steps with which it stays within the rest of the error after every step. The plan is
-//! the cheapest run, in evaluations of the dynamics, and its error is measured. Runs that cannot be cheaper are
-//! skipped.
+//! The reference is refined with smaller steps until two references agree to a part of the allowed error. For a free
+//! arm the tolerance is reduced instead. Then each method is simulated like the live arm and compared with the
+//! reference. A search ([`fewest`]) finds the fewest steps with which it stays within the rest of the error after every
+//! step. The plan is the cheapest run, in evaluations of the dynamics, and its error is measured. Runs that cannot be
+//! cheaper are skipped.
 //!
 //! If no control period is given, it is planned too. The law then runs in every step: a longer period at the same
 //! timestep costs as much and has a larger error. Under control the timestep never exceeds the advice for all poses,
@@ -33,18 +33,18 @@ use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
 use crate::math::shown::{Shown, shown_against};
 
-/// Longest time between two comparisons of truths \[s\], and the fewest intervals between comparisons.
+/// Longest time between two comparisons of references \[s\], and the fewest intervals between comparisons.
 const LONGEST_SPAN: f64 = 0.05;
 const FEWEST_SPANS: f64 = 16.0;
 
 /// Longest duration that is planned \[s\].
 pub const MAX_DURATION: f64 = 1000.0;
 
-/// Most steps of the truth, and of one run.
+/// Most steps of the reference, and of one run.
 const MAX_STEPS: u64 = 4_000_000;
 
-/// Largest uncertainty of the truth, relative to the allowed error.
-const PART_OF_TRUTH: f64 = 0.05;
+/// Largest uncertainty of the reference, relative to the allowed error.
+const PART_OF_REFERENCE: f64 = 0.05;
 
 /// A tolerance that was too large is multiplied by this. Two more digits increase the work by less than half.
 const FINER: f64 = 0.01;
@@ -84,7 +84,7 @@ pub struct Planned {
     /// The runs that were within the error, the cheapest last. Methods without a candidate are more expensive, or
     /// exceed the error.
     pub candidates: Vec<Candidate>,
-    /// Uncertainty of the truth \[m\].
+    /// Uncertainty of the reference \[m\].
     pub uncertainty: f64,
 }
 
@@ -95,7 +95,7 @@ pub enum PlanError {
     #[error("duration must be at most {MAX_DURATION} s, got {}", shown_against(*.0, MAX_DURATION))]
     TooLong(f64),
     /// The motion amplifies rounding beyond the allowed error, or changes too fast to be computed. The distance between
-    /// two truths \[m\]; infinite if there are no two.
+    /// two references \[m\]; infinite if there are no two.
     #[error("error must be larger or duration shorter: {}", known(*.0))]
     Unknown(f64),
     /// No method stays within the given error \[m\].
@@ -116,7 +116,7 @@ pub enum PlanError {
     TooManySteps(f64),
 }
 
-/// The resolution of a truth.
+/// The resolution of a reference.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
     /// The number of steps per whole.
@@ -134,7 +134,7 @@ impl Fineness {
     }
 }
 
-/// The most memory of [`plan`], in bytes: a run, its truth, and a search for limits.
+/// The most memory of [`plan`], in bytes: a run, its reference, and a search for limits.
 pub const fn most_bytes<const N: usize>() -> usize {
     2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
 }
@@ -153,8 +153,8 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     if duration.is_nan() || duration > MAX_DURATION {
         return Err(PlanError::TooLong(duration));
     }
-    let truth = Truth::known_to(PART_OF_TRUTH * error, task).await?;
-    let uncertainty = truth.uncertainty;
+    let reference = Reference::known_to(PART_OF_REFERENCE * error, task).await?;
+    let uncertainty = reference.uncertainty;
     let mut candidates: Vec<Candidate> = Vec::new();
     let (mut longest_stable, mut has_run) = (0.0_f64, false);
     for method in Method::ALL.into_iter().rev() {
@@ -162,15 +162,15 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
         let control = control.with_method(method);
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);
-        let least = count::whole((truth.whole / most * (1.0 - count::ROUNDING)).ceil());
+        let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
         // The number of steps that costs less than the best run so far.
         let cheapest = candidates.iter().map(|one| one.evaluations).min();
         let affordable = cheapest.map_or(u64::MAX, |least| {
             least.saturating_sub(1) / u64::from(method.evaluations())
         });
-        let affordable = affordable.min(MAX_STEPS) / truth.count;
+        let affordable = affordable.min(MAX_STEPS) / reference.count;
         let mut trials = MethodTrials {
-            truth: &truth,
+            reference: &reference,
             control,
             best: None,
             has_run: false,
@@ -198,7 +198,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
 
 /// Runs of one method.
 struct MethodTrials<'a, const N: usize> {
-    truth: &'a Truth<N>,
+    reference: &'a Reference<N>,
     control: ControlLoop<N>,
     /// The last run that was accurate enough.
     best: Option<Candidate>,
@@ -208,18 +208,18 @@ struct MethodTrials<'a, const N: usize> {
 impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
     async fn is_enough(&mut self, steps: u64) -> bool {
         self.has_run = true;
-        let (truth, method) = (self.truth, self.control.method);
-        let timestep = truth.whole / in_f64(steps);
+        let (reference, method) = (self.reference, self.control.method);
+        let timestep = reference.whole / in_f64(steps);
         let control = self.control.with_timestep(timestep);
-        let live = Box::new(control.simulation(truth.task.start));
-        let allowed = truth.task.error - truth.uncertainty;
-        let error = truth.off_by(live, steps, allowed).await;
-        let is_enough = error + truth.uncertainty <= truth.task.error;
+        let live = Box::new(control.simulation(reference.task.start));
+        let allowed = reference.task.error - reference.uncertainty;
+        let error = reference.off_by(live, steps, allowed).await;
+        let is_enough = error + reference.uncertainty <= reference.task.error;
         if is_enough {
             self.best = Some(Candidate {
                 method,
                 timestep,
-                evaluations: steps * truth.count * u64::from(method.evaluations()),
+                evaluations: steps * reference.count * u64::from(method.evaluations()),
                 error,
             });
         }
@@ -242,7 +242,7 @@ async fn longest_timestep<const N: usize>(control: &ControlLoop<N>) -> f64 {
 }
 
 /// The motion from which the errors of runs are measured.
-struct Truth<const N: usize> {
+struct Reference<const N: usize> {
     task: Task<N>,
     /// The duration, or the control period \[s\]: a timestep divides it.
     whole: f64,
@@ -253,7 +253,7 @@ struct Truth<const N: usize> {
     uncertainty: f64,
 }
 
-impl<const N: usize> Truth<N> {
+impl<const N: usize> Reference<N> {
     /// The motion of a task, refined until its uncertainty is at most `enough` \[m\].
     async fn known_to(enough: f64, task: Task<N>) -> Result<Self, PlanError> {
         let Task {
@@ -269,12 +269,12 @@ impl<const N: usize> Truth<N> {
             // The tolerance is relative to a rotation. For half a turn of the stretched arm it moves the end effector
             // by `enough`.
             let tolerance = enough / (PI * control.arm.reach());
-            // The truth of the first comparison must be finer.
+            // The reference of the first comparison must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4 * spans(whole, count))
         };
-        let mut truth = Self {
+        let mut reference = Self {
             task,
             whole,
             count,
@@ -282,25 +282,25 @@ impl<const N: usize> Truth<N> {
             uncertainty: f64::INFINITY,
         };
         loop {
-            let steps = match truth.fineness {
+            let steps = match reference.fineness {
                 Fineness::Steps(steps) => steps,
                 Fineness::Tolerance(_) => spans(whole, count),
             };
-            let (coarse, _) = truth.motion(steps);
-            truth.fineness = truth.fineness.finer();
-            let apart = truth.off_by(coarse, steps, f64::INFINITY).await;
+            let (coarse, _) = reference.motion(steps);
+            reference.fineness = reference.fineness.finer();
+            let apart = reference.off_by(coarse, steps, f64::INFINITY).await;
             if apart.is_finite() {
-                truth.uncertainty = apart;
+                reference.uncertainty = apart;
             }
-            let can_be_finer = match truth.fineness {
+            let can_be_finer = match reference.fineness {
                 Fineness::Steps(steps) => 2 * steps * count <= MAX_STEPS,
                 Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
             };
             if apart <= enough {
-                return Ok(truth);
+                return Ok(reference);
             }
             if !can_be_finer {
-                return Err(PlanError::Unknown(truth.uncertainty));
+                return Err(PlanError::Unknown(reference.uncertainty));
             }
         }
     }
@@ -337,7 +337,7 @@ impl<const N: usize> Truth<N> {
     }
 }
 
-/// Number of comparisons of truths per whole \[s\], for `count` wholes.
+/// Number of comparisons of references per whole \[s\], for `count` wholes.
 fn spans(whole: f64, count: u64) -> u64 {
     count::whole(
         (whole / LONGEST_SPAN)
@@ -351,7 +351,7 @@ fn is_sampled<const N: usize>(control: &ControlLoop<N>) -> bool {
     control.period.period > 0.0 && !control.is_free()
 }
 
-/// The message for truths that differ by `uncertainty` \[m\].
+/// The message for references that differ by `uncertainty` \[m\].
 fn known(uncertainty: f64) -> String {
     if uncertainty.is_finite() {
         format!("the motion itself is known only to {uncertainty:.1e} m over this duration")

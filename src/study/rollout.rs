@@ -6,8 +6,8 @@
 //!
 //! Three more references estimate the uncertainty of the first. Their arms differ in the last digits, and one of them
 //! takes steps half as long. On a chaotic swing the reference is usable for some twenty seconds. All errors are along
-//! the one growing direction. Two references may be close by chance, but four hardly ever are. The truth is therefore
-//! within `SPREAD` times the largest distance between any two of them.
+//! the one growing direction. Two references may be close by chance, but four hardly ever are. The reference is
+//! therefore within `SPREAD` times the largest distance between any two of them.
 //!
 //! **Invariant:** an accepted request has only finite numbers, and bounds the steps, samples and work of its run.
 

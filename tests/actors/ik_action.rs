@@ -5,7 +5,7 @@ use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction, SendGoal};
-use pendularm::actors::arm::sim::{ArmPose, CommandGoal, GoalJudged, TrackGoal, Tracking};
+use pendularm::actors::arm::sim::{ArmPose, CommandGoal, GoalProgress, TrackGoal, Tracking};
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
@@ -105,7 +105,7 @@ fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
             let goal_id = asked(&action, elsewhere()).await.unwrap();
             let number: u64 = goal_id.strip_prefix("goal-").unwrap().parse().unwrap();
             for outcome in [None, Some(Outcome::Reached)] {
-                let judged = GoalJudged {
+                let judged = GoalProgress {
                     number,
                     distance: 1.0,
                     elapsed: 1.0,
@@ -125,16 +125,16 @@ fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
 }
 
 /// Hears of a goal in a goal's owner's place.
-struct Owner(UnboundedSender<GoalJudged<2>>);
+struct Owner(UnboundedSender<GoalProgress<2>>);
 
 impl Actor for Owner {
     type Context = Context<Self>;
 }
 
-impl Handler<GoalJudged<2>> for Owner {
+impl Handler<GoalProgress<2>> for Owner {
     type Result = ();
 
-    fn handle(&mut self, judged: GoalJudged<2>, _: &mut Context<Self>) {
+    fn handle(&mut self, judged: GoalProgress<2>, _: &mut Context<Self>) {
         self.0.send(judged).unwrap();
     }
 }

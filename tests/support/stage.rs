@@ -12,7 +12,7 @@ use crate::nodes::{Started, start_whole};
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
-    AddBarrier, ArmPose, ArmSim, CommandGoal, EndGoal, GoalJudged, Pose, Reset, SetParams,
+    AddBarrier, ArmPose, ArmSim, CommandGoal, EndGoal, GoalProgress, Pose, Reset, SetParams,
     SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::compute::workers::WorkerPool;
@@ -272,7 +272,7 @@ impl Handler<CommandGoal<2>> for SilentArm {
 }
 
 impl Handler<EndGoal<2>> for SilentArm {
-    type Result = Option<GoalJudged<2>>;
+    type Result = Option<GoalProgress<2>>;
 
     fn handle(&mut self, _: EndGoal<2>, _: &mut Context<Self>) -> Self::Result {
         None

@@ -207,7 +207,7 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
 fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     let file = folder("differs").join("run.mcap");
     let settings = RunSettings { links: 2, seed: 0 };
-    let mut scribe = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
+    let mut writer = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
     let runtime_file = folder("differs-from").join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&runtime_file)]);
     let mut client = runtime.connect();
@@ -219,7 +219,7 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     // The same run, with another gravity at its beginning.
     let mut write = |content| {
         let log_time = 0;
-        scribe.write(&RecordEntry { log_time, content }).unwrap();
+        writer.write(&RecordEntry { log_time, content }).unwrap();
     };
     let numbers = |msg: &Value, name: &str| -> Vec<f64> {
         let numbers = msg[name].as_array().unwrap().iter();
@@ -242,7 +242,7 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
             _ => {}
         }
     }
-    scribe.finish().unwrap();
+    writer.finish().unwrap();
     let (status, said) = run(&["replay", text(&file)]);
     assert_eq!(status, Some(1), "{said}");
     assert!(

@@ -30,8 +30,8 @@ fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
         assert_eq!((status, said), (Some(1), expected), "{length}");
     }
     let settings = RunSettings { links: 2, seed: 0 };
-    let scribe = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
-    scribe.finish().unwrap();
+    let writer = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
+    writer.finish().unwrap();
     let (_, said) = run(&["replay", text(&file)]);
     assert!(said.ends_with("it has no states of an arm\n"), "{said}");
 }
@@ -58,17 +58,17 @@ fn words_of_a_record_are_escaped_and_cut() {
     let words = Value::from(&*hostile).to_string();
     let note = |note: String| {
         let file = File::create(&file).unwrap();
-        let mut scribe = McapWriter::new(file, &RunSettings { links: 2, seed: 0 }).unwrap();
+        let mut writer = McapWriter::new(file, &RunSettings { links: 2, seed: 0 }).unwrap();
         for note in [begin.clone(), note] {
             let content = Content::Input { step: 0, note };
-            scribe
+            writer
                 .write(&RecordEntry {
                     log_time: 0,
                     content,
                 })
                 .unwrap();
         }
-        scribe.finish().unwrap();
+        writer.finish().unwrap();
     };
     let topic = || {
         let mut writer = mcap::Writer::new(File::create(&file).unwrap()).unwrap();

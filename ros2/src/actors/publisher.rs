@@ -25,7 +25,7 @@ pub struct Publisher {
 /// Whether the topic has a subscriber in the graph.
 #[derive(Message)]
 #[rtype(result = "()")]
-struct Watched(bool);
+struct IsSubscribed(bool);
 
 impl Publisher {
     /// Starts it.
@@ -44,7 +44,7 @@ impl Publisher {
         let mut outlet = Outlet::new(session, endpoint, topic.is_latched())?;
         if !topic.is_latched() {
             let address: Addr<Self> = context.address();
-            outlet.watch(move |is_wanted| address.do_send(Watched(is_wanted)))?;
+            outlet.watch(move |is_wanted| address.do_send(IsSubscribed(is_wanted)))?;
         }
         Ok(context.run(Self {
             topic,
@@ -72,10 +72,10 @@ impl Actor for Publisher {
     }
 }
 
-impl Handler<Watched> for Publisher {
+impl Handler<IsSubscribed> for Publisher {
     type Result = ();
 
-    fn handle(&mut self, Watched(is_wanted): Watched, ctx: &mut Self::Context) {
+    fn handle(&mut self, IsSubscribed(is_wanted): IsSubscribed, ctx: &mut Self::Context) {
         self.listen(is_wanted, ctx);
     }
 }

@@ -64,12 +64,12 @@ pub(super) fn begin(
     let spawned = thread::Builder::new()
         .name("recorder".into())
         .spawn(move || {
-            let scribe = open(&target).and_then(|file| {
+            let writer = open(&target).and_then(|file| {
                 McapWriter::new(io::BufWriter::new(file), &settings)
                     .map_err(|why| failure(&target, &why))
             });
-            let scribe = match scribe {
-                Ok(scribe) => scribe,
+            let writer = match writer {
+                Ok(writer) => writer,
                 Err(why) => return drop(answer.send(Err(why))),
             };
             let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
@@ -83,7 +83,7 @@ pub(super) fn begin(
             if answer.send(Ok(Begun { tape, end })).is_err() {
                 return;
             }
-            let recorded = write(scribe, &queue, &counts, &target, over);
+            let recorded = write(writer, &queue, &counts, &target, over);
             // The program may end without waiting for the file.
             let _ = ended.send(recorded);
         });
@@ -174,22 +174,22 @@ impl TapeCounts {
 
 /// Writes entries until the last tape is dropped, the file fails, or the size limit is reached.
 fn write(
-    mut scribe: McapWriter<io::BufWriter<File>>,
+    mut writer: McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
     counts: &TapeCounts,
     target: &TapeTarget,
     over: impl FnOnce(),
 ) -> Recorded {
     let file = file_name(&target.path);
-    let outcome = take_entries(&mut scribe, queue, counts, target);
+    let outcome = take_entries(&mut writer, queue, counts, target);
     counts.is_over.store(true, Ordering::Relaxed);
     let recorded = Recorded {
-        messages: scribe.messages(),
-        bytes: scribe.bytes(),
+        messages: writer.messages(),
+        bytes: writer.bytes(),
         dropped: counts.dropped.load(Ordering::Relaxed),
         file,
     };
-    let finished = outcome.and_then(|is_last| scribe.finish().map(|_| is_last));
+    let finished = outcome.and_then(|is_last| writer.finish().map(|_| is_last));
     match finished {
         Ok(true) => {}
         Ok(false) => {
@@ -210,7 +210,7 @@ fn write(
 
 /// Writes waiting entries. Returns `false` if the file has become too long.
 fn take_entries(
-    scribe: &mut McapWriter<io::BufWriter<File>>,
+    writer: &mut McapWriter<io::BufWriter<File>>,
     queue: &Receiver<RecordEntry>,
     counts: &TapeCounts,
     target: &TapeTarget,
@@ -222,7 +222,7 @@ fn take_entries(
         {
             Ok(entry) => {
                 counts.written(entry.content.allocated());
-                match scribe.write(&entry) {
+                match writer.write(&entry) {
                     // A frame that cannot be read back is a fault of the runtime, but does not end the record.
                     Err(error @ RecordError::Frame(_)) => {
                         tracing::warn!(%error, "a message is not recorded");
@@ -235,7 +235,7 @@ fn take_entries(
             Err(RecvTimeoutError::Disconnected) => true,
         };
         if is_last || Instant::now() >= flush_due {
-            scribe.flush()?;
+            writer.flush()?;
             flush_due = Instant::now() + FLUSH_PERIOD;
             let so_far = counts.dropped.load(Ordering::Relaxed);
             if so_far > dropped {
@@ -251,7 +251,7 @@ fn take_entries(
         if is_last {
             return Ok(true);
         }
-        if target.limit.is_some_and(|limit| scribe.bytes() >= limit) {
+        if target.limit.is_some_and(|limit| writer.bytes() >= limit) {
             return Ok(false);
         }
     }

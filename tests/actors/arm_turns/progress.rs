@@ -6,7 +6,7 @@ use std::task::Poll;
 
 use super::*;
 use glam::DVec2;
-use pendularm::actors::arm::sim::{CommandGoal, GoalJudged, TrackGoal};
+use pendularm::actors::arm::sim::{CommandGoal, GoalProgress, TrackGoal};
 use pendularm::math::goal::Criteria;
 
 /// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
@@ -19,10 +19,10 @@ impl Actor for Owner {
     type Context = Context<Self>;
 }
 
-impl Handler<GoalJudged<3>> for Owner {
+impl Handler<GoalProgress<3>> for Owner {
     type Result = ();
 
-    fn handle(&mut self, judged: GoalJudged<3>, _: &mut Context<Self>) {
+    fn handle(&mut self, judged: GoalProgress<3>, _: &mut Context<Self>) {
         let heard = (judged.elapsed, self.turns.get());
         self.heard.borrow_mut().push(heard);
     }

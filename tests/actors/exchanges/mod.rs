@@ -61,7 +61,7 @@ use std::time::Duration;
 
 use self::held::KeptCalls;
 use self::patterns::{check, expand, number, range};
-use self::peer::{LONG_PATIENCE, Peer, SOON, ask};
+use self::peer::{LONG_PATIENCE, Peer, SHORT_PATIENCE, ask};
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, settle};
@@ -339,7 +339,7 @@ impl World {
                     return Err(format!("came too: {rest:?}"));
                 }
             }
-            "forget" => drop(peer.take_for(SOON).await),
+            "forget" => drop(peer.take_for(SHORT_PATIENCE).await),
             "room" => {}
             "take" => {
                 let mut bytes = vec![0; number(rest).ok_or("no number")?];

@@ -15,7 +15,7 @@ use super::patterns::{check, is_within, matches};
 pub(super) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
 /// Virtual time in which all that is under way arrives.
-pub(super) const SOON: Duration = Duration::from_millis(10);
+pub(super) const SHORT_PATIENCE: Duration = Duration::from_millis(10);
 
 /// Topics that are published periodically.
 const PERIODIC: [&str; 5] = [
@@ -136,7 +136,7 @@ impl Peer {
 
     /// The frames that have come and were not received, without those of periodic topics.
     pub(super) async fn rest(&mut self) -> Vec<Value> {
-        let mut rest = self.take_for(SOON).await;
+        let mut rest = self.take_for(SHORT_PATIENCE).await;
         let is_periodic = |value: &Value| PERIODIC.iter().any(|topic| value["topic"] == *topic);
         rest.retain(|value| !is_periodic(value) && *value != "the end");
         rest

@@ -66,14 +66,14 @@ impl Notes {
 
 pub fn file(entries: &[RecordEntry]) -> Vec<u8> {
     let settings = RunSettings { links: 2, seed: 1 };
-    let mut scribe = McapWriter::new(Vec::new(), &settings).unwrap();
+    let mut writer = McapWriter::new(Vec::new(), &settings).unwrap();
     for (number, entry) in entries.iter().enumerate() {
-        scribe.write(entry).unwrap();
+        writer.write(entry).unwrap();
         if number % 20 == 19 {
-            scribe.flush().unwrap();
+            writer.flush().unwrap();
         }
     }
-    scribe.finish().unwrap()
+    writer.finish().unwrap()
 }
 
 pub fn passages(file: &[u8]) -> (Vec<RecordedMessage>, RecordEnding) {

@@ -11,11 +11,9 @@ use serde_json::{Value, json};
 
 use crate::arm::{Arm, State};
 use crate::method::step;
-use crate::peer::{Answer, Peer, Trouble, is_message};
+use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
 use crate::values::{boolean, largest, list, minus, must, near, number, numbers, numbers_of, text};
 
-/// The longest wait for a message on a topic that is published continuously.
-const SOON: Duration = Duration::from_secs(3);
 /// Standard gravity of the specification.
 pub const GRAVITY: f64 = 9.81;
 
@@ -48,7 +46,7 @@ impl Found {
     pub fn at(address: &str) -> Result<Self, String> {
         let mut bench = Bench { peer: Peer::connect(address)?, links: 0, found: None };
         let params = bench.accepted("/arm_sim/set_params", &json!({}));
-        let state = bench.watch("/joint_states").and_then(|()| bench.message("/joint_states", SOON)).and_then(|msg| Joints::read(&msg));
+        let state = bench.watch("/joint_states").and_then(|()| bench.message("/joint_states", PATIENCE)).and_then(|msg| Joints::read(&msg));
         let by_params = params.as_ref().ok().and_then(|values| numbers(values, "masses").ok()).map(|masses| masses.len());
         let links = by_params.or_else(|| state.as_ref().ok().map(|state| state.position.len()));
         let links = match links {
@@ -229,7 +227,7 @@ impl Bench {
 
     /// The next joint states, in order.
     pub fn joints(&mut self) -> Result<Joints, String> {
-        let msg = self.message("/joint_states", SOON)?;
+        let msg = self.message("/joint_states", PATIENCE)?;
         let joints = Joints::read(&msg)?;
         let lengths = [joints.position.len(), joints.velocity.len(), joints.effort.len()];
         must(lengths == [self.links; 3], || format!("position, velocity and effort have {lengths:?} entries for {} joints", self.links))?;

@@ -3,7 +3,7 @@
 //! **Invariant:** each goal has exactly one result. A preempting goal comes in this order: the old goal's result, the
 //! response, the trajectory, feedback, result.
 
-use pendularm::live::{GoalJudged, GoalOrder, Obstacle};
+use pendularm::live::{GoalOrder, GoalProgress, Obstacle};
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::solve;
 use pendularm::protocol::catalog::Topic;
@@ -108,7 +108,7 @@ impl<const N: usize> Kernel<N> {
     }
 
     /// Sends feedback or the end of the active goal.
-    pub(super) fn judge(&mut self, judged: GoalJudged<N>) {
+    pub(super) fn judge(&mut self, judged: GoalProgress<N>) {
         let is_active = |active: &ActiveGoal<N>| active.goal.number == judged.number;
         let world = self.arm.world();
         match judged.outcome {

@@ -13,7 +13,7 @@ mod trials;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use pendularm::live::{GoalJudged, LiveArm};
+use pendularm::live::{GoalProgress, LiveArm};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
@@ -47,7 +47,7 @@ pub struct Kernel<const N: usize> {
     trial: Trial,
     rng: fastrand::Rng,
     /// News of goals that the trial has not handled.
-    news: VecDeque<(ActiveGoal<N>, GoalJudged<N>)>,
+    news: VecDeque<(ActiveGoal<N>, GoalProgress<N>)>,
     /// The time of the trial's last published status.
     trial_shown: Duration,
     computations: VecDeque<Box<dyn Computation>>,

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use bytes::Bytes;
-use pendularm::live::{GoalJudged, World};
+use pendularm::live::{GoalProgress, World};
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use pendularm::protocol::wire::json::Payload;
@@ -30,7 +30,7 @@ pub(super) struct Surroundings<const N: usize> {
     clock: Clock,
     subscriptions: RefCell<Vec<Subscription>>,
     frames: RefCell<Vec<u8>>,
-    judged: RefCell<VecDeque<GoalJudged<N>>>,
+    judged: RefCell<VecDeque<GoalProgress<N>>>,
 }
 
 impl<const N: usize> Surroundings<N> {
@@ -95,7 +95,7 @@ impl<const N: usize> Surroundings<N> {
         self.frames.take()
     }
 
-    pub(super) fn next_judged(&self) -> Option<GoalJudged<N>> {
+    pub(super) fn next_judged(&self) -> Option<GoalProgress<N>> {
         self.judged.borrow_mut().pop_front()
     }
 }
@@ -113,7 +113,7 @@ impl<const N: usize> World<N> for Surroundings<N> {
         self.deliver(topic, write);
     }
 
-    fn tell(&self, judged: GoalJudged<N>) {
+    fn tell(&self, judged: GoalProgress<N>) {
         self.judged.borrow_mut().push_back(judged);
     }
 

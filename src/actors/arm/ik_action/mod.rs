@@ -22,7 +22,8 @@ pub use self::messages::{
 use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names,
+    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalProgress, TrackGoal, Tracking,
+    joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
@@ -181,11 +182,11 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
     }
 }
 
-impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
+impl<const N: usize> Handler<GoalProgress<N>> for IkAction<N> {
     type Result = ();
 
     /// From the arm. News of a goal that is no longer active are discarded.
-    fn handle(&mut self, judged: GoalJudged<N>, _: &mut Context<Self>) {
+    fn handle(&mut self, judged: GoalProgress<N>, _: &mut Context<Self>) {
         if judged.outcome.is_some() {
             self.conclude(&judged);
         } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&judged)) {
@@ -218,19 +219,19 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActiveGoal<N> {
-    fn is(&self, judged: &GoalJudged<N>) -> bool {
+    fn is(&self, judged: &GoalProgress<N>) -> bool {
         self.goal.number == judged.number
     }
 
-    fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback {
+    fn feedback(&self, judged: &GoalProgress<N>) -> IkFeedback {
         self.goal.feedback(judged.distance, judged.elapsed)
     }
 
-    fn result(&self, judged: &GoalJudged<N>) -> IkResult {
+    fn result(&self, judged: &GoalProgress<N>) -> IkResult {
         self.goal.result(judged.distance, judged.outcome)
     }
 
-    fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
+    fn status(&self, judged: &GoalProgress<N>) -> GoalStatus {
         match judged.outcome {
             Some(Outcome::Reached) => GoalStatus::Succeeded,
             _ => self.if_preempted,
@@ -251,7 +252,7 @@ impl<const N: usize> ActiveGoal<N> {
     }
 
     /// Informs its owner of feedback or of its end.
-    fn inform_owner(&self, judged: &GoalJudged<N>) {
+    fn inform_owner(&self, judged: &GoalProgress<N>) {
         match &self.owner {
             None => {}
             Some(GoalOwner::Client(client)) => match judged.outcome {
@@ -366,7 +367,7 @@ impl<const N: usize> IkAction<N> {
     }
 
     /// Publishes the result of the goal and removes it. Does nothing if another goal is active.
-    fn conclude(&mut self, judged: &GoalJudged<N>) {
+    fn conclude(&mut self, judged: &GoalProgress<N>) {
         let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
             return;
         };

@@ -8,7 +8,7 @@ use actix::prelude::*;
 
 use super::messages::{AddBarrier, ArmPose, Barrier, CommandGoal, EndGoal, TrackGoal};
 use super::node::ArmSim;
-use crate::live::{GoalJudged, GoalOrder, Pose, Tracking};
+use crate::live::{GoalOrder, GoalProgress, Pose, Tracking};
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
@@ -53,7 +53,7 @@ impl<const N: usize> Handler<CommandGoal<N>> for ArmSim<N> {
 }
 
 impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
-    type Result = Option<GoalJudged<N>>;
+    type Result = Option<GoalProgress<N>>;
 
     fn handle(&mut self, EndGoal { number }: EndGoal<N>, ctx: &mut Context<Self>) -> Self::Result {
         self.attend(ctx);

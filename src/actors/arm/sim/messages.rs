@@ -6,7 +6,7 @@ use actix::dev::{MessageResponse, OneshotSender};
 use actix::prelude::*;
 use glam::DVec2;
 
-use crate::live::{ArmListener, GoalJudged, Pose, Tracking};
+use crate::live::{ArmListener, GoalProgress, Pose, Tracking};
 use crate::math::goal::Criteria;
 use crate::math::simulation::Simulation;
 use crate::services::study::Present;
@@ -72,7 +72,7 @@ pub struct TrackGoal<const N: usize> {
     /// Joint positions that put the end effector there \[rad\].
     pub solution: [f64; N],
     /// The receiver of feedback and of the end, unless the end is the answer to its own message.
-    pub owner: Recipient<GoalJudged<N>>,
+    pub owner: Recipient<GoalProgress<N>>,
 }
 
 /// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before it
@@ -99,14 +99,14 @@ pub struct CommandGoal<const N: usize> {
 
 /// Preempts the goal, unless it has ended already. From `ik_action`. The answer is how the latest goal ended.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<GoalJudged<N>>")]
+#[rtype(result = "Option<GoalProgress<N>>")]
 pub struct EndGoal<const N: usize> {
     /// The goal.
     pub number: u64,
 }
 
 /// To the owner of the goal.
-impl<const N: usize> Message for GoalJudged<N> {
+impl<const N: usize> Message for GoalProgress<N> {
     type Result = ();
 }
 

@@ -23,7 +23,7 @@ pub use self::messages::{
 pub use self::node::ArmSim;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
-    ArmEvent, ArmListener, ArmNews, BREATHER, GoalJudged, LEAST_PAUSE, Obstacle, PUBLISH_RATE,
+    ArmEvent, ArmListener, ArmNews, BREATHER, GoalProgress, LEAST_PAUSE, Obstacle, PUBLISH_RATE,
     Pose, Tracking, WAKE_UP_BUDGET,
 };
 pub use crate::services::arm::{

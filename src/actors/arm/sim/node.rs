@@ -23,7 +23,7 @@ use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::gauges::Gauges;
-use crate::live::{BREATHER, GoalJudged, Journal, LiveArm, PUBLISH_RATE};
+use crate::live::{BREATHER, GoalProgress, Journal, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::services::study::Present;
@@ -46,7 +46,7 @@ pub struct ArmSim<const N: usize> {
     /// The nodes that inform clients of goals, which get barriers.
     pub(super) owners: Vec<Recipient<Barrier>>,
     /// Feedback of the goal that has been sent and not yet arrived.
-    pub(super) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
+    pub(super) underway: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
 }
 
 impl<const N: usize> ArmSim<N> {

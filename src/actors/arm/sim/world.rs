@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use crate::actors::node::{FrameOut, Publish};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::work_clock;
-use crate::live::{GoalJudged, World};
+use crate::live::{GoalProgress, World};
 use crate::math::simulation::Divergence;
 use crate::protocol::catalog::Topic;
 
@@ -23,7 +23,7 @@ pub(super) struct ArmWorld<const N: usize> {
     pub(super) publish: Recipient<Publish>,
     pub(super) gauges: Arc<Gauges>,
     /// The receiver of the tracked goal's news.
-    pub(super) owner: Option<Recipient<GoalJudged<N>>>,
+    pub(super) owner: Option<Recipient<GoalProgress<N>>>,
 }
 
 impl<const N: usize> World<N> for ArmWorld<N> {
@@ -40,7 +40,7 @@ impl<const N: usize> World<N> for ArmWorld<N> {
         self.publish.do_send(Publish { topic, frame });
     }
 
-    fn tell(&self, judged: GoalJudged<N>) {
+    fn tell(&self, judged: GoalProgress<N>) {
         if let Some(owner) = &self.owner {
             owner.do_send(judged);
         }

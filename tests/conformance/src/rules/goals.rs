@@ -51,7 +51,7 @@ const CANCEL: &str = "/ik_action/cancel_goal";
 const FEEDBACK: &str = "/ik_action/feedback";
 const RESULT: &str = "/ik_action/result";
 /// The longest wait for a message about a goal.
-const SOON: Duration = Duration::from_secs(2);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// The target that a pose reaches, with its orientation for 3 links, and further members.
 fn goal_at(bench: &Bench, pose: [f64; 3], further: &Value) -> Value {
@@ -132,7 +132,7 @@ fn leaves_alone(bench: &mut Bench) -> Got {
     bench.forget(FEEDBACK);
     no_result(bench, &id)?;
     bench.forget(FEEDBACK);
-    let msg = bench.message(FEEDBACK, SOON)?;
+    let msg = bench.message(FEEDBACK, PATIENCE)?;
     must(is_of(&msg, &id), || format!("feedback of another goal: {msg}"))?;
     Ok(format!("rejected with: {status}"))
 }
@@ -157,7 +157,7 @@ fn commands(bench: &mut Bench) -> Got {
     bench.watch("/joint_trajectory")?;
     let goal = endless(bench);
     bench.send_goal(&goal)?;
-    let msg = bench.message("/joint_trajectory", SOON)?;
+    let msg = bench.message("/joint_trajectory", PATIENCE)?;
     let points = member(&msg, "points")?.as_array().map_or(0, Vec::len);
     let last = points.checked_sub(1).ok_or("no points")?;
     let positions = numbers_of(&msg, &format!("points/{last}/positions"), bench.links)?;
@@ -170,14 +170,14 @@ fn feedback(bench: &mut Bench) -> Got {
     listen(bench)?;
     let goal = endless(bench);
     let id = bench.send_goal(&goal)?;
-    let msg = bench.message_that(FEEDBACK, SOON, "feedback", |msg| is_of(msg, &id))?;
+    let msg = bench.message_that(FEEDBACK, PATIENCE, "feedback", |msg| is_of(msg, &id))?;
     has_target(bench, &msg, &goal)?;
     let positions = numbers_of(&msg, "positions", bench.links)?;
     let (x, y, _) = Arm::of(bench.links, GRAVITY).end_effector(&positions);
     near("the end effector of positions", &[x, y], &[number(&goal, "x")?, number(&goal, "y")?], 1e-6)?;
     let (distance, elapsed) = (number(&msg, "distance_remaining")?, number(&msg, "elapsed")?);
     must(distance >= 0.0 && elapsed >= 0.0, || format!("distance_remaining {distance}, elapsed {elapsed}"))?;
-    let later = bench.message_that(FEEDBACK, SOON, "later feedback", |msg| {
+    let later = bench.message_that(FEEDBACK, PATIENCE, "later feedback", |msg| {
         is_of(msg, &id) && number(msg, "elapsed").is_ok_and(|later| later > elapsed)
     })?;
     Ok(later.to_string())
@@ -199,7 +199,7 @@ fn preempts(bench: &mut Bench) -> Got {
     let next = goal_at(bench, [-0.5, 0.9, 0.2], &json!({"epsilon": 1e-6, "success_hold": 1000.0}));
     let other = bench.send_goal(&next)?;
     must(id != other, || format!("both goals have the id {id}"))?;
-    let msg = result(bench, &id, SOON)?;
+    let msg = result(bench, &id, PATIENCE)?;
     is_preempted(bench, &msg, &goal)?;
     Ok(msg.to_string())
 }
@@ -227,7 +227,7 @@ fn cancels(bench: &mut Bench) -> Got {
         let id = bench.send_goal(&goal)?;
         let args = if names_goal { json!({"goal_id": id}) } else { json!({}) };
         bench.accepted(CANCEL, &args)?;
-        last = result(bench, &id, SOON)?;
+        last = result(bench, &id, PATIENCE)?;
         is_preempted(bench, &last, &goal)?;
     }
     Ok(last.to_string())

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
+use crate::peer::PATIENCE;
 use crate::values::{boolean, member, must, near, number, numbers_of, text};
 use crate::{Got, Rule, rule};
 
@@ -42,8 +43,6 @@ const STATUS: &str = "/ik_trial/status";
 const START: &str = "/ik_trial/start";
 const SKIP: &str = "/ik_trial/skip";
 const STOP: &str = "/ik_trial/stop";
-/// The longest wait for a status.
-const SOON: Duration = Duration::from_secs(3);
 
 /// Starts a trial whose targets are not reached.
 fn start(bench: &mut Bench) -> Result<(), String> {
@@ -55,7 +54,7 @@ fn start(bench: &mut Bench) -> Result<(), String> {
 
 /// The next status that is as it should be; the error has the latest one that is not.
 fn status_that(bench: &mut Bench, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
-    match bench.message_that(STATUS, SOON, name, is_it) {
+    match bench.message_that(STATUS, PATIENCE, name, is_it) {
         Ok(status) => Ok(status),
         Err(why) => {
             let last = bench.message(STATUS, Duration::from_millis(300));
@@ -195,6 +194,6 @@ fn uses_goals(bench: &mut Bench) -> Got {
         let same = |name, value: f64| number(msg, name).is_ok_and(|got| (got - value).abs() < 1e-6);
         same("target/x", x) && same("target/y", y)
     };
-    bench.message_that("/ik_action/feedback", SOON, "feedback for that target", is_same)?;
+    bench.message_that("/ik_action/feedback", PATIENCE, "feedback for that target", is_same)?;
     Ok(format!("feedback for {target}"))
 }
