@@ -14,8 +14,8 @@ use std::time::Duration;
 use libfuzzer_sys::fuzz_target;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::limits::MAX_NAME;
-use pendularm::protocol::op::trajectory::joint_trajectory;
 use pendularm::protocol::messages::{self, ErrorForm, Level};
+use pendularm::protocol::op::trajectory::joint_trajectory;
 use pendularm::protocol::op::{
     self, ActionServerOp, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
 };
