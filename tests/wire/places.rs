@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::process::Output;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 
@@ -120,4 +120,22 @@ fn one_place_and_two_are_served_too() {
     assert!(refused(runtime.address, false).contains("keeps 1"));
     #[cfg(feature = "web")]
     assert_eq!(crate::web_client::get(runtime.address, "/").status, 200);
+}
+
+/// A client that has only stopped sending keeps its place for 15 s while its call waits.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_client_that_has_closed_its_socket_waits_for_no_answer() {
+    let runtime = serving("3");
+    let mut provider = Client::to(runtime.address);
+    provider.send(&json!({"op": "advertise_service", "service": "/silent", "type": "a/b"}));
+    provider.settle();
+    let mut caller = Client::to(runtime.address);
+    caller.send(&json!({"op": "call_service", "service": "/silent", "timeout": 60}));
+    caller.settle();
+    assert!(refused(runtime.address, true).contains("serves 3 clients"));
+    drop(caller);
+    let began = Instant::now();
+    assert!(is_served_at_last(runtime.address));
+    assert!(began.elapsed() < Duration::from_secs(10), "{began:?}");
 }

@@ -66,7 +66,7 @@ pub const STALL_LIMIT: Duration = Duration::from_secs(20);
 /// timeout. The slowest line that can control an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// Timeout of pending responses to a client that has stopped sending. It is longer than [`DEFAULT_TIMEOUT`]. The client
-/// may have disconnected, which is detected only by sending to it.
+/// may have disconnected, which is detected by sending to it, or by [`CLOSED_CHECK`] on the same machine.
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 /// Bytes offered in one write. Then other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
@@ -76,5 +76,7 @@ pub(super) const WRITE_FRAMES: usize = 64;
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
+/// Interval of checks whether a client that has stopped sending has closed its socket.
+pub(super) const CLOSED_CHECK: Duration = Duration::from_millis(250);
 /// Most waiting computations of one connection, besides the running one. At this limit the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

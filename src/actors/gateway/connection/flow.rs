@@ -31,6 +31,12 @@ pub(super) fn between(ends: Ends) -> UnreadSource {
     })
 }
 
+/// Whether the client has closed its socket, if it is on this machine. A client that has only stopped sending may still
+/// read.
+pub(super) fn has_closed(ends: Ends) -> bool {
+    ends.peer.port() != 0 && sockets::has_closed(ends)
+}
+
 /// Nothing more is written once a byte has been unread for this time. Python reads 8 KiB at a time, which is half a
 /// second of messages to a client that reads at half the rate.
 const HOLD: Duration = Duration::from_millis(100);
@@ -193,9 +199,10 @@ mod sockets {
     /// The message type for a query of a socket (`SOCK_DIAG_BY_FAMILY`), and the request flag (`NLM_F_REQUEST`).
     const BY_FAMILY: u16 = 20;
     const REQUEST: u16 = 1;
-    /// The offsets of `idiag_rqueue` and `idiag_wqueue` in `inet_diag_msg`.
+    /// The offsets of `idiag_rqueue`, `idiag_wqueue` and `idiag_inode` in `inet_diag_msg`.
     const RECEIVED: usize = HEAD + 56;
     const SENT: usize = HEAD + 60;
+    const INODE: usize = HEAD + 68;
 
     thread_local! {
         static DIAGNOSTICS: Option<OwnedFd> = {
@@ -206,15 +213,20 @@ mod sockets {
 
     /// Bytes in the client's receive queue. If there are some, plus those in our send queue.
     pub(super) fn unread(ends: Ends) -> Option<usize> {
-        let received = queue(ends.peer, ends.local, RECEIVED)?;
+        let received = value(ends.peer, ends.local, RECEIVED)?;
         if received == 0 {
             return Some(0);
         }
-        Some(received + queue(ends.local, ends.peer, SENT)?)
+        Some((received + value(ends.local, ends.peer, SENT)?) as usize)
     }
 
-    /// Bytes in a queue of the socket at `of`, which is connected to `to`.
-    fn queue(of: SocketAddr, to: SocketAddr, place: usize) -> Option<usize> {
+    /// Whether the client's socket belongs to no program any more.
+    pub(super) fn has_closed(ends: Ends) -> bool {
+        value(ends.peer, ends.local, INODE) == Some(0)
+    }
+
+    /// A number in the description of the socket at `of`, which is connected to `to`.
+    fn value(of: SocketAddr, to: SocketAddr, place: usize) -> Option<u32> {
         DIAGNOSTICS.with(|socket| {
             let socket = socket.as_ref()?;
             send(socket, &request(of, to), SendFlags::empty()).ok()?;
@@ -226,7 +238,7 @@ mod sockets {
                 .filter(|_| length >= place + 4)?;
             // Any other kind is an error: there is no such socket on this machine.
             (kind == BY_FAMILY.to_ne_bytes())
-                .then(|| u32::from_ne_bytes(bytes.try_into().unwrap_or_default()) as usize)
+                .then(|| u32::from_ne_bytes(bytes.try_into().unwrap_or_default()))
         })
     }
 
@@ -261,7 +273,7 @@ mod sockets {
     #[cfg(test)]
     mod tests {
         use std::io::{Read, Write};
-        use std::net::{TcpListener, TcpStream};
+        use std::net::{Shutdown, TcpListener, TcpStream};
 
         use super::*;
 
@@ -301,6 +313,20 @@ mod sockets {
                 assert_eq!(unread(ends), None);
             }
         }
+
+        #[test]
+        fn a_client_that_has_closed_its_socket_differs_from_one_that_has_stopped_sending() {
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let (ours, peer) = listener.accept().unwrap();
+            let local = ours.local_addr().unwrap();
+            let ends = Ends { local, peer };
+            assert!(!has_closed(ends));
+            client.shutdown(Shutdown::Write).unwrap();
+            assert!(!has_closed(ends));
+            drop(client);
+            assert!(has_closed(ends));
+        }
     }
 }
 
@@ -310,5 +336,9 @@ mod sockets {
 
     pub(super) fn unread(_: Ends) -> Option<usize> {
         None
+    }
+
+    pub(super) fn has_closed(_: Ends) -> bool {
+        false
     }
 }

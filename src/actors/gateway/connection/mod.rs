@@ -53,7 +53,8 @@ use crate::protocol::catalog::Service;
 /// The actor of one client.
 pub struct Connection<S> {
     /// The stream and the conditions of admission, until the session takes them.
-    newcomer: Option<(S, Arc<Admission>, Ends)>,
+    newcomer: Option<(S, Arc<Admission>)>,
+    ends: Ends,
     registry: Addr<Registry>,
     /// The shared memory for long frames.
     memory: Memory,
@@ -106,7 +107,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
         Self {
-            newcomer: Some((stream, admission, ends)),
+            newcomer: Some((stream, admission)),
+            ends,
             registry,
             memory: gauges.memory().clone(),
             transport: None,
@@ -131,7 +133,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
 
     /// Runs the session, which serves or refuses the client.
     fn started(&mut self, ctx: &mut Context<Self>) {
-        let Some((stream, admission, ends)) = self.newcomer.take() else {
+        let Some((stream, admission)) = self.newcomer.take() else {
             return;
         };
         let outlets = Outlets {
@@ -146,7 +148,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             memory: self.memory.clone(),
             finish: Arc::clone(&self.finish),
             admission,
-            ends,
+            ends: self.ends,
         };
         let opened = contained(session.run(stream, outlets)).into_actor(self);
         ctx.spawn(opened.map(|opened, connection, ctx| match opened {

@@ -16,15 +16,18 @@ use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
-use super::Connection;
+use super::flow::has_closed;
 use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;
 use super::turns::yield_turn;
 use super::writer::ClientWriter;
+use super::{Connection, Ends};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME};
+use crate::actors::gateway::limits::{
+    CLOSED_CHECK, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME,
+};
 use crate::actors::gateway::messages::{Disconnect, Request, Respond, Retire, form_of};
 use crate::actors::gateway::registry::Registry;
 use crate::actors::panics::contain;
@@ -66,6 +69,8 @@ struct ClientReader {
     frame_due: Option<Instant>,
     /// Start of the wait for a client that has ended its stream and does not read.
     waits_since: Option<Instant>,
+    /// The next check whether a client that has stopped sending has closed its socket.
+    closed_check: Option<Instant>,
     /// The stream has ended. Earlier bytes may still wait.
     has_ended: bool,
     /// The last op is being performed.
@@ -122,6 +127,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             room: None,
             frame_due: None,
             waits_since: None,
+            closed_check: None,
             has_ended: false,
             is_last: false,
             timer: Timer::default(),
@@ -179,7 +185,8 @@ impl ClientReader {
                         *answered = None;
                     }
                     if answered.is_some() || connection.is_computing() {
-                        ready!(self.timer.poll(Some(*due), cx));
+                        let due = *due;
+                        ready!(self.poll_gone(connection.ends, due, cx));
                         connection.abandon_computations();
                     }
                     self.step = self.leave(connection);
@@ -424,6 +431,19 @@ impl ClientReader {
         }
     }
 
+    /// Waits until a client that has stopped sending has closed its socket, or until `due`.
+    fn poll_gone(&mut self, ends: Ends, due: Instant, cx: &mut task::Context<'_>) -> Poll<()> {
+        loop {
+            let check = *self.closed_check.get_or_insert_with(Instant::now);
+            ready!(self.timer.poll(Some(check.min(due)), cx));
+            let now = Instant::now();
+            if now >= due || has_closed(ends) {
+                return Poll::Ready(());
+            }
+            self.closed_check = Some(now + CLOSED_CHECK);
+        }
+    }
+
     /// Waits until something was written or computed. Meanwhile reads up to [`CHUNK`] bytes or [`FRAMES_IN_A_ROW`]
     /// messages, to detect the end of the stream. Returns an error if the client has disconnected. A client that has
     /// ended its stream counts as disconnected if nothing was written or computed for [`RESPONSES_TIME`].
@@ -438,7 +458,7 @@ impl ClientReader {
         if self.has_ended {
             let since = *self.waits_since.get_or_insert_with(Instant::now);
             let due = since.max(connection.room_since) + RESPONSES_TIME;
-            ready!(self.timer.poll(Some(due), cx));
+            ready!(self.poll_gone(connection.ends, due, cx));
             return Poll::Ready(Err(ClientLost::Gone));
         }
         let messages = self.messages.iter().map(|(message, _)| message.len());
