@@ -13,7 +13,7 @@ use std::task::{Context, Waker};
 use tokio::task::yield_now;
 
 /// Waiting connections that are woken in one pass of the run queue.
-const TURNS_PER_PASS: usize = 8;
+const TURNS_PER_PASS: usize = 32;
 
 thread_local! {
     /// The connections of this thread's run queue that wait for their next turns.
