@@ -19,7 +19,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, ClientLost};
+use super::plain::{self, CHUNK, ClientLost};
 use super::turns::yield_turn;
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
@@ -27,8 +27,6 @@ use crate::protocol::limits::{MAX_FRAME, MEDIUM};
 
 /// Input buffer of a WebSocket. It lives as long as the connection, so it is small.
 const READ_BUFFER: usize = 8 * 1024;
-/// Bytes read before other connections have a turn. They may be ten thousand empty frames without a message.
-const TURN: usize = 32 * 1024;
 /// Bytes of a control frame's header: two, and four of the mask.
 const CONTROL_HEAD: usize = 6;
 /// Bytes of payload in one WebSocket frame and in one write. A longer message is sent in fragments, so that the
@@ -91,7 +89,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
     }
 
     fn poll_message(&mut self, cx: &mut Context<'_>) -> Poll<Result<Bytes, ClientLost>> {
-        self.stream().left = TURN;
+        self.stream().left = CHUNK;
         for _ in 0..FRAMES_IN_A_ROW {
             let message = self.socket.poll_next_unpin(cx);
             self.spent = None;
@@ -135,7 +133,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         cx: &mut Context<'_>,
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
-        self.stream().left = TURN;
+        self.stream().left = CHUNK;
         plain::poll_read(self.stream(), cx, chunk)
     }
 
@@ -276,7 +274,8 @@ struct MonitoredStream<S> {
     taken: Instant,
     /// Bytes of the incoming message: those read since the last complete message, without control frames.
     coming: usize,
-    /// Bytes that may be read before other connections have a turn.
+    /// Bytes that may be read before other connections have a turn. They may be ten thousand empty frames without a
+    /// message.
     left: usize,
     memory: Memory,
     /// The memory permit of the incoming message, if it is long.
@@ -291,7 +290,7 @@ impl<S> MonitoredStream<S> {
             stream,
             taken: Instant::now(),
             coming: 0,
-            left: TURN,
+            left: CHUNK,
             memory,
             permit: None,
             waiting: None,

@@ -150,7 +150,7 @@ impl Registry {
         subscribers.filter(move |one| *one.spelling == *spelling)
     }
 
-    /// Delivers the messages of a form. Those that could not be made count as dropped.
+    /// Delivers the messages of a form. Messages that could not be made count as dropped.
     fn deliver_form(&self, subscriber: &Subscriber, made: &Made, done: Option<&Done>) {
         self.gauges.add_dropped(made.lost);
         for frame in &made.messages {
