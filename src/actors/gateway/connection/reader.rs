@@ -17,11 +17,10 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::flow::has_closed;
-use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME};
 use super::session::Opened;
 use super::timer::Timer;
-use super::transport::ReceivedData;
-use super::turns::yield_turn;
+use super::transport::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, ReceivedData};
+use super::turns::Turns;
 use super::writer::ClientWriter;
 use super::{Connection, Ends};
 use crate::actors::ConnectionId;
@@ -75,6 +74,7 @@ struct ClientReader {
     has_ended: bool,
     /// The last op is being performed.
     is_last: bool,
+    turns: Turns,
     timer: Timer,
 }
 
@@ -130,6 +130,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             closed_check: None,
             has_ended: false,
             is_last: false,
+            turns: Turns::default(),
             timer: Timer::default(),
         });
         ctx.spawn(ClientWriter::default());
@@ -207,7 +208,7 @@ impl ClientReader {
                     match transport.poll_swallow(cx, &mut self.chunk) {
                         Poll::Ready(Ok(bytes)) if bytes > 0 && *left > bytes => {
                             *left -= bytes;
-                            yield_turn(cx);
+                            self.turns.end(cx);
                             return self.timer.poll(Some(*due), cx);
                         }
                         Poll::Ready(_) => return Poll::Ready(()),
@@ -261,7 +262,7 @@ impl ClientReader {
                 ops += 1;
                 if ops == FRAMES_IN_A_ROW {
                     // Other connections have a turn.
-                    yield_turn(cx);
+                    self.turns.end(cx);
                     return Poll::Pending;
                 }
             }
@@ -287,7 +288,7 @@ impl ClientReader {
             }
             if bytes >= CHUNK / 2 {
                 // All chunks of a long frame may be available at once.
-                yield_turn(cx);
+                self.turns.end(cx);
                 return Poll::Pending;
             }
             if !self.chunk.is_empty() {
@@ -394,7 +395,7 @@ impl ClientReader {
         };
         self.is_last = true;
         self.performing = Some(Box::pin(performer.take_end(error)));
-        yield_turn(cx);
+        self.turns.end(cx);
         Poll::Pending
     }
 
@@ -411,6 +412,7 @@ impl ClientReader {
         if let Poll::Ready(read) = transport.poll_read(cx, &mut self.chunk) {
             return Poll::Ready(read.map(Some));
         }
+        self.turns.rest();
         let is_unfinished = self.frames.is_unfinished() || transport.is_unfinished();
         let begin = || Instant::now() + FRAME_TIME;
         let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));

@@ -19,8 +19,8 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, CHUNK, ClientLost};
-use super::turns::yield_turn;
+use super::transport::{self, CHUNK, ClientLost};
+use super::turns::Turns;
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM};
@@ -113,7 +113,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             return Poll::Ready(Ok(message));
         }
         // Other connections have a turn.
-        yield_turn(cx);
+        self.stream().turns.end(cx);
         Poll::Pending
     }
 
@@ -134,7 +134,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         self.stream().left = CHUNK;
-        plain::poll_read(self.stream(), cx, chunk)
+        transport::poll_read_stream(self.stream(), cx, chunk)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
@@ -277,6 +277,7 @@ struct MonitoredStream<S> {
     /// Bytes that may be read before other connections have a turn. They may be ten thousand empty frames without a
     /// message.
     left: usize,
+    turns: Turns,
     memory: Memory,
     /// The memory permit of the incoming message, if it is long.
     permit: Option<Permit>,
@@ -291,6 +292,7 @@ impl<S> MonitoredStream<S> {
             taken: Instant::now(),
             coming: 0,
             left: CHUNK,
+            turns: Turns::default(),
             memory,
             permit: None,
             waiting: None,
@@ -338,12 +340,15 @@ impl<S: AsyncRead + Unpin> AsyncRead for MonitoredStream<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         if self.left == 0 {
-            yield_turn(cx);
+            self.turns.end(cx);
             return Poll::Pending;
         }
         ready!(self.poll_room(cx));
         let before = buffer.filled().len();
         let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        if polled.is_pending() {
+            self.turns.rest();
+        }
         let received = buffer.filled().len() - before;
         self.left = self.left.saturating_sub(received);
         self.coming += received;

@@ -96,25 +96,28 @@ impl Registry {
         encode: impl Fn(&str) -> Bytes,
         ctx: &mut Context<Self>,
     ) {
-        for spelling in names::spellings(topic) {
-            let mut subscribers = self.subscribers_as(topic, spelling).peekable();
-            if subscribers.peek().is_none() {
-                continue;
-            }
-            let plain = cover_message(self.permit.as_ref(), encode(spelling));
-            let mut encodings: Vec<Encoding> = Vec::new();
-            for subscriber in subscribers {
-                let encoding = subscriber.encoding;
-                if is_sent_plain(encoding, plain.len()) {
-                    deliver(subscriber, plain.clone(), done);
-                } else if !encodings.contains(&encoding) {
-                    encodings.push(encoding);
+        let mut plain: Vec<(&str, Bytes)> = Vec::new();
+        let mut others: Vec<(&str, Bytes, Encoding)> = Vec::new();
+        for subscriber in self.topics.subscribers(topic) {
+            let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
+            let known = plain.iter().find(|(known, _)| *known == spelling);
+            let frame = match known {
+                Some((_, frame)) => frame.clone(),
+                None => {
+                    let frame = cover_message(self.permit.as_ref(), encode(spelling));
+                    plain.push((spelling, frame.clone()));
+                    frame
                 }
+            };
+            let is_asked = |one: &(&str, Bytes, Encoding)| one.0 == spelling && one.2 == encoding;
+            if is_sent_plain(encoding, frame.len()) {
+                deliver(subscriber, frame, done);
+            } else if !others.iter().any(is_asked) {
+                others.push((spelling, frame, encoding));
             }
-            for encoding in encodings {
-                let message = self.to_encode(spelling, plain.clone(), encoding);
-                self.deliver_encoded(message, done, ctx);
-            }
+        }
+        for (spelling, frame, encoding) in others {
+            self.deliver_encoded(self.to_encode(spelling, frame, encoding), done, ctx);
         }
     }
 
