@@ -10,10 +10,10 @@
 //! `benches/peers/run.sh` calls them in this order. The peers' own programs are `benches/peers/*.cpp` and `*.c`; their
 //! `harness.h` has the same constants as this file. A result that strays from another's ends the run before any ratio.
 //!
-//! *Throughput*, *independent*: independent states; *chained*, and steps that do not say: every result moves the next state. A *step* is
-//! `increment` and two sums, under an effort held over the step; a *live step* is the arm's own, with compensated sums, clock and check
-//! for divergence, PID off. *Lanes* are many such live arms side by side, a lane of a register for each, over ADVANCE steps a call, or
-//! for forward dynamics all states, in columns.
+//! *Throughput* and *independent*: the states are independent. *Chained*, and steps without such a word: every result
+//! moves the next state. A *step* is `increment` and two sums, under an effort held over the step. A *live step* is the
+//! arm's own, with compensated sums, clock and check for divergence, PID off. *Lanes* are many such live arms side by
+//! side, a lane of a register for each, over ADVANCE steps a call. For forward dynamics they are all states, in columns.
 
 mod compare;
 
