@@ -15,7 +15,7 @@ use crate::hostile::Hostile;
 use crate::model::Model;
 use crate::pipe::Fate;
 use crate::plan::{Burst, Feature, Plan};
-use crate::workload::{Numbers, Workload};
+use crate::workload::{UniqueNumbers, Workload};
 use crate::world::{World, in_virtual_time};
 
 /// Bytes in a pipe, and in a write, without which what a flood brings would be on its way for too long.
@@ -62,7 +62,7 @@ struct Course {
     plan: Plan,
     world: World,
     model: Model,
-    numbers: Numbers,
+    numbers: UniqueNumbers,
     honest: Vec<Honest>,
     hostile: Vec<Hostile>,
     /// Honest clients so far.
@@ -81,7 +81,7 @@ impl Course {
             plan,
             world,
             model,
-            numbers: Numbers::default(),
+            numbers: UniqueNumbers::default(),
             honest: Vec::new(),
             hostile: Vec::new(),
             clients: 0,

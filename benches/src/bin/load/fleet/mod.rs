@@ -27,7 +27,7 @@ const WINDOW: u64 = 256;
 
 /// The publisher, and its rate.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Pace {
+pub enum Traffic {
     /// This many times a second.
     Rate(f64),
     /// As fast as the slowest subscriber takes them.
@@ -42,7 +42,7 @@ pub struct Scene {
     pub name: &'static str,
     pub topics: usize,
     pub subscribers: usize,
-    pub pace: Pace,
+    pub traffic: Traffic,
 }
 
 /// The outcome of a scene.
@@ -95,12 +95,12 @@ impl Fleet {
     /// Connects and subscribes everybody; returns when every subscription holds.
     pub fn open(protocol: Protocol, address: SocketAddr, scene: Scene) -> Self {
         let names = (0..scene.topics)
-            .map(|topic| match scene.pace {
-                Pace::Arm => "/joint_states".to_owned(),
+            .map(|topic| match scene.traffic {
+                Traffic::Arm => "/joint_states".to_owned(),
                 _ => format!("/load/topic{topic}"),
             })
             .collect();
-        let publishers = if scene.pace == Pace::Arm {
+        let publishers = if scene.traffic == Traffic::Arm {
             0
         } else {
             scene.topics
@@ -221,15 +221,15 @@ impl Fleet {
 
     /// Sends what is due; gives the time until more may be.
     fn publish(&mut self, now: Instant, next: &mut Instant) -> Duration {
-        match self.scene.pace {
-            Pace::Arm => Duration::from_millis(20),
-            Pace::Flood => {
+        match self.scene.traffic {
+            Traffic::Arm => Duration::from_millis(20),
+            Traffic::Flood => {
                 for topic in 0..self.scene.topics {
                     self.flood(topic);
                 }
                 Duration::from_millis(20)
             }
-            Pace::Rate(rate) => {
+            Traffic::Rate(rate) => {
                 if now >= *next {
                     let period = Duration::from_secs_f64(1.0 / rate);
                     // A tick that was missed is skipped.
@@ -270,7 +270,7 @@ impl Fleet {
     /// Waits until every subscriber has all that was sent to it, and checks that it is so.
     fn drain(&mut self) {
         let deadline = Instant::now() + PATIENCE;
-        if self.scene.pace == Pace::Arm {
+        if self.scene.traffic == Traffic::Arm {
             // A subscriber may be a message ahead of another: all have to reach the newest of now.
             let newest = self
                 .links
