@@ -1,6 +1,6 @@
 //! The figures in words: a table for each scene, and the bars at the end.
 //!
-//! **Invariant:** what is compared is the median of the rounds, and the peer that it is compared with is the better one.
+//! **Invariant:** medians of the rounds are compared, with the better peer.
 
 use crate::Played;
 use crate::fleet::{Scene, Traffic};
