@@ -51,7 +51,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
 ];
 
-/// A provider that answers nothing, and callers who are patient for so many seconds; one comes each millisecond.
+/// A provider that answers nothing, and callers with timeouts of `patience` seconds. One connects each millisecond.
 fn waiting(provider: Client, patience: impl Fn(usize) -> f64) -> Vec<Client> {
     let provider = provider.says(&on_service("advertise_service", "/crowd"));
     let callers = each(0..CROWD, |n| {

@@ -18,7 +18,7 @@ use fleet::{Fleet, Outcome, Scene, Traffic};
 use pendularm_benches::program::{Program, processor};
 use pendularm_benches::protocol::Protocol;
 
-/// How often the arm publishes, and so everybody here that does not flood.
+/// The rate of the arm's topics, and of all publishers that do not flood.
 const RATE: Traffic = Traffic::Rate(60.0);
 
 /// The scenes that are played. The last of the fan-outs is that of the arm's own topic.

@@ -1,6 +1,6 @@
-//! A server under load as somebody else sees it: the time of a light request, and whether the arm keeps its time.
+//! A server under load, seen by another client: the time of a light request, and whether the arm keeps real time.
 //!
-//! **Invariant:** each probe has a connection and a thread of its own, and asks little.
+//! **Invariant:** each probe has its own connection and thread, and sends few requests.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -17,7 +17,7 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// A request, or the next message of the arm, that takes longer fails the run.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A thread that probes until it is told to stop.
+/// A thread that probes until `stop` is set.
 pub struct Probe<T> {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<T>,

@@ -92,7 +92,7 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
 
 pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     println!("\n=== summary");
-    // The arm's own topic has no peers: it stands beside the same fan-out between clients.
+    // The arm's own topic has no peers. It is compared with the same fan-out between clients.
     let peers_of = |scene: &Scene| {
         let name = if scene.traffic == Traffic::Arm {
             "60 Hz to 1000"

@@ -102,7 +102,7 @@ fn start<const N: usize>() -> State<N> {
     }
 }
 
-/// A step of an arm that is known to have weight, as the peers' is: nobody asks at each step what may be left out of it.
+/// A step of an arm with gravity, as in the peers. It omits the check for work that can be left out.
 #[inline(always)]
 fn step<const N: usize>(
     arm: &Arm<N>,

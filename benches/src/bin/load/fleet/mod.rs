@@ -15,7 +15,7 @@ use crate::message::Template;
 use pendularm_benches::program::{processor, resident};
 use pendularm_benches::protocol::Protocol;
 
-/// How long a server may take for what is asked of it before the run fails.
+/// Longest wait for a server. After that the run fails.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Before it is measured, a scene runs for so long.
 const WARM_UP: Duration = Duration::from_millis(500);
@@ -36,7 +36,7 @@ pub enum Traffic {
     Arm,
 }
 
-/// Topics, each with one publisher and so many subscribers.
+/// Topics, each with one publisher and `subscribers` subscribers.
 #[derive(Clone, Copy)]
 pub struct Scene {
     pub name: &'static str,
@@ -92,7 +92,7 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Connects and subscribes everybody; returns when every subscription holds.
+    /// Connects and subscribes all clients. Returns when every subscription is active.
     pub fn open(protocol: Protocol, address: SocketAddr, scene: Scene) -> Self {
         let names = (0..scene.topics)
             .map(|topic| match scene.traffic {
@@ -219,7 +219,7 @@ impl Fleet {
         }
     }
 
-    /// Sends what is due; gives the time until more may be.
+    /// Sends all due messages. Returns the time until the next ones may be due.
     fn publish(&mut self, now: Instant, next: &mut Instant) -> Duration {
         match self.scene.traffic {
             Traffic::Arm => Duration::from_millis(20),
