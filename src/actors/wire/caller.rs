@@ -148,7 +148,7 @@ impl Caller {
         Ok(())
     }
 
-    /// Sends the caller a status before the answer: the reason why its request has no effect yet.
+    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
     fn warn(&self, why: &str) {
         let status = Respond::status(self.connection, Level::Warning, why, self.id());
         self.registry.do_send(status);
