@@ -236,8 +236,8 @@ fn the_arm_itself_has_the_limits_that_are_predicted() {
     assert!(bent.max(straight) < 1e-3);
 }
 
-/// Sampled control on a single inertia, two periods by hand. The integral adds the error before it is used, as in the
-/// live arm. Under a constant effort Runge-Kutta 4 is the exact plant.
+/// Sampled control on a single inertia, in the shipped order (the integral takes up the error before it is used), with the
+/// exact plant that Runge-Kutta 4 is under a constant effort: two periods by hand.
 #[test]
 fn the_held_law_is_stepped_in_the_shipped_order() {
     let (kp, ki, kd, h) = (30.0, 40.0, 7.0, 0.05);

@@ -15,7 +15,7 @@ use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
 use pendularm::report::experiments::step_scene::{ready, undamped};
 
-// A separate function, so that the counts of the arm's code have its name even if code is inlined into it.
+// A function of its own, so that the counts of the arm's code are found by its name however much is inlined into it.
 #[inline(never)]
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
