@@ -43,7 +43,7 @@ function controlled(links, period, changed = {}) {
 export const STEPS = [
   {
     id: "hold", title: "A controller holds the arm",
-    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, and the controller takes it there.",
+    text: "A thousand times a second the controller measures the joints and sets new torques. Drag the end of the arm, the end effector, and the controller takes it there.",
     scene: (links) => controlled(links, 0.001),
     chart: "velocity", dial: null,
     task: { text: "Drag the end effector to a new place, and wait until it arrives.", done: ({ reached }) => reached },
@@ -69,7 +69,7 @@ export const STEPS = [
   },
   {
     id: "look", title: "Look closely",
-    text: "Each bar is the computed speed of the last joint at one measurement, after a tiny push without gravity. The arm on the left starts beside its setpoint, in slow motion: two measurements a second.",
+    text: "Each bar is the computed speed of the last joint at one measurement, after a tiny push without gravity. The arm on the left starts beside the pose that the controller holds, in slow motion: two measurements a second.",
     scene: (links) => controlled(links, BEYOND[links]),
     offset: [0, 0.02, 0], paused: true,
     chart: "bars", dial: "period",
@@ -86,7 +86,7 @@ export const STEPS = [
     chart: "velocity", dial: "period", methods: true,
     task: { text: "Try all four methods at this period.", done: ({ methods }) => methods.size === ALL },
     question: {
-      text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The gains are too low"], right: 0,
+      text: "Why does a better method not help?", answers: ["The controller still measures as rarely", "Euler is exact enough", "The controller is too weak"], right: 0,
       because: "The limit comes from the hold between two measurements. A real robot has the same limit, without any method.",
     },
   },
@@ -103,7 +103,7 @@ export const STEPS = [
   },
   {
     id: "limit", title: "What sets the limit",
-    text: "More damping or less mass makes the arm react faster, so the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M), with the mass matrix M and the smallest eigenvalue λmin.",
+    text: "More damping or less mass makes the arm react faster: the controller must measure more often. The limit is about T = 2 λmin(Kd⁻¹ M). M is the mass matrix, Kd the damping, λmin the smallest eigenvalue.",
     scene: (links) => controlled(links, BEYOND[links]),
     chart: "map", dial: "damping",
     task: { text: "Change the damping until this period is stable.", done: ({ stable }) => stable },
@@ -147,7 +147,7 @@ export const STEPS = [
   },
   {
     id: "own", title: "Your own arm",
-    text: "Fill in your arm and your gains. The sheet shows the largest period and timestep that they allow, the reason, and the benefit of a better method.",
+    text: "Fill in your arm and the gains of its controller. The sheet shows the largest period and timestep that they allow, the reason, and the benefit of a better method.",
     scene: (links) => controlled(links, 0.001),
     chart: "form", dial: null,
     task: { text: "Make the sheet of your arm.", done: ({ sheet }) => sheet },

@@ -229,8 +229,9 @@ function gallery(links) {
 
 /**
  * The sentence under a scene's picture, and the action of a click on it; null if a click does nothing. A
- * scene with another number of links needs that arm: the file loads it, and a server must be started with
- * it. @param {import("./scenes.js").Scene} scene @param {number} links of the present arm
+ * scene with another number of links needs that arm: the file loads it, and a server must be started with it.
+ * @param {import("./scenes.js").Scene} scene
+ * @param {number} links of the present arm
  */
 function offer(scene, links) {
   if (scene.links === links) return { text: scene.expected, act: () => runScene(scene) };

@@ -229,7 +229,7 @@ function whyFree({ critical }, method, limit) {
   return `Why: beyond ${duration(limit)} ${methodName(method)} no longer follows the fastest small swing of the free arm. Wide and fast swings have a smaller limit.`;
 }
 
-/** What limits a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
+/** The reason for the limit of a loop with a controller: the motion that grows first beyond the smallest limit of all poses. @param {any} answer @param {number} limit */
 export function cause({ critical, minimum_over_poses_held: least, equilibrium_kind, timestep_limit_continuous }, limit) {
   if (limit === 0) {
     return equilibrium_kind === "unstable" || timestep_limit_continuous === 0

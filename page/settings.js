@@ -7,11 +7,15 @@ import { METHODS, exact } from "./format.js";
 /** @typedef {import("./policy.js").Gains} Gains */
 /** @typedef {import("./policy.js").Arm} Arm */
 /**
- * @typedef {object} Settings @property {{method?: string, timestep?: number} | null} integrator @property {Partial<Arm>
- * | null} params @property {Partial<Gains> | null} gains @property {{period?: number, delay?: boolean} | null} period
- * the control period, 0 for every step [s] @property {boolean | null} controller whether it is on @property {boolean}
- * [servo] the same, in the form of the scenes @property {number[] | null} setpoint @property {{ position?: number[],
- * velocity?: number[] } | null} [start] the start of the arm [rad, rad/s]; only in links
+ * @typedef {object} Settings
+ * @property {{method?: string, timestep?: number} | null} integrator
+ * @property {Partial<Arm> | null} params
+ * @property {Partial<Gains> | null} gains
+ * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
+ * @property {boolean | null} controller whether it is on
+ * @property {boolean} [servo] the same, in the form of the scenes
+ * @property {number[] | null} setpoint
+ * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
  */
 
 /** Changes that can be undone. */

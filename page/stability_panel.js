@@ -1,4 +1,4 @@
-// What limits the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of
+// The limits of the timestep. Each method's button has its limit. The panel Stability has the reason, a map, and a small push of
 // the active loop, step by step. The map shows where the loop is stable, gains over timestep, with the present point as a dot.
 // A click or an arrow key moves the dot, and with it the settings.
 // Invariant: all limits are the study's answers for the active loop, and an outdated one is never shown. The boundary is drawn

@@ -28,8 +28,8 @@ export const state = {
   enabled: null, // whether the controller is on
   diagnostics: null, // { level, message, state, ...numbers }
   diverged: false,
-  // The answers of /study/stability for the active loop: the requested loop (see `policy.js`), the values for each
-  // method, and the first limit and speed of the motion since the last reset [s, rad/s].
+  // The answers of /study/stability for the active loop. They have the requested loop (see `policy.js`), the values for
+  // each method, and the first limit and speed of the motion since the last reset [s, rad/s].
   limits: nothingAsked(),
   pushed: false, // whether an effort has acted with the controller off since the energy's reference
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }

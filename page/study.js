@@ -35,10 +35,12 @@ export async function climb(length, isWanted, tell) {
 }
 
 /**
- * Asks the study about `count` multiples of the gains, the lowest first, and reports each answer on arrival. @param
- * {import("./scale.js").LogScale} scale of the multiples @param {number} count @param {(factor: number) => any} ask the
- * loop at a multiple @param {() => boolean} isWanted whether to go on @param {(factor: number, values: any) => void}
- * tell
+ * Asks the study about `count` multiples of the gains, the lowest first, and reports each answer on arrival.
+ * @param {import("./scale.js").LogScale} scale of the multiples
+ * @param {number} count
+ * @param {(factor: number) => any} ask the loop at a multiple
+ * @param {() => boolean} isWanted whether to go on
+ * @param {(factor: number, values: any) => void} tell
  */
 export async function climbRows(scale, count, ask, isWanted, tell) {
   for (let row = 0; row < count && isWanted(); row += 1) {
@@ -50,8 +52,10 @@ export async function climbRows(scale, count, ask, isWanted, tell) {
 
 /**
  * A tiny push of the last joint at rest: its speed [rad/s] at each of the next samples, `every` [s] apart. It is the
- * difference of two runs, with and without the push; null if they are refused. @param {any} loop with method and
- * timestep @param {number[]} rest pose [rad] @param {number} every
+ * difference of two runs, with and without the push, and null if they are refused.
+ * @param {any} loop with method and timestep
+ * @param {number[]} rest pose [rad]
+ * @param {number} every
  */
 export async function deviation(loop, rest, every) {
   const common = { ...loop, q0: rest, duration: LOOKS * every, samples: LOOKS + 1 };

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes single small changes to the code of a layer (cargo-mutants), and counts the changes that a test notices. usage:
-# scripts/mutants.sh [math|protocol|actors] [--check] [options of cargo mutants, such as --shard 0/20 or --file
+# Makes single small changes to the code of a layer (cargo-mutants), and counts the changes that a test notices.
+# Usage: scripts/mutants.sh [math|protocol|actors] [--check] [options of cargo mutants, such as --shard 0/20 or --file
 # src/math/pid.rs]
 #
 # `actors` is src/actors with src/live, src/services and src/web. Its tests take minutes for each mutant, so select a

@@ -25,6 +25,7 @@ if [ "$("$tools/maturin" --version 2>/dev/null)" != "maturin $maturin" ]; then
     say "installing maturin $maturin into python/.venv"
     "$tools/python" -m pip install --quiet --disable-pip-version-check "maturin==$maturin"
 fi
+# An empty list is expanded with `+`, because the bash of macOS (3.2) calls it unset.
 linker=()
 if [ -n "$portable" ]; then
     [ "$(uname -s)" = Linux ] || fail "PORTABLE=1 is for Linux: elsewhere the wheel is as portable without it"
@@ -52,6 +53,6 @@ if [ "$(uname -s)" = Linux ]; then
     [ -z "$portable" ] || [ "$glibc" = "$oldest" ] || fail "the program needs glibc $glibc"
     compatibility=(--compatibility "manylinux_${glibc//./_}")
 fi
-"$tools/maturin" build --quiet --release --locked --out target/wheels "${compatibility[@]}" "${linker[@]}" ${WHEEL_ARGS:-}
+"$tools/maturin" build --quiet --release --locked --out target/wheels ${compatibility[@]+"${compatibility[@]}"} ${linker[@]+"${linker[@]}"} ${WHEEL_ARGS:-}
 wheel=$(echo target/wheels/*.whl)
 say "${wheel#"$root"/}: $(wc -c <"$wheel") bytes"

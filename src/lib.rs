@@ -1,7 +1,7 @@
 //! pendularm: a real-time planar robot arm that any rosbridge client can drive.
 //!
-//! The layers import in one direction: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure:
-//! bytes and JSON), `services` and `live` (pure: both together), and `actors` (one actor per node). `math` and
+//! The layers import in one direction. [`math`] is pure: the arm, the integrators, the control law. `protocol` is pure:
+//! bytes and JSON. `services` and `live` use both, and are pure too. `actors` has one actor per node. `math` and
 //! `protocol` do not import each other.
 //!
 //! In addition there are [`study`] (pure: `math` compared with theory), `report` (clock, files and drawings of the

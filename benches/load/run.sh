@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
 #
-# All three run on free ports of loopback; each is stopped by its process id, pendularm by the client that starts it.
-# redis-server and mosquitto come from Debian's packages: as root they are installed if missing. Takes some minutes.
+# All three run on free ports of loopback. Each is stopped by its process id, pendularm by the client that starts it.
+# redis-server and mosquitto come from Debian's packages. As root they are installed if missing. Takes some minutes.
 # ARGS=--quick plays each scene for a moment, without bars; KEEP=1 keeps the figures in
 # benches/results/<date>-<processor>/load/.
 set -euo pipefail

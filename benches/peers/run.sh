@@ -2,9 +2,11 @@
 # `make bench-peers`: the same 2- and 3-link rod arm in pendularm, Pinocchio, the C that Pinocchio generates for it (with CppADCodeGen), and
 # MuJoCo, checked, then timed, in one run.
 #
-# Installs the peers' headers and libraries from PyPI into benches/peers/.venv (nothing outside it is touched), compiles the programs
-# of this folder against them, compares all results, and only then times: every program in turn, PASSES times, on one
-# core. ARGS=--quick makes one pass without the programs that compile Pinocchio themselves, which takes ten minutes. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++ (or CC, CXX).
+# Installs the peers' headers and libraries from PyPI into benches/peers/.venv, and changes nothing outside it. Compiles
+# the programs of this folder against them, and compares all results. Then every program is timed in turn, PASSES
+# times, on one core. ARGS=--quick makes one pass without the programs that compile Pinocchio themselves, which takes
+# ten minutes. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++
+# (or CC, CXX).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
@@ -55,8 +57,8 @@ if [ -z "$quick" ]; then
     systems+=("pinocchio native" "generated plain" "generated native" "generated fast")
     libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
     program pinocchio-native pinocchio.cpp "${pinocchio[@]}" -march=native
-    # The C that Pinocchio generates, for each number of links: compiled as ours is, for any x86-64; for this machine; and with the flags
-    # that Pinocchio gives its own, which let the compiler reorder sums and take sines side by side.
+    # The C that Pinocchio generates, for each number of links. It is compiled for any x86-64 like our program, for this
+    # machine, and with Pinocchio's own flags. These let the compiler reorder sums and vectorise sines.
     program generate generate.cpp "${pinocchio[@]}" -O0
     for links in 2 3; do
         forward=$target/peers/forward-$links.h

@@ -188,7 +188,7 @@ fn watch(mut client: Client, stop: &AtomicBool) -> Health {
     health
 }
 
-/// Newcomers, until it is told to stop.
+/// New clients, one after the other, until `stop` is set.
 fn come_and_go(target: Target, stop: &AtomicBool) -> Health {
     let mut health = Health::default();
     while !stop.load(Ordering::Relaxed) {
@@ -207,7 +207,7 @@ fn come_and_go(target: Target, stop: &AtomicBool) -> Health {
     health
 }
 
-/// A call of a service of its own, a message to itself, a small computation, the page.
+/// Calls a service that the client provides itself, sends itself a message, and asks for a small computation and the page.
 fn visit(target: Target, number: usize) -> Result<(), String> {
     let mut client = target.connect()?;
     let client = &mut client;

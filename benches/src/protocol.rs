@@ -69,7 +69,7 @@ impl Protocol {
         }
     }
 
-    /// Writes the first words of a publisher. Redis is told to answer no `PUBLISH`: nobody else's are answered either.
+    /// Writes the opening of a publisher. Redis gets the request to answer no `PUBLISH`, because the other servers do not.
     pub fn advertise(self, topic: &str, out: &mut Vec<u8>) {
         match self {
             Self::Pendularm => line(

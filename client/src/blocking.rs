@@ -313,7 +313,7 @@ impl Client {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
-    /// True if the stream ends (or breaks) in time, whatever comes before.
+    /// True if the stream ends (or breaks) in time. Earlier data is ignored.
     #[track_caller]
     pub fn is_closed(&mut self) -> bool {
         self.set_patience(self.patience);

@@ -22,7 +22,7 @@ pub struct Client<S> {
     chunk: Vec<u8>,
     calls: u64,
     /// Every received frame, the oldest first, if the client stores them.
-    pub heard: Vec<Value>,
+    pub received: Vec<Value>,
     remembers: bool,
 }
 
@@ -59,12 +59,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
             patience,
             chunk: vec![0; 8192],
             calls: 0,
-            heard: Vec::new(),
+            received: Vec::new(),
             remembers: false,
         }
     }
 
-    /// The same, storing every frame in [`Client::heard`].
+    /// The same, storing every frame in [`Client::received`].
     #[must_use]
     pub fn remembering(self) -> Self {
         Self {
@@ -158,7 +158,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
             let frame: Value = serde_json::from_str(&text)
                 .map_err(|error| Error::Malformed(format!("{error} in {text:?}")))?;
             if self.remembers {
-                self.heard.push(frame.clone());
+                self.received.push(frame.clone());
             }
             return Ok(frame);
         }

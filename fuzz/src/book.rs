@@ -79,10 +79,10 @@ impl Book {
     }
 }
 
-fn check(sent: &Json, heard: Option<&Json>, what: &str, which: &dyn std::fmt::Debug) {
-    let same_number = |sent: &Json, heard: &Json| sent.number() == heard.number();
-    let is_same = heard.is_some_and(|heard| sent.becomes(heard, same_number));
-    assert!(is_same, "{what} {which:?}: {sent:?} became {heard:?}");
+fn check(sent: &Json, received: Option<&Json>, what: &str, which: &dyn std::fmt::Debug) {
+    let same_number = |sent: &Json, received: &Json| sent.number() == received.number();
+    let is_same = received.is_some_and(|received| sent.becomes(received, same_number));
+    assert!(is_same, "{what} {which:?}: {sent:?} became {received:?}");
 }
 
 /// A name with its slash.

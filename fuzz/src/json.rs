@@ -90,23 +90,23 @@ impl Json {
     /// Whether this is the forwarded form of `sent`: a number that overflows is `null`, and any other number satisfies
     /// `same_number`.
     #[must_use]
-    pub fn becomes(&self, heard: &Self, same_number: fn(&Self, &Self) -> bool) -> bool {
-        match (self, heard) {
+    pub fn becomes(&self, received: &Self, same_number: fn(&Self, &Self) -> bool) -> bool {
+        match (self, received) {
             (Self::Number(_), Self::Null) => self.overflows(),
-            (Self::Number(_), Self::Number(_)) => same_number(self, heard),
-            (Self::Array(sent), Self::Array(heard)) => {
-                let mut pairs = sent.iter().zip(heard);
-                sent.len() == heard.len()
-                    && pairs.all(|(sent, heard)| sent.becomes(heard, same_number))
+            (Self::Number(_), Self::Number(_)) => same_number(self, received),
+            (Self::Array(sent), Self::Array(received)) => {
+                let mut pairs = sent.iter().zip(received);
+                sent.len() == received.len()
+                    && pairs.all(|(sent, received)| sent.becomes(received, same_number))
             }
-            (Self::Object(sent), Self::Object(heard)) => {
-                let mut pairs = sent.iter().zip(heard);
-                sent.len() == heard.len()
-                    && pairs.all(|((key, sent), (same_key, heard))| {
-                        key == same_key && sent.becomes(heard, same_number)
+            (Self::Object(sent), Self::Object(received)) => {
+                let mut pairs = sent.iter().zip(received);
+                sent.len() == received.len()
+                    && pairs.all(|((key, sent), (same_key, received))| {
+                        key == same_key && sent.becomes(received, same_number)
                     })
             }
-            _ => self == heard,
+            _ => self == received,
         }
     }
 }

@@ -4,9 +4,9 @@
 //! | --- | --- |
 //! | [`json`] | JSON as serde_json reads it, with every member and every number as it is written |
 //! | [`cbor`] | a second reading, slow and strict |
-//! | [`limits`] | what an execution may cost in time and memory |
-//! | [`book`] | what clients have said, to compare what others hear with |
-//! | [`session`] | scripts for clients, and what must hold of what they hear |
+//! | [`limits`] | bounds of an execution's time and memory |
+//! | [`book`] | everything that clients have sent, to compare received frames with it |
+//! | [`session`] | scripts for clients, and checks of everything that they receive |
 //! | [`client`] | a client on an in-memory pipe, which speaks as `pendularm-client` does |
 //! | [`stage`] | the runtime's side of it, in virtual time |
 //!

@@ -19,7 +19,7 @@ ROUNDS = 3
 
 
 def rate(settings: int, executor: object) -> float:
-    """Servo gains of a 2-link arm, 2 s each at 2 ms."""
+    """Settings per second: gains of a 2-link arm, 2 s each at 2 ms."""
     side = round(settings**0.5)
     grid = {"kp": np.geomspace(50, 2000, side), "kd": np.geomspace(2, 100, side)}
     took = []

@@ -2,8 +2,8 @@
 
 CMA-ES (the package `cma`) draws some dozens of small networks, 300 times by default. A vector environment tries each
 of them on several arms at once, and the best half shapes the next draw. Needs `pip install "$(ls
-python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, more than 0.5, on
-starts that were not trained on, and keeps the network in `policy.npz`.
+python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and of the found one, more than 0.5.
+Their starts are not those of the training. Keeps the network in `policy.npz`.
 """
 
 import sys

@@ -53,13 +53,13 @@ pub(crate) fn property<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Held<'p
     read_only(values.to_pyarray(py))
 }
 
-/// Numbers in an array of any shape. Contiguous doubles, row by row, stay in the caller's memory.
-pub(crate) struct Numbers<'py> {
+/// An argument with numbers in an array of any shape. Contiguous doubles, row by row, stay in the caller's memory.
+pub(crate) struct ArrayArgument<'py> {
     field: String,
     array: PyReadonlyArrayDyn<'py, f64>,
 }
 
-impl<'py> Numbers<'py> {
+impl<'py> ArrayArgument<'py> {
     pub(crate) fn read(field: &str, value: &Object<'py>) -> PyResult<Self> {
         if is_masked(value)? {
             return Err(refused(format_args!(
@@ -206,7 +206,7 @@ pub(crate) fn joints<const N: usize>(
     value: &Object<'_>,
     bound: Bound,
 ) -> PyResult<[f64; N]> {
-    let numbers = Numbers::read(field, value)?;
+    let numbers = ArrayArgument::read(field, value)?;
     if *numbers.shape() != [N] {
         return Err(refused(format_args!(
             "{field} must be an array of {N} numbers, got {}",

@@ -8,7 +8,7 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Chain, Given, for_either};
-use crate::arrays::{Numbers, Rows, joints_or, room};
+use crate::arrays::{ArrayArgument, Rows, joints_or, room};
 use crate::fields::{self, Bound, Held, Object, Real, refused};
 
 /// The shape of a function's result for one state.
@@ -52,7 +52,7 @@ fn all_rows<'py, const K: usize>(
 ) -> PyResult<Object<'py>> {
     let mut given = Vec::with_capacity(K);
     for (field, value) in fields {
-        given.push((field, Numbers::read(field, value)?));
+        given.push((field, ArrayArgument::read(field, value)?));
     }
     let counts = || {
         given

@@ -24,7 +24,7 @@ use crate::patience::{hold, until_done};
 /// Steps between two checks of the clock: some hundred microseconds.
 const STEPS_PER_LOOK: u64 = 1000;
 
-type Numbers<'py> = Held<'py, PyArray1<f64>>;
+type ArrayProperty<'py> = Held<'py, PyArray1<f64>>;
 
 /// The number of links never changes. A lock protects the state, because threads may share a simulation.
 #[derive(Debug)]
@@ -255,31 +255,31 @@ impl Simulation {
 
     /// Joint positions [rad], (links,), never wrapped.
     #[getter]
-    fn position<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(Either, &self.own, one => property(py, &hold(py, one).state().position))
     }
 
     /// Joint rates [rad/s], (links,).
     #[getter]
-    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(Either, &self.own, one => property(py, &hold(py, one).state().velocity))
     }
 
     /// Effort of the latest step [N m], (links,): the controller's plus the disturbance's.
     #[getter]
-    fn effort<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+    fn effort<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(Either, &self.own, one => property(py, hold(py, one).effort()))
     }
 
     /// Integral of the position error [rad s], (links,).
     #[getter]
-    fn integral<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+    fn integral<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(Either, &self.own, one => property(py, hold(py, one).pid().integral()))
     }
 
     /// The setpoint: positions [rad] and velocities [rad/s], (links,) each.
     #[getter]
-    fn setpoint<'py>(&self, py: Python<'py>) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
+    fn setpoint<'py>(&self, py: Python<'py>) -> PyResult<(ArrayProperty<'py>, ArrayProperty<'py>)> {
         for_either!(Either, &self.own, one => {
             let one = hold(py, one);
             let Setpoint { position, velocity } = one.pid().setpoint();
@@ -400,7 +400,7 @@ impl Simulation {
 
     /// Position of the end effector [m], (2,).
     #[getter]
-    fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Numbers<'py>> {
+    fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<ArrayProperty<'py>> {
         for_either!(Either, &self.own, one => {
             let one = hold(py, one);
             let tip = forward(one.arm().lengths(), &one.state().position);

@@ -71,7 +71,7 @@ fn listed_limits<'py, const N: usize>(
     motion: Motion,
     is_free: bool,
 ) -> PyResult<Held<'py, PyDict>> {
-    let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+    let motion_limit = Some(motion.timestep).filter(|timestep| timestep.is_finite());
     let critical = limits.critical.map(|critical| {
         let found = PyDict::new(py);
         found.set_item("growth_per_step", critical.growth_per_step)?;
@@ -96,7 +96,7 @@ fn listed_limits<'py, const N: usize>(
         limits.worst_pose.map(|pose| pose.to_pyarray(py)),
     )?;
     found.set_item("critical", critical.transpose()?)?;
-    found.set_item("timestep_limit_motion", bears)?;
+    found.set_item("timestep_limit_motion", motion_limit)?;
     found.set_item("motion_speed", motion.speed)?;
     found.set_item("advised_timestep", limits.advised_for(&motion))?;
     found.set_item("advised_duration", is_free.then_some(FREE_SECONDS))?;

@@ -161,7 +161,7 @@ try:
     print("waiting", flush=True)
     batch.reset()
 except KeyboardInterrupt:
-    print("heard", flush=True)
+    print("interrupted", flush=True)
     os._exit(0)
 """
 
@@ -173,7 +173,7 @@ def test_who_waits_hears_signals(start_child):
     assert run.stdout.readline() == "waiting\n"
     time.sleep(0.2)
     run.send_signal(signal.SIGINT)
-    assert run.stdout.readline() == "heard\n"
+    assert run.stdout.readline() == "interrupted\n"
     assert run.wait(60) == 0
 
 

@@ -41,7 +41,7 @@ def test_the_manual_runs_from_top_to_bottom(tmp_path):
     assert len(parts) >= 3
     said = run("\n".join(parts), tmp_path)
     assert "(20, 20, 2)" in said
-    assert len(list((tmp_path / "servo").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "gains").glob("*.npz"))) == 1
 
 
 def test_the_wheels_own_page_runs(tmp_path):

@@ -93,8 +93,7 @@ fn command() -> Command {
         )
         .arg(
             Arg::new("token").long("token").value_name("TOKEN").help(
-                "What the arm wants to be shown; who may list this machine's processes sees it, so better use the \
-                 variable ARM_SIM_TOKEN",
+                "Token of the arm; prefer the variable ARM_SIM_TOKEN, because other users can see options",
             ),
         )
         .arg(

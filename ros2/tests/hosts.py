@@ -99,8 +99,8 @@ class Watchers:
 
     def wait_until_each_has(self, count):
         def get():
-            heard = self.read()
-            return heard if all(one["count"] >= count for one in heard["watchers"]) else None
+            received = self.read()
+            return received if all(one["count"] >= count for one in received["watchers"]) else None
 
         return wait_for(f"{count} messages for each", get)
 
@@ -181,12 +181,12 @@ class Scene:
         heard_then, sent_then = self.messages_and_bytes()
         sent, messages = sent_then - sent_before, heard_then - heard_before
         ran = {name: processor_time(program) - ran[name] for name, program in programs.items()}
-        heard = [one for watchers in self.watchers for one in watchers.read()["watchers"]]
+        received = [one for watchers in self.watchers for one in watchers.read()["watchers"]]
         rows = first["rows"]
         return {
-            "watchers": len(heard),
+            "watchers": len(received),
             "rate": len(rows) / took,
-            "missing": sum(one["missing"] for one in heard),
+            "missing": sum(one["missing"] for one in received),
             "bytes": sent / messages * len(rows) / took,
             "bytes a message": sent / messages,
             "hop": spread((came - gone) * 1e-6 for _, gone, came in rows),
@@ -211,8 +211,8 @@ class Scene:
             one.begin()
         getattr(self, f"start_{name}_router")()
         back = time.time_ns()
-        heard = [one for watchers in self.watchers for one in watchers.wait_until_each_has(1)["watchers"]]
-        return max(0.0, max((one["first"] - back) * 1e-9 for one in heard))
+        received = [one for watchers in self.watchers for one in watchers.wait_until_each_has(1)["watchers"]]
+        return max(0.0, max((one["first"] - back) * 1e-9 for one in received))
 
 
 def show(rows):

@@ -102,12 +102,12 @@ def test_joint_states_are_decoded_and_numbered(peer, session):
     watcher = session.declare_subscriber(
         f"{DOMAIN}/joint_states/**", lambda sample: attachments.append(Attachment.from_bytes(sample.attachment.to_bytes()))
     )
-    heard = peer.subscribe("/joint_states", "sensor_msgs/msg/JointState")
-    wait_for("120 joint states", lambda: len(heard) >= 120)
-    for state in heard:
+    received = peer.subscribe("/joint_states", "sensor_msgs/msg/JointState")
+    wait_for("120 joint states", lambda: len(received) >= 120)
+    for state in received:
         assert state.name == ["joint1", "joint2"], state
         assert [len(state.position), len(state.velocity), len(state.effort)] == [2, 2, 2], state
-    stamps = [state.header.stamp.sec + state.header.stamp.nanosec * 1e-9 for state in heard]
+    stamps = [state.header.stamp.sec + state.header.stamp.nanosec * 1e-9 for state in received]
     # After a late tick the next one follows at once, possibly before the arm has taken a step.
     assert stamps == sorted(stamps) and len(set(stamps)) >= 100, stamps
     wait_for("120 attachments", lambda: len(attachments) >= 120)
@@ -117,13 +117,13 @@ def test_joint_states_are_decoded_and_numbered(peer, session):
     assert len({one.gid for one in attachments}) == 1
     assert all(len(one.gid) == 16 for one in attachments)
     assert all(abs(one.timestamp_ns * 1e-9 - time.time()) < LIMIT for one in attachments)
-    return heard
+    return received
 
 
 def test_who_comes_late_gets_the_last_description(peer):
-    heard = peer.subscribe("/robot_description", "std_msgs/msg/String", qos=LATCHED)
-    wait_for("the description", lambda: heard)
-    assert "<robot" in heard[-1].data, heard[-1].data[:80]
+    received = peer.subscribe("/robot_description", "std_msgs/msg/String", qos=LATCHED)
+    wait_for("the description", lambda: received)
+    assert "<robot" in received[-1].data, received[-1].data[:80]
 
 
 def test_a_trajectory_moves_the_arm(peer, states):
@@ -236,9 +236,9 @@ def test_the_router_comes_back(port, bridge, router, states):
     bridge.said("connected to the router at", times=2)
     session = open_session(port)
     wait_for("the node", lambda: [token for token in tokens(session, "NN") if token[8] == "arm_sim"])
-    heard = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", heard.append)
-    wait_for("joint states", lambda: len(heard) >= 10)
+    received = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", received.append)
+    wait_for("joint states", lambda: len(received) >= 10)
     watcher.undeclare()
     return router, session
 
@@ -248,9 +248,9 @@ def test_the_arm_comes_back(port, bridge, arm, session):
     wait_for("an empty graph", lambda: not [token for token in tokens(session) if token[8] == "arm_sim"])
     arm, address = start_arm(port)
     bridge.said("is in domain", times=2)
-    heard = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", heard.append)
-    wait_for("joint states", lambda: len(heard) >= 10)
+    received = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", received.append)
+    wait_for("joint states", lambda: len(received) >= 10)
     watcher.undeclare()
     return arm, address
 
@@ -258,9 +258,9 @@ def test_the_arm_comes_back(port, bridge, arm, session):
 def test_another_arm_has_its_namespace(address, port, session):
     left = start_bridge(address, port, "--namespace", "/left")
     left.said("is in domain")
-    heard = []
-    watcher = session.declare_subscriber(f"{DOMAIN}/left/joint_states/**", heard.append)
-    wait_for("joint states", lambda: len(heard) >= 10)
+    received = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/left/joint_states/**", received.append)
+    wait_for("joint states", lambda: len(received) >= 10)
     watcher.undeclare()
     found = {(token[7], token[9]) for token in tokens(session, "MP")}
     assert {("%", "%joint_states"), ("%left", "%left%joint_states")} <= found, found

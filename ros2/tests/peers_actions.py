@@ -62,11 +62,11 @@ def test_a_goal_is_sent_as_an_action(peer, session):
         definition("action_msgs/GoalInfo goal_info", **info),
         definition("int8 return_code\naction_msgs/GoalInfo[] goals_canceling", **info),
     )
-    heard = []
+    received = []
     ROS2Subscriber(
         f"{place}feedback",
         f"{move}_FeedbackMessage",
-        heard.append,
+        received.append,
         msg_definition=definition(
             "unique_identifier_msgs/UUID goal_id\npendularm_interfaces/MoveToFeedback feedback",
             pendularm_interfaces__MoveToFeedback="string goal_id\npendularm_interfaces/Target target\nfloat64[] positions\n"
@@ -90,8 +90,8 @@ def test_a_goal_is_sent_as_an_action(peer, session):
     assert accepted
     ended = wait.call(goal_id=name)
     assert ended.status == 4 and ended.result.final_distance < 0.02, ended
-    mine = wait_for("feedback", lambda: [one for one in heard if list(one.goal_id.uuid) == [1] * 16])
-    assert all(len(one.feedback.positions) == 2 for one in mine), heard
+    mine = wait_for("feedback", lambda: [one for one in received if list(one.goal_id.uuid) == [1] * 16])
+    assert all(len(one.feedback.positions) == 2 for one in mine), received
     _, accepted = goal(2, 5.0, 5.0)
     assert not accepted, "five metres are out of reach"
     # It does not end by itself before it is cancelled.
@@ -145,7 +145,7 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     ]:
         inside[kind.replace("/msg/", "__")] = own(kind)
 
-    heard = []
+    received = []
     feedback = definition(
         "unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowFeedback feedback",
         control_msgs__FollowFeedback="std_msgs/Header header\nstring[] joint_names\n"
@@ -158,7 +158,7 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     )
     hashed = next(token[11] for token in tokens(session, "MP") if token[9] == f"{place}feedback".replace("/", "%"))
     options = {"msg_definition": feedback, "type_hash": hashed, **peer.at}
-    ROS2Subscriber(f"{place}feedback", f"{name}_FeedbackMessage", heard.append, **options)
+    ROS2Subscriber(f"{place}feedback", f"{name}_FeedbackMessage", received.append, **options)
 
     def service(part, kind, request, response):
         hashed = hashes[f"{place}{part}".replace("/", "%")]
@@ -206,7 +206,7 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     assert send.call(goal_id=mine, goal=path).accepted
     ended = wait.call(goal_id=mine)
     assert (ended.status, ended.result.error_code) == (4, 0), ended
-    told = wait_for("feedback", lambda: [one.feedback for one in heard])
+    told = wait_for("feedback", lambda: [one.feedback for one in received])
     for one in told:
         assert one.joint_names == ["joint1", "joint2"] and len(one.actual.positions) == 2, one
         # These fields are for other robots, but CDR has them too.

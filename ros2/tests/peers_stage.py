@@ -69,9 +69,9 @@ class Peer:
         return {"msg_definition": definition, "type_hash": JAZZY.hash_rihs01(name), **self.at}
 
     def subscribe(self, topic, name, qos=None):
-        heard = []
-        ROS2Subscriber(topic, name, heard.append, qos=qos, **self.message(name))
-        return heard
+        received = []
+        ROS2Subscriber(topic, name, received.append, qos=qos, **self.message(name))
+        return received
 
     def publisher(self, topic, name):
         return ROS2Publisher(topic, name, **self.message(name))

@@ -1,4 +1,5 @@
-//! Elementary functions with the same bits on every platform. Those of the standard library differ between platforms.
+//! Elementary functions with the same bits on every platform. Functions of the standard library differ between
+//! platforms.
 //!
 //! **Invariant:** angles are in radians. Results are as accurate as those of a C library, to about one unit in
 //! the last place.

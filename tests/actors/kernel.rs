@@ -97,19 +97,19 @@ where
     /// The answers of both, and the statuses before them.
     async fn call(&mut self, service: &str, args: Value) -> (Value, Value) {
         let frame = json!({"op": "call_service", "id": "one", "service": service, "args": args});
-        let before = (self.client.heard.len(), self.said.len());
+        let before = (self.client.received.len(), self.said.len());
         self.kernel.receive(&frame.to_string());
         while self.kernel.compute(ms(1)) {}
         self.hear();
         self.client.send(&frame).await;
         let is_answer = |frame: &Value| frame["op"] == "service_response" && frame["id"] == "one";
         self.client.receive_where(is_answer).await;
-        let of = |heard: &[Value]| -> Value {
-            let told = heard.iter().filter(|frame| frame["op"] != "publish");
+        let of = |received: &[Value]| -> Value {
+            let told = received.iter().filter(|frame| frame["op"] != "publish");
             told.cloned().map(without_times).collect()
         };
         (
-            of(&self.client.heard[before.0..]),
+            of(&self.client.received[before.0..]),
             of(&self.said[before.1..]),
         )
     }
@@ -348,11 +348,11 @@ fn setpoints_and_efforts_are_taken_or_refused_alike() {
                 .await;
             both.pass(ms(40)).await;
         }
-        let statuses = |heard: &[Value]| -> Vec<Value> {
-            let told = heard.iter().filter(|frame| frame["op"] == "status");
+        let statuses = |received: &[Value]| -> Vec<Value> {
+            let told = received.iter().filter(|frame| frame["op"] == "status");
             told.cloned().collect()
         };
-        assert_eq!(statuses(&both.said), statuses(&both.client.heard));
+        assert_eq!(statuses(&both.said), statuses(&both.client.received));
         assert_eq!(statuses(&both.said).len(), 3);
         assert_eq!(both.agree_on("/joint_trajectory"), 3);
         both.agree("/arm_sim/pause", json!({"data": true})).await;

@@ -21,8 +21,8 @@ type Log<T> = Rc<RefCell<Vec<T>>>;
 #[test]
 fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
     in_virtual_time(async {
-        let heard: Log<(Topic, bool)> = Rc::default();
-        let log = Rc::clone(&heard);
+        let received: Log<(Topic, bool)> = Rc::default();
+        let log = Rc::clone(&received);
         let node = Node {
             on_interest: Box::new(move |interest| {
                 log.borrow_mut().push((interest.topic, interest.wanted));
@@ -46,11 +46,11 @@ fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
             .await;
         settle().await;
         let wanted = [(Topic::JointStates, true), (Topic::Clock, true)];
-        assert_eq!(*heard.borrow(), wanted);
-        heard.borrow_mut().clear();
+        assert_eq!(*received.borrow(), wanted);
+        received.borrow_mut().clear();
         drop(second);
         settle().await;
-        let mut ended = heard.borrow().clone();
+        let mut ended = received.borrow().clone();
         ended.sort_unstable();
         assert_eq!(ended, [(Topic::JointStates, false), (Topic::Clock, false)]);
     });
@@ -60,8 +60,8 @@ fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
 fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_and_not_the_listener()
 {
     in_virtual_time(async {
-        let heard: Log<String> = Rc::default();
-        let log = Rc::clone(&heard);
+        let received: Log<String> = Rc::default();
+        let log = Rc::clone(&received);
         let node = Node {
             on_message: Box::new(move |message| {
                 log.borrow_mut().push(message.msg.get().to_owned());
@@ -80,8 +80,8 @@ fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_an
         });
         assert_eq!(client.receive().await["msg"], msg);
         settle().await;
-        let heard = heard.borrow();
-        assert!(heard.is_empty(), "nodes ask one another by messages");
+        let received = received.borrow();
+        assert!(received.is_empty(), "nodes ask one another by messages");
     });
 }
 

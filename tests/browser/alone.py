@@ -11,7 +11,7 @@ from runtime import Runtime
 
 FILE = pathlib.Path(os.environ.get("PAGE", "pendularm.html")).resolve()
 
-# Waits for a frame of the kernel, after sending one; the page hears both, and ignores answers to ids that it does not know.
+# Waits for a frame of the kernel, after sending one. The page receives both, and ignores answers to unknown ids.
 HEAR = """new Promise((done) => {
   const kernel = pendularm["kernel.js"].Kernel.current, before = kernel.onmessage;
   kernel.onmessage = (event) => {

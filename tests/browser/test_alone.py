@@ -31,10 +31,10 @@ class AloneTest(PageTest):
     def test_it_runs_in_a_sandboxed_frame_and_its_course_goes_on_there(self):
         page = self.visit("about:blank")
         step = """<script>setTimeout(() => document.querySelector("#course-next").click(), 500);</script>"""
-        page.run("addEventListener('message', ({ data }) => { window.heard = data; })")
+        page.run("addEventListener('message', ({ data }) => { window.received = data; })")
         page.run("""((text) => { const frame = document.createElement("iframe"); frame.sandbox = "allow-scripts"; frame.width = 1200;
           frame.height = 800; frame.srcdoc = text; document.body.append(frame); })(%s)""" % json.dumps(FILE.read_text() + step + REPORT))
-        page.until("window.heard && window.heard[0] === 'pill open' && window.heard[1] > 0.3", why="the arm runs in the frame")
+        page.until("window.received && window.received[0] === 'pill open' && window.received[1] > 0.3", why="the arm runs in the frame")
         self.assertEqual(page.complaints, [])
 
     def test_without_a_worker_the_page_itself_runs_the_arm(self):

@@ -121,8 +121,8 @@ class Hostile(PageTest):
         _, stop = serve(f'<iframe src="{self.runtime.url}"></iframe>', port)
         self.addCleanup(stop)
         page = self.visit(f"{site}/")
-        heard = lambda: self.runtime.call("/rosapi/subscribers", topic="/joint_states")["values"]["subscribers"]
-        self.wait(heard, f"the framed page hears the arm, got {page.complaints}")
+        subscribers = lambda: self.runtime.call("/rosapi/subscribers", topic="/joint_states")["values"]["subscribers"]
+        self.wait(subscribers, f"the framed page subscribes to the arm, got {page.complaints}")
 
     def test_a_page_whose_name_was_pointed_here_can_ask_for_nothing_by_any_method(self):
         """The page is of the runtime's own origin, as far as the browser knows."""

@@ -106,8 +106,8 @@ class TwoLinks(View, Sums, PageTest):
             self.page.run("gc()")
             return self.page.run("performance.memory.usedJSHeapSize")
 
-        # Memory that is compiled and cached once is no growth, and comes when the browser likes: so the growth that lasts is sought, in one
-        # of four spans of half a minute. At 10 MB an hour, each would grow by 83 kB.
+        # Memory that is compiled and cached once is no growth. The browser takes it at any time. So at least one of four spans of half
+        # a minute must have little growth. At 10 MB an hour, each would grow by 83 kB.
         self.page.run("new Promise((done) => setTimeout(done, 15000))")
         before, growths = heap(), []
         while len(growths) < 4 and (not growths or growths[-1] >= 83_000):

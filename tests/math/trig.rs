@@ -4,8 +4,8 @@ use pendularm::math::trig::sin_cos;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-/// Sine and cosine, rounded to nearest, of exactly these numbers: those below the limit that come closest to a multiple of π/2, the
-/// multiples themselves, where the quadrants meet, both sides of the limit, tiny and huge.
+/// Sine and cosine, rounded to nearest, of exactly these numbers. Some are the numbers below the limit that are closest to a multiple
+/// of π/2. The others are the multiples themselves, numbers on both sides of the limit, tiny and huge ones.
 #[rustfmt::skip]
 const KNOWN: [(f64, f64, f64); 24] = [
     (45.553093477052, 1.0, -6.189806365883577e-19),

@@ -26,8 +26,8 @@ test("the question with the controller off is about the arm left to itself", () 
 });
 
 test("an answer about another loop counts for nothing, and offers no button", () => {
-  const servo = arm({ integrator: { method: "rk4", timestep: 0.01 } });
-  const off = { ...servo, enabled: false };
+  const on = arm({ integrator: { method: "rk4", timestep: 0.01 } });
+  const off = { ...on, enabled: false };
   assert.equal(answerInForce(off), null);
   const said = verdict(off);
   assert.equal(said.kind, "unknown");

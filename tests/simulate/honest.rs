@@ -103,7 +103,7 @@ pub struct Honest {
     /// Frames that it has sent, and up to which they are known to have been handled.
     pub frames: u64,
     pub handled: u64,
-    /// Answers that it owes as a provider: when, and the frame.
+    /// Answers that it has to give as a provider, each with its time and its frame.
     pub due_answers: Vec<(Instant, u64, String)>,
     /// The turn at which its last computation was answered. The next one starts then.
     pub computed: u64,

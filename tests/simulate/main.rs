@@ -66,7 +66,7 @@ use crate::play::{Outcome, play, processor_time_of};
 /// Seeds that failed once: they are always played first.
 const KEPT: &str = include_str!("kept_seeds.txt");
 /// Seeds of a plain `cargo test`, and how many of them are played twice and compared.
-const FEW: u64 = 60;
+const DEFAULT_SEEDS: u64 = 60;
 const TWICE: u64 = 6;
 /// Interval at which a long run reports its progress.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
@@ -237,7 +237,11 @@ fn differ(first: &Outcome, second: &Outcome) -> Option<Failure> {
 fn play_many(began: Instant) -> i32 {
     let minutes: Option<f64> = number("MINUTES");
     let from: u64 = number("FROM").unwrap_or(1);
-    let count: u64 = number("SEEDS").unwrap_or(if minutes.is_some() { u64::MAX } else { FEW });
+    let count: u64 = number("SEEDS").unwrap_or(if minutes.is_some() {
+        u64::MAX
+    } else {
+        DEFAULT_SEEDS
+    });
     let end = minutes.map(|minutes| Duration::from_secs_f64(minutes * 60.0));
     let goes_on = std::env::var("GO_ON").is_ok_and(|text| !text.is_empty());
     let how_many = match minutes {

@@ -54,8 +54,8 @@ fn widely_scaled_states_keep_their_slow_eigenvalues() {
     assert!((values[1].0 / -1e-3 - 1.0).abs() < 1e-14);
 }
 
-/// Sums of the eigenvalues and of their squares are traces of the matrix and of its square, however its states are
-/// scaled: some hundred units of rounding of sums of 81 products.
+/// Sums of the eigenvalues and of their squares are traces of the matrix and of its square, for every scale of its
+/// states. The tolerance is some hundred units of rounding of sums of 81 products.
 #[test]
 fn eigenvalues_of_random_matrices_have_the_traces() {
     let mut rng = fastrand::Rng::with_seed(3);

@@ -113,8 +113,8 @@ fn free_arms_are_carried_within_the_limit_and_lost_at_a_multiple_of_it() {
     check_free::<3>(32, 40);
 }
 
-/// Moves of up to four turns with gains of all dampings: the speed assumed is that of the true motion within a factor
-/// of four, and within both limits the arm arrives.
+/// Moves of up to four turns with gains of all dampings. The assumed speed is within a factor of four of the true
+/// motion's, and within both limits the arm arrives.
 fn check_moves<const N: usize>(seed: u64, cases: usize) {
     let mut rng = fastrand::Rng::with_seed(seed);
     for case in 0..cases {

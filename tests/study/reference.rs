@@ -93,8 +93,8 @@ fn start() -> State<2> {
     }
 }
 
-/// With the effort of a linear spring and damper, halving the period of a held effort halves its distance to the law at
-/// every instant: the held effort is on average half a period old.
+/// The effort is of a linear spring and damper. Half the period of the hold halves the distance to the law at every
+/// instant, because a held effort is on average half a period old.
 #[test]
 fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     let arm = Arm::<2>::default();

@@ -157,8 +157,8 @@ fn beside_twice_the_digits<const N: usize>(arm: &Arm<N>, start: &State<N>, time:
 }
 
 /// Tips of a million and of a billion times the rest's mass, or of as small a part; lengths of a thousandth and of a
-/// thousand. Nothing can be known better than a motion that begins a unit in the last place beside: a hundred times that
-/// is for the units that every step adds, and for what the elimination of an uneven matrix loses.
+/// thousand. No motion can be known better than one that begins a unit in the last place beside it. The tolerance is a
+/// hundred times that, for the units that every step adds, and for the loss of eliminating an uneven matrix.
 #[test]
 fn hostile_arms_are_followed_as_exactly_as_they_can_be_known() {
     let mut rng = fastrand::Rng::with_seed(5);
@@ -187,8 +187,8 @@ fn hostile_arms_are_followed_as_exactly_as_they_can_be_known() {
     }
 }
 
-/// Let go at rest, stretched along the horizontal, three coefficients in a row vanish between two that do not: neither
-/// may the series end there, nor a step be chosen by them.
+/// The arm is let go at rest, stretched along the horizontal. Three coefficients in a row are zero between two that are
+/// not. The series must not end there, and the step must not be chosen by them.
 #[test]
 fn an_arm_let_go_along_the_horizontal_is_followed_although_its_series_has_gaps() {
     for time in [1e-3, 0.01, 0.1, 0.5] {

@@ -58,7 +58,7 @@ fn state_within(
     panic!("no {what} in time; the last state was {last}");
 }
 
-/// Lets so much simulation time pass \[s\], however long that takes, and throws away what comes. The client subscribes to
+/// Waits until `time` of simulation time has passed \[s\], and discards all frames. The client subscribes to
 /// `/joint_states`.
 pub fn let_simulate(client: &mut Client, time: f64) {
     let end = stamp(&state(client)) + time;

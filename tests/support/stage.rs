@@ -130,7 +130,7 @@ pub fn connect(registry: &Addr<Registry>, gauges: &Arc<Gauges>) -> Client {
     Client(pipe::Client::on(ours, PATIENCE).remembering())
 }
 
-/// A client, over a pipe, that remembers every frame it has heard.
+/// A client, over a pipe, that remembers every frame it has received.
 pub struct Client(pipe::Client<DuplexStream>);
 
 impl Deref for Client {
@@ -151,7 +151,7 @@ impl Client {
     /// Receives all messages until now; the requests that this needs are not recorded.
     pub async fn settle(&mut self) {
         self.0.settle().await;
-        self.heard.pop();
+        self.received.pop();
     }
 
     pub async fn unsubscribe(&mut self, topic: &str) {
@@ -184,19 +184,19 @@ impl Client {
 
     /// Lets `time` pass, and gives the messages on `topic` that came in it.
     pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
-        let before = self.heard.len();
+        let before = self.received.len();
         let listen = async {
             loop {
                 self.receive().await;
             }
         };
         let _: Result<(), _> = timeout(time, listen).await;
-        messages(&self.heard[before..], topic)
+        messages(&self.received[before..], topic)
     }
 
     /// The messages on `topic` so far.
     pub fn messages(&self, topic: &str) -> Vec<Value> {
-        messages(&self.heard, topic)
+        messages(&self.received, topic)
     }
 }
 

@@ -45,7 +45,7 @@ impl Gateway {
         Self::within(Memory::default(), nodes).await
     }
 
-    /// A gateway whose clients share this room for what is long.
+    /// A gateway whose clients share this memory for long frames and answers.
     pub async fn within(memory: Memory, nodes: Nodes) -> Self {
         let gauges = Arc::new(Gauges::with(memory));
         let registry = Registry::new(Arc::clone(&gauges)).start();
@@ -87,7 +87,7 @@ impl Peer {
         self.send_bytes(text.as_bytes()).await;
     }
 
-    /// Takes what comes up to the end of the stream.
+    /// Reads all frames up to the end of the stream.
     pub async fn drain(&mut self) {
         let mut bytes = Vec::new();
         let _ = self.stream().read_to_end(&mut bytes).await;

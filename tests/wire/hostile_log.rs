@@ -1,5 +1,5 @@
-//! Log injection: whatever a client sends at the most talkative level, each line of standard error is one record of the
-//! runtime's own, and nothing on it acts on a terminal. Nor does what is sent become a file's name or a format.
+//! Log injection at the level `trace`. For every text of a client, each line of standard error is one record of the
+//! runtime, and nothing on it acts on a terminal. No text becomes a file's name or a format.
 //!
 //! **Invariant:** the program logs into a pipe that is read to its end, so no line is missed.
 

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 const READS_A_SECOND: u32 = 30;
 /// How long it is read: without a bound it would be half as late at the end.
 const TIME: Duration = Duration::from_secs(12);
-/// Buffers as small as a script's: what they hold has been taken, as far as the runtime can see.
+/// Buffers as small as a script's. Their content counts as read, because the runtime cannot see it.
 const BUFFER: usize = 4096;
 
 /// Simulation time of a message \[ms\], if it is one of the joints' states.

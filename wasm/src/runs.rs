@@ -80,8 +80,13 @@ where
     simulation.set_setpoint(Setpoint::at(setpoint));
     simulation.advance(STEPS);
     let State { position, velocity } = *simulation.state();
-    let servo = if on { "on" } else { "off" };
-    let _ = write!(text, "{} {N} {servo} {}", method.name(), simulation.steps());
+    let controller = if on { "on" } else { "off" };
+    let _ = write!(
+        text,
+        "{} {N} {controller} {}",
+        method.name(),
+        simulation.steps()
+    );
     let values = [position, velocity, *simulation.effort()];
     for value in values.into_iter().flatten().chain([simulation.time()]) {
         let _ = write!(text, " {:016x}", value.to_bits());

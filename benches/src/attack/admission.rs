@@ -13,13 +13,13 @@ pub const REPORT: &str = "report";
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "silent-before-token",
-        "200 clients connect and say nothing, return, and the holder of the token comes",
+        "200 clients connect, send nothing and reconnect; a client with the token connects",
         || Client::tcp().returns().times(200),
     )
     .locked(),
     Attack::new(
         "guesses",
-        "100 clients guess at the token, are told so, and return",
+        "100 clients send wrong tokens, read the refusal and reconnect",
         || {
             each(0..100, |k| {
                 let token = format!("a-token-that-somebody-guesses-{k:08}");
@@ -43,7 +43,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "refused-requests",
-        "25 clients send requests that are refused, short and long ones, and return",
+        "25 clients send requests that are refused, short and long ones, and reconnect",
         refused_requests,
     ),
     Attack::new(

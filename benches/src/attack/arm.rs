@@ -13,7 +13,7 @@ pub const ATTACKS: &[Attack] = &[
     .moves(),
     Attack::new(
         "long-steps",
-        "150 clients take steps of a second by hand, while a goal is pursued whose feedback 20 hear",
+        "150 clients step the arm by a second, while 20 clients receive the feedback of a goal",
         long_steps,
     )
     .moves(),

@@ -9,17 +9,17 @@ const CROWD: usize = 180;
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "storm-beside-waiting",
-        "180 clients have 180 calls wait each; 50 connect, say nothing and go, over and over",
+        "180 clients have 180 waiting calls each; 50 connect, send nothing and leave, repeatedly",
         storm,
     ),
     Attack::new(
         "late-together",
-        "180 clients have 180 calls wait each, whose time is over at one instant",
+        "180 clients have 180 waiting calls each, with one common timeout",
         || waiting(Client::tcp(), |n| 2.5 - n as f64 / 1000.0),
     ),
     Attack::new(
         "left-together",
-        "a provider goes that 180 clients have 180 calls wait for, and another returns",
+        "a provider of 180 waiting calls from each of 180 clients leaves, and another one connects",
         || waiting(Client::tcp().leaves_after(1500).returns(), |_| 86_400.0),
     ),
     Attack::new(
@@ -51,7 +51,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
 ];
 
-/// A provider that answers nothing, and callers who are patient for so many seconds; one comes each millisecond.
+/// A provider that answers nothing, and callers with timeouts of `patience` seconds. One connects each millisecond.
 fn waiting(provider: Client, patience: impl Fn(usize) -> f64) -> Vec<Client> {
     let provider = provider.says(&on_service("advertise_service", "/crowd"));
     let callers = each(0..CROWD, |n| {

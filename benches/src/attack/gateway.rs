@@ -11,7 +11,7 @@ const PAUSE: &str = "/arm_sim/pause";
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "garbage-traced",
-        "10 clients send lines of a few bytes that are no frames and read the complaints; the log tells everything",
+        "10 clients send lines of a few bytes that are no frames and read the errors; the log has every event",
         || {
             Client::tcp()
                 .says(&light(PAUSE))
@@ -29,7 +29,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "openings",
-        "20 clients open like TLS, HTTP, BSON, a mail server, and return",
+        "20 clients open like TLS, HTTP, BSON, a mail server, and reconnect",
         || {
             let openings: [&[u8]; 5] = [
                 b"\x16\x03\x01\x02\0\x01\0\x01\xfc\x03\x03",

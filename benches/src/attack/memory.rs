@@ -7,7 +7,7 @@ use super::script::{Client, LONG, MIB, call, each, filler, light, publish, subsc
 pub const ATTACKS: &[Attack] = &[
     Attack::new(
         "deaf-statuses-10",
-        "10 clients send lines of two bytes and read no complaint",
+        "10 clients send lines of two bytes and read no errors",
         || {
             Client::tcp()
                 .says(&light("/arm_sim/pause"))
@@ -38,7 +38,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "deaf-watchers",
-        "200 clients subscribe to all that the arm publishes and read nothing",
+        "200 clients subscribe to all topics of the arm and read nothing",
         || {
             const TOPICS: [&str; 8] = [
                 "/joint_states",
@@ -58,7 +58,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new(
         "deaf-log",
-        "20 clients watch /rosout and diagnostics unread, others give reason for warnings",
+        "20 clients subscribe to /rosout and diagnostics and read nothing, others cause warnings",
         || {
             let watch = Client::tcp()
                 .says(&subscribe("/rosout", ""))

@@ -135,7 +135,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
 ];
 
-/// The id of a forwarded call, as it stands.
+/// The id of a forwarded call, unchanged.
 fn id_of(line: &str) -> Option<&str> {
     let from = line.find(r#""id":"#)? + 5;
     let rest = &line[from..];

@@ -112,7 +112,7 @@ pub const ATTACKS: &[Attack] = &[
         "10 clients send line ends and spaces",
         || {
             let bytes = [b"\n".repeat(32 * KIB), b" \t\r".repeat(32 * KIB)].concat();
-            // The first bytes decide what is spoken, so the first frame is one.
+            // The first bytes select the protocol, so the first frame is valid.
             Client::tcp()
                 .says(&light("/arm_sim/pause"))
                 .repeats_bytes(&bytes)

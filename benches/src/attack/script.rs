@@ -1,7 +1,6 @@
-//! A hostile client, as data: through which door it comes, what it says once and over and over, whether it reads, how
-//! it goes.
+//! A hostile client, as data: its protocol, its bytes sent once and repeatedly, its reading, and its end.
 //!
-//! **Invariant:** knows bytes only; [`stage`](super::stage) has the sockets and the clock.
+//! **Invariant:** a script has only bytes. [`stage`](super::stage) has the sockets and the clock.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -61,7 +60,7 @@ pub struct Client {
     pub(super) first: Arc<Vec<u8>>,
     /// Sent after that, over and over.
     pub(super) again: Arc<[u8]>,
-    /// At most so many bytes every so often; as many as are taken without.
+    /// At most this many bytes per interval. Without it, as many as the server accepts.
     pub(super) drip: Option<(usize, Duration)>,
     /// When it connects, from the beginning of the attack.
     pub(super) after: Duration,
@@ -146,7 +145,7 @@ impl Client {
         self
     }
 
-    /// A short message is said many times in one write, as whoever floods does.
+    /// Sends a short message many times in one write, as floods do.
     pub fn floods(self, frame: &str) -> Self {
         let bytes = self.framed(frame);
         let times = (64 * KIB / bytes.len()).max(1);
@@ -165,7 +164,7 @@ impl Client {
         self
     }
 
-    /// Reads so many bytes ten times a second.
+    /// Reads `bytes` bytes ten times a second.
     pub fn sips(mut self, bytes: usize) -> Self {
         self.ear = Ear::Sips(bytes);
         self
@@ -177,13 +176,13 @@ impl Client {
         self
     }
 
-    /// Connects so many milliseconds after the others.
+    /// Connects `milliseconds` after the others.
     pub fn after(mut self, milliseconds: u64) -> Self {
         self.after = Duration::from_millis(milliseconds);
         self
     }
 
-    /// Closes so many milliseconds after it has said all.
+    /// Closes `milliseconds` after it has sent everything.
     pub fn leaves_after(mut self, milliseconds: u64) -> Self {
         self.exit = (Exit::Closes, Duration::from_millis(milliseconds));
         self
@@ -232,7 +231,7 @@ pub fn call(service: &str, id: &str, args: &str) -> String {
     format!(r#"{{"op":"call_service","service":"{service}","id":{id},"args":{args}}}"#)
 }
 
-/// The lightest call, and what is asked with nothing at stake.
+/// A call without arguments, the lightest request.
 pub fn light(service: &str) -> String {
     call(service, "1", "{}")
 }
@@ -260,7 +259,7 @@ pub fn on_service(op: &str, service: &str) -> String {
 /// Two numbers that are slow to convert: twenty digits astride a halfway point.
 pub const SLOW: &str = "10000000000000001268e281,10000000000000001268e281";
 
-/// A string of so many bytes, quotes left out.
+/// A string of `bytes` bytes, without its quotes.
 pub fn filler(bytes: usize) -> String {
     "x".repeat(bytes)
 }

@@ -22,14 +22,14 @@ const SWEEP: Duration = Duration::from_millis(5);
 const REPLIES: usize = 8 * 1024 * 1024;
 /// Between two sips.
 const SIP: Duration = Duration::from_millis(100);
-/// Connections of one play, whoever returns: loopback has so many ports.
+/// Connections of one play, including repeated ones. Loopback has a limited number of ports.
 const MAX_CONNECTIONS: u64 = 20_000;
-/// Between two attempts of one that returns and is refused at once.
+/// Time between two attempts of a client that reconnects and is refused at once.
 const RETURN: Duration = Duration::from_millis(10);
 /// Connections made in one sweep: a listener's queue holds some hundreds, and what overflows comes a second later.
 const CONNECTS: usize = 20;
 
-/// The deeds so far, for whoever watches.
+/// The actions so far, for a thread that reports them.
 #[derive(Default)]
 pub struct Deeds {
     pub connections: AtomicU64,
@@ -42,7 +42,7 @@ struct Player<'a> {
     client: &'a Client,
     stream: Option<TcpStream>,
     opening: Vec<u8>,
-    /// Bytes sent of the opening and of what is said once.
+    /// Bytes sent of the opening and of the part that is sent once.
     said: usize,
     /// Position in the bytes that are said over and over.
     at: usize,
@@ -190,7 +190,7 @@ impl<'a> Player<'a> {
         self.unread.clear();
     }
 
-    /// Does what is due; whether it can send or read more.
+    /// Does all due actions. Returns whether it can send or read more.
     fn sweep(&mut self, now: Instant) -> bool {
         if self.due.is_some_and(|due| due <= now) {
             self.due = None;
@@ -277,7 +277,7 @@ impl<'a> Player<'a> {
         false
     }
 
-    /// Sends some of what is next; how much was taken, none if nothing is to be sent or can be.
+    /// Sends some of the next bytes. Returns their number, `None` if there are none or none can be sent.
     fn send(&mut self, most: usize) -> Option<usize> {
         let client = self.client;
         let (first, said) = (&client.first, self.said);

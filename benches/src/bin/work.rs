@@ -2,9 +2,10 @@
 //!
 //! `cargo run --release --bin work -- VARIANT COUNT`
 //!
-//! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
-//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges. WHAT is
-//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it.
+//! The difference of the counts for `COUNT` and for twice `COUNT` excludes the start of the program.
+//! `step-LINKS-METHOD-WHAT` is a step of the live arm's simulation. All arms start bent and at rest, with a setpoint
+//! near their equilibrium, so that none diverges. The last part is `free`, `pid`, `pd` (no integral), `pi` (no damping)
+//! or `pushed` (`pid` under a disturbance of zeros). `weightless` may be before it.
 
 use std::hint::black_box;
 

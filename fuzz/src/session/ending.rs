@@ -111,14 +111,14 @@ impl Session {
             let unanswered = player.answered.iter().find(|(_, count)| **count != 1);
             assert_eq!(unanswered, None, "a call in the end and its answers");
             for &from in &left {
-                let heard = player
+                let received = player
                     .last
                     .iter()
                     .filter(|(one, _)| *one == u64::from(from));
                 assert_eq!(
-                    heard.count() as u64,
+                    received.count() as u64,
                     LAST_MESSAGES,
-                    "what {client} heard of {from}"
+                    "messages of {from} that {client} received"
                 );
             }
         }

@@ -2,8 +2,8 @@
 //!
 //! - Every frame is one line of strict JSON (or CBOR, where that was asked for) with an `op` that the runtime sends.
 //! - A call gets exactly one response with its `id`, as long as its client stays, reads, and breaks no rule; never two.
-//! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent, as they were sent.
-//! - A provider hears what its caller asked, and the caller what its provider answered.
+//! - A client receives each message of another client on a topic at most once, in order, and unchanged.
+//! - A provider receives its caller's arguments, and the caller receives the provider's answer.
 //! - In the end, without other load, every message and every call between the remaining clients arrives.
 //! - A connection ends only when its client has ended, or by a rule of the protocol.
 //! - When all clients have disconnected, no memory is counted for any of them.
@@ -51,7 +51,7 @@ const ARM_WAIT: u16 = 48;
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(66);
 /// Every id of a call begins so; garbage must not, or it would be a call.
 const ID: &str = "call-";
-/// Messages of each client in the end, on a topic that nobody has named before.
+/// Messages of each client in the end, on a topic that no client has named before.
 const LAST_MESSAGES: u64 = 3;
 const LAST_TOPIC: &str = "/in/the/end";
 
@@ -113,7 +113,7 @@ struct Player {
     answered: BTreeMap<String, u32>,
     /// Calls that came for it as a provider: id, service, and the caller's own id.
     forwarded: Vec<(String, String, String)>,
-    /// The messages that it heard in the end, with their senders.
+    /// The messages that it received in the end, with their senders.
     last: Vec<(u64, u64)>,
     book: Rc<RefCell<Book>>,
     /// The last message of each topic and sender.

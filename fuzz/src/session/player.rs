@@ -1,4 +1,4 @@
-//! All that one client hears, beside what it must.
+//! Everything that one client receives, compared with the required frames.
 
 use super::*;
 

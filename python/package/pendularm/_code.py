@@ -18,7 +18,7 @@ def fingerprint(name: str, function: Callable[..., Any]) -> str:
     """
     if not isinstance(function, FunctionType):
         raise ValueError(
-            f"{name} must be a plain function where a folder is given, which knows it by its code, got {function!r:.60}"
+            f"{name} must be a plain function, because a folder identifies it by its code, got {function!r:.60}"
         )
     return hashlib.sha256(_told(name, function, ()).encode()).hexdigest()
 

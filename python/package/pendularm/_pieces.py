@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Folder", "Numbers", "hand_out"]
+__all__ = ["Folder", "PieceResults", "hand_out"]
 
-Numbers = dict[str, NDArray[Any]]
+PieceResults = dict[str, NDArray[Any]]
 """The results of a piece by the metrics' names, each (arms,)."""
 
 IN_FLIGHT = 256
@@ -29,8 +29,8 @@ def hand_out(
     starts: Sequence[int],
     piece: int,
     executor: Any,
-    solve: Callable[..., Numbers],
-    done: dict[int, Numbers],
+    solve: Callable[..., PieceResults],
+    done: dict[int, PieceResults],
     kept: "Folder | None",
     progress: bool,
 ) -> None:
@@ -153,12 +153,12 @@ class Folder:
         finally:
             part.unlink(missing_ok=True)
 
-    def keep(self, start: int, values: Numbers) -> None:
+    def keep(self, start: int, values: PieceResults) -> None:
         # The names are stored first, as a separate array, because NumPy and zip files change or confuse some
         # names.
         self._write(f"{start:012}.npz", lambda part: np.savez(part, json.dumps(list(values)), *values.values()))
 
-    def read(self, starts: Iterable[int]) -> dict[int, Numbers]:
+    def read(self, starts: Iterable[int]) -> dict[int, PieceResults]:
         found = {}
         for start in starts:
             try:

@@ -233,11 +233,12 @@ def _arguments_and_rendering(target: str) -> str:
     """
 
 
-_SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as strong as would hold it stretched out.
+_SWING_UP = """The task: a hanging arm swings up and stays there. Each effort is at most half of the effort that
+    holds the stretched arm.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm
-    there: 9.81 and 2.4525 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s. 1 is half of the effort that holds the stretched arm:
+    9.81 and 2.4525 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |
@@ -257,11 +258,12 @@ _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as s
 
     """ + _arguments_and_rendering("the highest point")
 
-_REACH = """The end effector is to come to a target and stay, with efforts twice as strong as hold the arm stretched.
+_REACH = """The task: the end effector moves to a target and stays there. Each effort is at most twice the
+    effort that holds the stretched arm.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm
-    there: 39.24 and 9.81 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s. 1 is twice the effort that holds the stretched arm:
+    39.24 and 9.81 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ._code import fingerprint
 from ._fields import Floats, flag, is_masked, number, path, shown, whole_number
 from ._native import Batch
-from ._pieces import Folder, Numbers, hand_out
+from ._pieces import Folder, PieceResults, hand_out
 from ._settings import begin, column, try_values
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
@@ -316,7 +316,7 @@ def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | 
             return
 
 
-def _solve(question: _Question, start: int, stop: int, stopped: threading.Event | None = None) -> Numbers:
+def _solve(question: _Question, start: int, stop: int, stopped: threading.Event | None = None) -> PieceResults:
     """Computes one piece on any worker. In this process it ends soon after `stopped` is set."""
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start

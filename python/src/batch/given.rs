@@ -8,14 +8,14 @@ use pyo3::prelude::{PyAnyMethods, PyResult};
 use pyo3::types::{PyByteArray, PyBytes};
 
 use super::Batch;
-use crate::arrays::{Numbers, Rows, collected, laid_out, room};
+use crate::arrays::{ArrayArgument, Rows, collected, laid_out, room};
 use crate::fields::{self, Bound, Object, entries, is_masked, is_too_long, refused, shown};
 
 impl Batch {
     /// A row per arm, or one for all, if there is an argument.
     pub(super) fn rows<'a>(
         &self,
-        given: Option<&'a Numbers<'_>>,
+        given: Option<&'a ArrayArgument<'_>>,
         bound: Bound,
     ) -> PyResult<Option<Rows<'a>>> {
         given
@@ -26,7 +26,7 @@ impl Batch {
     /// A number per arm, or one for all, if there is an argument.
     pub(super) fn column<'a>(
         &self,
-        given: Option<&'a Numbers<'_>>,
+        given: Option<&'a ArrayArgument<'_>>,
         bound: Bound,
     ) -> PyResult<Option<Rows<'a>>> {
         given
@@ -35,12 +35,14 @@ impl Batch {
     }
 }
 
-/// Numbers, if there is an argument.
+/// The array, if there is an argument.
 pub(super) fn read<'py>(
     field: &str,
     value: Option<&Object<'py>>,
-) -> PyResult<Option<Numbers<'py>>> {
-    value.map(|value| Numbers::read(field, value)).transpose()
+) -> PyResult<Option<ArrayArgument<'py>>> {
+    value
+        .map(|value| ArrayArgument::read(field, value))
+        .transpose()
 }
 
 /// One number of steps for all arms, or one for each.

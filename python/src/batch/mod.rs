@@ -22,7 +22,7 @@ use pendularm::math::simulation::{ControlPeriod, Simulation};
 use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::arrays::{Numbers, read_only};
+use crate::arrays::{ArrayArgument, read_only};
 use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
 use given::{chosen, of_arm, read, read_flags, read_methods, read_steps};
@@ -165,7 +165,7 @@ impl Batch {
         arms: Option<&Object<'_>>,
     ) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
-        let position = Numbers::read("position", position)?;
+        let position = ArrayArgument::read("position", position)?;
         let position = position.rows(chosen.len(), self.links(), Bound::Finite)?;
         let velocity = read("velocity", velocity)?;
         let velocity = velocity
@@ -198,7 +198,7 @@ impl Batch {
         positions: &Object<'_>,
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let positions = Numbers::read("positions", positions)?;
+        let positions = ArrayArgument::read("positions", positions)?;
         let positions = positions.rows(self.arms, self.links(), Bound::Finite)?;
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;

@@ -121,7 +121,7 @@ impl Gateway {
             GoalEvent::Feedback(values)
         };
         if to.try_send(GoalUpdate { id, what }).is_err() {
-            report::say("what the arm says of a goal was dropped: its action is busy");
+            report::say("feedback or result of a goal was dropped: its action is busy");
         }
     }
 }

@@ -33,7 +33,7 @@ pub struct RosapiNode {
 }
 
 impl RosapiNode {
-    /// A node that asks the registry who is there, and the arm for the time.
+    /// A node that asks the registry for its clients, and the arm for the time.
     #[must_use]
     pub fn new(registry: Recipient<TakeCensus>, time: Recipient<SimulationTime>) -> Self {
         Self { registry, time }
@@ -103,7 +103,7 @@ impl Handler<Call<Look>> for RosapiNode {
         } = call;
         let registry = self.registry.clone();
         let answered = async move {
-            // However many wait, a census is kept alive by those alone who are at work.
+            // Only calls with a permit hold a census, however many calls wait.
             let Some(place) = WorkPermit::take(WorkKind::Listing).await else {
                 return;
             };

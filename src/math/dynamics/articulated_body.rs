@@ -29,9 +29,9 @@
 //! acceleration of the base. Without gravity nothing depends on the first joint angle, and
 //! [`super::weightless_dynamics`] omits its sine and cosine.
 //!
-//! On the stored arms of 2 and 3 links, masses 1e-9 to 1e9 and lengths 1e-6 to 1e6, at most one digit is lost, and 1.2
-//! with a heavy tip (`tests/math/`). Known limit: masses *and* lengths that both differ by many powers of ten, such as
-//! 1e7 kg in 0.1 mm at the end of 500 km of links of a gram. There the last joint may lose eight digits.
+//! The stored arms have 2 and 3 links, masses 1e-9 to 1e9 and lengths 1e-6 to 1e6. They lose at most one digit, and 1.2
+//! with a heavy tip (`tests/math/`). Known limit: masses *and* lengths that both differ by many powers of ten. An
+//! example is 1e7 kg in 0.1 mm at the end of 500 km of links of a gram. There the last joint may lose eight digits.
 //!
 //! **Invariant:** every arm and every n uses this one kernel. Source of the method: Featherstone, *Rigid Body
 //! Dynamics Algorithms* (2008), ch. 7; the split into two directions is our own.

@@ -1,5 +1,5 @@
-//! The types inside other types: those of messages, of requests and responses, of parameters, and those of which ROS 2
-//! builds services and actions.
+//! The types inside other types: parts of messages, of requests and responses, of parameters, and the types of which
+//! ROS 2 builds services and actions.
 //!
 //! **Invariant:** the fields of a type of ROS are those of its definition. Parts that nothing here uses are empty.
 

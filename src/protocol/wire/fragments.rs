@@ -3,7 +3,7 @@
 //! They are [sent](split()) only to subscribers with a `fragment_size`, and accepted from any client, within
 //! bounds. The caller passes the time.
 //!
-//! **Invariant:** what is kept is one unfinished message of at most [`MAX_FRAME`] bytes, for [`MAX_AGE`] at most.
+//! **Invariant:** at most one unfinished message is stored, of at most [`MAX_FRAME`] bytes, for at most [`MAX_AGE`].
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

@@ -127,7 +127,7 @@ fn message(bytes: &[u8], head: &[u8]) -> Option<usize> {
 }
 
 /// The end of the JSON object whose brace is right before `at`. `None` if it is not valid or not complete, or if it
-/// needs the general reader: an escape, a byte beyond ASCII, an exponent, a very long number or very deep nesting.
+/// needs the general reader, for escapes, bytes beyond ASCII, exponents, very long numbers or very deep nesting.
 fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
     // One bit per open level, 1 for a bracket. The leading 1 marks their number.
     let mut levels: u64 = 0b10;

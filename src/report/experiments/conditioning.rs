@@ -1,8 +1,8 @@
 //! Digits lost in the accelerations of an arm, by mass ratio, pose and solver.
 //!
-//! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two solvers are compared with it: the live arm's
-//! recursion, and elimination of `M(q)` in joint space, as in textbooks. The inherent loss is the effect on the truth
-//! of a change of the angles by half a unit in the last place. No algorithm can lose less.
+//! The reference is the Lagrangian with 106 bits ([`exact_acceleration`]). Two solvers are compared with it: the live
+//! arm's recursion, and elimination of `M(q)` in joint space, as in textbooks. The inherent loss is the effect on the
+//! reference of a change of the angles by half a unit in the last place. No algorithm can lose less.
 //!
 //! **Invariant:** every solver gets the same states.
 

@@ -182,7 +182,7 @@ fn through_hanging(amplitude: f64, second: f64) -> Option<(f64, f64)> {
             return None;
         }
     }
-    // Back to the instant itself, by Newton's method: each round leaves the square of what was off.
+    // Back to the instant itself, by Newton's method. Each round squares the error.
     for _ in 0..6 {
         let back = -(state.position[0] + FRAC_PI_2) / state.velocity[0];
         state = advance(&state, back);

@@ -99,7 +99,7 @@ impl<T: 'static> Asker<T> for Client {
     }
 }
 
-/// An arm of three links whose `/joint_states` are heard.
+/// An arm of three links with a subscriber of `/joint_states`.
 struct TurnsBench {
     arm: Addr<ArmSim<3>>,
     said: Log,

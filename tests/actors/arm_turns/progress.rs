@@ -12,7 +12,7 @@ use pendularm::math::goal::Criteria;
 /// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
 struct Owner {
     turns: Rc<Cell<u64>>,
-    heard: Rc<RefCell<Vec<(f64, u64)>>>,
+    received: Rc<RefCell<Vec<(f64, u64)>>>,
 }
 
 impl Actor for Owner {
@@ -23,8 +23,8 @@ impl Handler<GoalProgress<3>> for Owner {
     type Result = ();
 
     fn handle(&mut self, judged: GoalProgress<3>, _: &mut Context<Self>) {
-        let heard = (judged.elapsed, self.turns.get());
-        self.heard.borrow_mut().push(heard);
+        let received = (judged.elapsed, self.turns.get());
+        self.received.borrow_mut().push(received);
     }
 }
 
@@ -33,7 +33,7 @@ impl Handler<GoalProgress<3>> for Owner {
 fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
-        let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
+        let (turns, received) = (Rc::new(Cell::new(0)), Rc::default());
         let others = Rc::clone(&turns);
         // Another task that always has work.
         actix_rt::spawn(std::future::poll_fn(move |cx| {
@@ -43,7 +43,7 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
         }));
         let owner = Owner {
             turns,
-            heard: Rc::clone(&heard),
+            received: Rc::clone(&received),
         };
         let long = SetIntegrator {
             timestep: Some(1.0),
@@ -76,10 +76,10 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
         }
         // The last are on their way.
         advance(Duration::from_millis(1)).await;
-        let heard = heard.borrow();
-        assert_eq!(heard.len(), 5000);
-        assert!(heard.is_sorted());
-        let most = heard.chunk_by(|(_, one), (_, other)| one == other);
+        let received = received.borrow();
+        assert_eq!(received.len(), 5000);
+        assert!(received.is_sorted());
+        let most = received.chunk_by(|(_, one), (_, other)| one == other);
         let most = most.map(<[_]>::len).max().unwrap();
         assert_eq!(most, 1, "in a turn");
     });

@@ -44,8 +44,9 @@
 //! The text of a request has the escapes of JSON. The first answer to it has the headers that keep a browser
 //! strict.
 //!
-//! A number may be a limit by its name, times in ms, and `LIMIT - 1` or `LIMIT + 1`. In a sent text, `%3*x%` is `xxx`, `%MAX_NAME*x%` repeats as often as that limit says, `%cr%` is a carriage return, `%lf%` is a line feed, and
-//! `$name` is a value that a pattern has bound. A pattern is JSON. An object may have more members than its pattern. The texts `*`, `-`, `~part`
+//! A number may be a limit by its name, times in ms, and `LIMIT - 1` or `LIMIT + 1`. In a sent text, `%3*x%` is `xxx`, and
+//! `%MAX_NAME*x%` repeats `x` up to that limit. `%cr%` is a carriage return, `%lf%` is a line feed, and `$name` is a value
+//! that a pattern has bound. A pattern is JSON. An object may have more members than its pattern. The texts `*`, `-`, `~part`
 //! and `$name` match any value, no value, a value that contains this part, and the value that the name is bound to. The text `1..2` matches
 //! numbers from 1 to 2, also as texts. `{"=": value}` matches this value only. At the end, no client has a frame that was not received, other than messages of
 //! topics that are published periodically.

@@ -34,7 +34,7 @@ with RosClient(host, int(port)) as client:
             arrived.set()
 
     roslibpy.Topic(client, "/joint_states", "sensor_msgs/msg/JointState").subscribe(look)
-    # No callback: what compas_fab 2.0.1 makes of a result is not what roslibpy 2.1 hands it.
+    # No callback: compas_fab 2.0.1 expects another form of a result than roslibpy 2.1 passes to it.
     client.follow_joint_trajectory(
         JointTrajectory(Header(), names, points), action_name=ACTION, feedback_callback=progress.append
     )

@@ -29,15 +29,15 @@ OWN = {"/recorder/inputs", "/recorder/states", "/recorder/calls"}
 
 def front_to_back(path):
     """The topics of a file without an index, message by message, as far as it goes; it has to end early."""
-    heard = []
+    received = []
     with path.open("rb") as file:
         reader = NonSeekingReader(file, decoder_factories=[DecoderFactory()])
         try:
             for _, channel, _, _ in reader.iter_decoded_messages(log_time_order=False):
-                heard.append(channel.topic)
+                received.append(channel.topic)
         # In the middle of a number mcap 1.6.0 leaves the word to `struct`.
         except (EndOfFile, struct.error):
-            return heard
+            return received
     raise AssertionError(f"{path} is whole")
 
 
@@ -66,7 +66,7 @@ def record(path, end):
 
 def wait_until_it_is_written(path):
     deadline = time.monotonic() + PATIENCE
-    while len(heard := front_to_back(path)) < 150 or not {"/joint_states", "/diagnostics", *OWN} <= set(heard):
+    while len(received := front_to_back(path)) < 150 or not {"/joint_states", "/diagnostics", *OWN} <= set(received):
         assert time.monotonic() < deadline, "nothing is written before the end"
         time.sleep(0.2)
 
@@ -150,17 +150,17 @@ assert count == len(messages), (count, len(messages))
 print(f"rosbags: {count} messages, {len(types)} types")
 
 # A file that was not ended has no index.
-heard = front_to_back(killed)
-assert "/joint_states" in heard and OWN <= set(heard), set(heard)
-print(f"mcap on the record of a killed program: {len(heard)} messages")
+received = front_to_back(killed)
+assert "/joint_states" in received and OWN <= set(received), set(received)
+print(f"mcap on the record of a killed program: {len(received)} messages")
 
 # Nor has one that was cut.
 cut = whole.with_name("cut.mcap")
 longest = 0
 for place in range(1, CUTS):
     cut.write_bytes(whole.read_bytes()[:whole.stat().st_size * place // CUTS])
-    heard = len(front_to_back(cut))
-    assert longest <= heard <= len(messages), (place, heard)
-    longest = heard
+    received = len(front_to_back(cut))
+    assert longest <= received <= len(messages), (place, received)
+    longest = received
 assert longest > len(messages) / 2, longest
 print(f"mcap on {CUTS - 1} cut records: up to {longest} of {len(messages)} messages")

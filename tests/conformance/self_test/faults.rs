@@ -79,7 +79,7 @@ fn one(text: &'static str, links: usize) -> Fault {
             })
         }
         [how @ ("drop" | "twice"), of, name, ..] => {
-            // What follows may have spaces.
+            // The rest of the line may have spaces.
             let value = head.splitn(4, ' ').last().expect(text);
             let pointer = format!("/{name}");
             Box::new(move |side, _, frame| {

@@ -1,7 +1,7 @@
 //! Shared by the rules: a connection to an arm in a known state, and requests to it.
 //!
-//! An error is the sentence that a rule fails with: the server rejected a call, did not answer in time, sent a message that is missing
-//! or malformed, or closed the connection.
+//! An error is the sentence that a rule fails with. Causes: the server rejected a call, did not answer in time, sent no or a
+//! malformed message, or closed the connection.
 //!
 //! The known state: running, PID off, `rk4` at 1 ms, gravity 9.81, links of 1 m and 1 kg, no goal, no trial, just reset.
 

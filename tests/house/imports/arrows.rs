@@ -121,7 +121,7 @@ impl House {
                 .filter(|import| !import.handed_on || used(&import.name))
                 .map(|import| &import.path);
             for path in imported.chain(&file.paths) {
-                // A module that is named without anything in it is no arrow; what is taken from it is.
+                // A module that is named without anything in it is no arrow. An item of it is one.
                 if let Some((target, Some(name))) = self.place(module, path, &mut Seen::new())
                     && target != *module
                 {

@@ -109,8 +109,8 @@ proptest! {
 
 #[test]
 fn a_present_orientation_is_kept_to_the_last_digit_where_its_range_is_narrowest() {
-    // Near full stretch the range of orientations is as narrow as the root of what is left of the reach: its ends,
-    // though right to every digit of the distance, are good to 1e-8 rad only.
+    // Near full stretch the width of the range of orientations is the root of the remaining reach. The distance is
+    // right to the last digit, but the ends of the range only to 1e-8 rad.
     for lengths in [[1.0, 0.7, 0.5], [1.0, 0.7, 2.5]] {
         for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
             for present in [[0.3, 0.0, hair], [0.3, hair, 0.0], [-2.0, hair, -hair]] {

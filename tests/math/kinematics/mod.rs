@@ -70,7 +70,7 @@ fn assert_wrapped<const N: usize>(q: &[f64; N]) {
     assert!(q.iter().all(|q| -PI < *q && *q <= PI), "{q:?}");
 }
 
-/// Sum of squared wrapped differences: what the choice of the elbow is made by.
+/// Sum of squared wrapped differences. It selects the elbow.
 fn cost<const N: usize>(q: &[f64; N], present: &[f64; N]) -> f64 {
     q.iter()
         .zip(present)

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// The stored `sens` is the sum of `lᵢ (1 + |q₁| + … + |qᵢ|)`: what rounding each *summed* angle would cost. Composed
-/// rotations do better; 8·2⁻⁵³ is the bar that the data set names.
+/// The stored `sens` is the sum of `lᵢ (1 + |q₁| + … + |qᵢ|)`, the cost of rounding each *summed* angle. Composed
+/// rotations lose less. The data set has the bar 8·2⁻⁵³.
 fn check_forward<const N: usize>(case: &Value) {
     let lengths = numbers::<N>(&case["lengths"]);
     let q = numbers::<N>(&case["q"]);

@@ -38,8 +38,8 @@ fn many_steps_at_once_are_the_same_bits_as_one_by_one() {
     }
 }
 
-/// A link that turns at 0.1 rad/s without gravity moves by the same increment each step: a million of them add up to
-/// that product, where a plain sum would be thousands of units in the last place off.
+/// A link that turns at 0.1 rad/s without gravity moves by the same increment each step. A million of them add up to
+/// the product. A plain sum would be off by thousands of units in the last place.
 #[test]
 fn a_million_tiny_steps_lose_no_digit() {
     let arm = Arm::new([1.0], [1.0], 0.0).unwrap();

@@ -63,7 +63,7 @@ fn a_message_that_is_not_one_object_is_refused_as_a_whole() {
     assert_eq!(error, FrameError::NotUtf8 { at: 2 });
 }
 
-/// What passes through to other clients is one line.
+/// A message for other clients is one line.
 #[test]
 fn the_payload_of_a_pretty_printed_message_is_one_line() {
     for (space, line) in [("\n", "{ \"a\": 1}"), ("\r\n", "{  \"a\":  1}")] {

@@ -1,4 +1,4 @@
-//! A message's body in either encoding: whose it is, and whether it is what was sent.
+//! A message's body in either encoding: its sender, and a comparison with the sent one.
 
 use serde::Deserialize;
 

@@ -66,13 +66,13 @@ impl Model {
             && before.elapsed() + LOOKS_APART < interval
         {
             court.wrong(format!(
-                "client {who} heard {topic} after {:?}, not {interval:?}",
+                "client {who} received {topic} after {:?}, not {interval:?}",
                 before.elapsed()
             ));
         }
         subscription.last = Some((number, Instant::now()));
         subscription.last_from = Some(from);
-        court.count("messages heard");
+        court.count("messages received");
         if skipped > 0 {
             self.miss(
                 court,

@@ -119,13 +119,16 @@ impl Model {
     pub fn hear(&mut self, court: &Court, honest: &mut Honest, received: Received) {
         match received {
             Received::Json(text) => {
-                court.note("heard", text.as_bytes());
+                court.note("received", text.as_bytes());
                 self.hear_text(court, honest, &text);
             }
             Received::Binary(bytes) => {
-                court.note("heard", &bytes);
+                court.note("received", &bytes);
                 let Some(frame) = crate::cbor::read(&bytes) else {
-                    return court.wrong(format!("client {} heard what is no CBOR", honest.who));
+                    return court.wrong(format!(
+                        "client {} received a frame that is not CBOR",
+                        honest.who
+                    ));
                 };
                 let topic = frame
                     .get("topic")
@@ -144,7 +147,7 @@ impl Model {
         let frame: NodeMessage<'_> = match serde_json::from_str(text) {
             Ok(frame) => frame,
             Err(why) => {
-                return court.wrong(format!("client {} heard {text:.200}: {why}", honest.who));
+                return court.wrong(format!("client {} received {text:.200}: {why}", honest.who));
             }
         };
         match frame.op.as_str() {
@@ -159,7 +162,7 @@ impl Model {
             "call_service" => self.hear_call(court, honest, &frame, text),
             "fragment" => self.hear_piece(court, honest, frame),
             "action_feedback" | "action_result" => self.hear_goal(court, honest, &frame, text),
-            _ => court.wrong(format!("client {} heard {text:.200}", honest.who)),
+            _ => court.wrong(format!("client {} received {text:.200}", honest.who)),
         }
     }
 

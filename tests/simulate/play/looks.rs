@@ -10,8 +10,8 @@ use crate::honest::Expect;
 
 /// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
 const LIGHT_TURNS: u64 = 30_000;
-/// Turns within which a computation is done, once the client's one before is, for each client that may have some too:
-/// what takes longest of what honest clients have computed takes some 1,000 where nobody else computes.
+/// Turns within which a computation is done, from the end of the client's one before, for each client that may compute.
+/// The longest computation of honest clients takes some 1,000 turns if no other client computes.
 const COMPUTED_TURNS: u64 = 2_000;
 /// The same for what is computed in a few turns: in two thousand seeds one took 43, beside a flood, and all others
 /// fewer than 40.

@@ -15,14 +15,14 @@ use crate::hostile::Hostile;
 use crate::model::Model;
 use crate::pipe::Fate;
 use crate::plan::{Burst, Feature, Plan};
-use crate::workload::{Numbers, Workload};
+use crate::workload::{UniqueNumbers, Workload};
 use crate::world::{World, in_virtual_time};
 
 /// Bytes in a pipe, and in a write, without which what a flood brings would be on its way for too long.
 const FLOODED_ROOM: usize = 4096;
 const FLOODED_PIECE: usize = 100;
-/// Processor time that everybody's turns after one deed may take, however slow the machine is: an arm whose steps are
-/// too short to keep up takes seconds, as tests are built to be compiled quickly.
+/// Processor time that all turns after one action may take, on a slow machine too. An arm with steps that are too short
+/// for real time takes seconds, because tests are built to be compiled quickly.
 const STANDSTILL: Duration = Duration::from_secs(10);
 
 /// The outcome of a seed.
@@ -62,7 +62,7 @@ struct Course {
     plan: Plan,
     world: World,
     model: Model,
-    numbers: Numbers,
+    numbers: UniqueNumbers,
     honest: Vec<Honest>,
     hostile: Vec<Hostile>,
     /// Honest clients so far.
@@ -81,7 +81,7 @@ impl Course {
             plan,
             world,
             model,
-            numbers: Numbers::default(),
+            numbers: UniqueNumbers::default(),
             honest: Vec::new(),
             hostile: Vec::new(),
             clients: 0,

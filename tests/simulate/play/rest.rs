@@ -130,7 +130,7 @@ impl Course {
             if let Some((topic, subscription)) = stale.filter(|_| is_quiet) {
                 let (last, newest) = (subscription.last, &subscription.newest);
                 self.court.wrong(format!(
-                    "client {} has not heard the newest on {topic}: {last:?}, not {newest:?}",
+                    "client {} has not received the newest on {topic}: {last:?}, not {newest:?}",
                     one.who
                 ));
             }

@@ -146,7 +146,7 @@ impl Workload<'_> {
             self.me().await_news(format!("subscribed to {topic}"));
             return self.send(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
         }
-        // Messages on their way may still come: they stay on the list of what may be heard.
+        // Messages on their way may still arrive, so they stay on the list of allowed messages.
         self.send(&format!("{{\"op\":\"unsubscribe\",\"topic\":\"{topic}\"}}"));
     }
 }

@@ -46,9 +46,9 @@ const DAY: Duration = Duration::from_secs(24 * 3600);
 
 /// Unique numbers for all calls and messages of a seed.
 #[derive(Default)]
-pub struct Numbers(u64);
+pub struct UniqueNumbers(u64);
 
-impl Numbers {
+impl UniqueNumbers {
     pub fn next(&mut self) -> u64 {
         self.0 += 1;
         self.0
@@ -60,7 +60,7 @@ pub struct Workload<'a> {
     pub court: &'a Court,
     pub plan: &'a Plan,
     pub model: &'a mut Model,
-    pub numbers: &'a mut Numbers,
+    pub numbers: &'a mut UniqueNumbers,
     pub all: &'a mut [Honest],
     /// The client whose turn it is.
     pub at: usize,

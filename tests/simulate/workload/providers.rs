@@ -84,7 +84,7 @@ impl Workload<'_> {
         );
     }
 
-    /// Decides about the calls that this client has heard as a provider.
+    /// Decides about the calls that this client has received as a provider.
     pub fn answer_calls(&mut self) {
         let who = self.me().who;
         let asked: Vec<_> = self

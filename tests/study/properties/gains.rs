@@ -12,8 +12,8 @@ use pendularm::study::stability::limits;
 
 use super::{Dice, Tally, cases, property, run, tells};
 
-/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link: gains that are suggested leave the margin and settle on moves
-/// that the search has not made.
+/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link. Suggested gains keep the margin, and settle on moves that the
+/// search has not made.
 fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     let mut dice = Dice::of(case);
     let (length, mass) = (dice.size(1.0), dice.size(1.7));

@@ -149,7 +149,7 @@ fn no_pose_of_a_random_loop_is_worse_than_the_worst() {
     tells(property!(no_pose_is_worse_than_the_worst, 80, 20_000));
 }
 
-/// Its gains run away where nothing weighs, in a pose that gravity steadies: what grows there grows without gravity.
+/// Its gains diverge without gravity, in a pose that gravity stabilises. The critical motion is the one without gravity.
 #[test]
 fn what_is_critical_grows_also_where_only_the_arm_without_weight_runs_away() {
     no_pose_is_worse_than_the_worst::<3>(285, &mut Tally::default());

@@ -52,8 +52,8 @@ fn a_field_that_is_not_there_is_refused_by_name_and_nothing_is_sent() {
         &runtime,
         &["topic", "pub", "-1", "/joint_trajectory", stamped],
     );
-    let heard = client.message("/joint_trajectory");
-    assert_eq!(heard["points"][0]["positions"], json!([0.1, 0.2]));
+    let received = client.message("/joint_trajectory");
+    assert_eq!(received["points"][0]["positions"], json!([0.1, 0.2]));
     assert_eq!(
         client.ask("/arm_sim/set_params", json!({}))["gravity"],
         9.81

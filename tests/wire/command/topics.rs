@@ -83,8 +83,8 @@ fn messages_are_published_once_so_many_times_or_until_a_signal() {
     let once = ["topic", "pub", "-1", "/joint_trajectory", point];
     let line = "publishing #1: {\"points\":[{\"positions\":[0.3,-0.5]}]}\n";
     assert_eq!(said(&runtime, &once), line);
-    let heard = client.message("/joint_trajectory");
-    assert_eq!(heard, json!({"points": [{"positions": [0.3, -0.5]}]}));
+    let received = client.message("/joint_trajectory");
+    assert_eq!(received, json!({"points": [{"positions": [0.3, -0.5]}]}));
     let fast = [
         "topic",
         "pub",

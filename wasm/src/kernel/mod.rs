@@ -182,7 +182,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// A message that the client publishes: subscribers are told of it, and so is the arm.
+    /// Delivers a message that the client publishes to its subscribers and to the arm.
     fn take_message(&mut self, name: &str, msg: &Payload, id: Option<&Payload>) {
         let topic = Topic::from_name(name);
         let Some(topic) = topic.filter(|topic| topic.direction() == Direction::Subscribed) else {

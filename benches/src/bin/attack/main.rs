@@ -34,7 +34,7 @@ struct Plan {
     bars: Bars,
     /// How often an attack is played until it is in time.
     tries: usize,
-    /// Parts of the names of what is played, between commas; all if empty.
+    /// Parts of the names of the attacks to play, separated by commas. All if empty.
     only: String,
 }
 
@@ -140,7 +140,7 @@ fn attacked(attack: &Attack, plan: &Plan, missed: &mut Vec<&'static str>) -> Res
     Ok(())
 }
 
-/// The program as the attack wants it, on a free port.
+/// The program with the options of the attack, on a free port.
 fn start(attack: &Attack, program: &str) -> Result<Program, String> {
     let mut arguments = vec!["--bind", "127.0.0.1:0", "--seed", "1"];
     if !attack.options.contains(&"--log") {

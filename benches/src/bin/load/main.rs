@@ -14,12 +14,12 @@ mod report;
 use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
-use fleet::{Fleet, Outcome, Pace, Scene};
+use fleet::{Fleet, Outcome, Scene, Traffic};
 use pendularm_benches::program::{Program, processor};
 use pendularm_benches::protocol::Protocol;
 
-/// How often the arm publishes, and so everybody here that does not flood.
-const RATE: Pace = Pace::Rate(60.0);
+/// The rate of the arm's topics, and of all publishers that do not flood.
+const RATE: Traffic = Traffic::Rate(60.0);
 
 /// The scenes that are played. The last of the fan-outs is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
@@ -27,49 +27,49 @@ const SCENES: [Scene; 8] = [
         name: "60 Hz to 1",
         topics: 1,
         subscribers: 1,
-        pace: RATE,
+        traffic: RATE,
     },
     Scene {
         name: "60 Hz to 10",
         topics: 1,
         subscribers: 10,
-        pace: RATE,
+        traffic: RATE,
     },
     Scene {
         name: "60 Hz to 100",
         topics: 1,
         subscribers: 100,
-        pace: RATE,
+        traffic: RATE,
     },
     Scene {
         name: "60 Hz to 1000",
         topics: 1,
         subscribers: 1000,
-        pace: RATE,
+        traffic: RATE,
     },
     Scene {
         name: "the arm to 1000",
         topics: 1,
         subscribers: 1000,
-        pace: Pace::Arm,
+        traffic: Traffic::Arm,
     },
     Scene {
         name: "flood 1 to 1",
         topics: 1,
         subscribers: 1,
-        pace: Pace::Flood,
+        traffic: Traffic::Flood,
     },
     Scene {
         name: "flood 4 to 4",
         topics: 4,
         subscribers: 1,
-        pace: Pace::Flood,
+        traffic: Traffic::Flood,
     },
     Scene {
         name: "flood 1 to 50",
         topics: 1,
         subscribers: 50,
-        pace: Pace::Flood,
+        traffic: Traffic::Flood,
     },
 ];
 
@@ -103,7 +103,7 @@ pub struct Played {
 
 /// Whether the arm's time and a caller's are looked at, too.
 fn is_probed(scene: &Scene) -> bool {
-    scene.subscribers >= 1000 || scene.pace == Pace::Flood
+    scene.subscribers >= 1000 || scene.traffic == Traffic::Flood
 }
 
 fn main() {
@@ -204,7 +204,7 @@ fn rest(server: &Server, seconds: f64) -> f64 {
 /// Plays a scene to each server in turn, as many rounds as planned; then once more with probes beside it.
 fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played)> {
     let takes_part =
-        |server: &&Server| scene.pace != Pace::Arm || server.protocol == Protocol::Pendularm;
+        |server: &&Server| scene.traffic != Traffic::Arm || server.protocol == Protocol::Pendularm;
     let servers: Vec<&Server> = servers.iter().filter(takes_part).collect();
     let mut played: Vec<(Protocol, Played)> = servers
         .iter()

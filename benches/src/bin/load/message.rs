@@ -1,6 +1,6 @@
 //! The message: a `JointState` as the arm itself publishes it, with a number and a time written into two of its values.
 //!
-//! **Invariant:** every message has the same length, and reads back what was written.
+//! **Invariant:** every message has the same length, and is read back as it was written.
 
 use std::sync::OnceLock;
 use std::time::Instant;

@@ -1,6 +1,6 @@
-//! A server under load as somebody else sees it: the time of a light request, and whether the arm keeps its time.
+//! A server under load, seen by another client: the time of a light request, and whether the arm keeps real time.
 //!
-//! **Invariant:** each probe has a connection and a thread of its own, and asks little.
+//! **Invariant:** each probe has its own connection and thread, and sends few requests.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -17,7 +17,7 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// A request, or the next message of the arm, that takes longer fails the run.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A thread that probes until it is told to stop.
+/// A thread that probes until `stop` is set.
 pub struct Probe<T> {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<T>,
@@ -60,30 +60,30 @@ pub fn caller(protocol: Protocol, address: SocketAddr) -> Probe<Vec<u32>> {
     })
 }
 
-/// Simulation time by wall time. The arm's `/clock` is heard late now and then, never early: so the earliest of the first second and
-/// of the last are compared.
+/// Simulation time by wall time. A message on `/clock` may be late, but never early. So the earliest of the first second
+/// and of the last are compared.
 pub fn clock(address: SocketAddr) -> Probe<f64> {
     Probe::start(move |stop| {
         let mut client = Client::connect(Protocol::Pendularm, address);
         let mut subscription = Vec::new();
         Protocol::Pendularm.subscribe("/clock", &mut subscription);
         client.stream.write_all(&subscription).expect("sent");
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         while !stop.load(Ordering::Relaxed) {
             let message = client.listen(PATIENCE, |event| match event {
                 Event::Message(payload) => Some((stamp(payload) as f64, now() as f64)),
                 _ => None,
             });
-            heard.push(message.expect("the arm publishes its time"));
+            received.push(message.expect("the arm publishes its time"));
         }
-        let second = heard.len().min(60);
+        let second = received.len().min(60);
         let earliest = |part: &[(f64, f64)]| {
             let by_delay = |a: &&(f64, f64), b: &&(f64, f64)| (a.1 - a.0).total_cmp(&(b.1 - b.0));
-            *part.iter().min_by(by_delay).expect("heard")
+            *part.iter().min_by(by_delay).expect("received")
         };
         let (first, last) = (
-            earliest(&heard[..second]),
-            earliest(&heard[heard.len() - second..]),
+            earliest(&received[..second]),
+            earliest(&received[received.len() - second..]),
         );
         (last.0 - first.0) / (last.1 - first.1)
     })

@@ -1,9 +1,9 @@
 //! The figures in words: a table for each scene, and the bars at the end.
 //!
-//! **Invariant:** what is compared is the median of the rounds, and the peer that it is compared with is the better one.
+//! **Invariant:** medians of the rounds are compared, with the better peer.
 
 use crate::Played;
-use crate::fleet::{Pace, Scene};
+use crate::fleet::{Scene, Traffic};
 use crate::message::Template;
 use pendularm_benches::protocol::Protocol;
 
@@ -92,9 +92,9 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
 
 pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     println!("\n=== summary");
-    // The arm's own topic has no peers: it stands beside the same fan-out between clients.
+    // The arm's own topic has no peers. It is compared with the same fan-out between clients.
     let peers_of = |scene: &Scene| {
-        let name = if scene.pace == Pace::Arm {
+        let name = if scene.traffic == Traffic::Arm {
             "60 Hz to 1000"
         } else {
             scene.name
@@ -166,8 +166,8 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
 /// Largest processor time for a delivery, as a share of the better peer's, and whether the time at rest is left out of
 /// it. With few subscribers that is most of the figure, and ours simulates an arm meanwhile.
 const fn most_of_peer(scene: &Scene) -> (f64, bool) {
-    match (scene.pace, scene.subscribers) {
-        (Pace::Flood, _) => (1.0, false),
+    match (scene.traffic, scene.subscribers) {
+        (Traffic::Flood, _) => (1.0, false),
         (_, 0..=10) => (1.5, true),
         (_, _) => (1.1, false),
     }

@@ -141,7 +141,7 @@ impl Row {
     }
 }
 
-/// Times by number of links, what was timed, and system.
+/// Times by number of links, kind of work, and system.
 type Rows = BTreeMap<(String, String, String), Row>;
 
 /// `system,links,"what",shortest,median` line by line; `what` may hold a comma.

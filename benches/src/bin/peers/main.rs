@@ -10,10 +10,10 @@
 //! `benches/peers/run.sh` calls them in this order. The peers' own programs are `benches/peers/*.cpp` and `*.c`; their
 //! `harness.h` has the same constants as this file. A result that strays from another's ends the run before any ratio.
 //!
-//! *Throughput*, *independent*: independent states; *chained*, and steps that do not say: every result moves the next state. A *step* is
-//! `increment` and two sums, under an effort held over the step; a *live step* is the arm's own, with compensated sums, clock and check
-//! for divergence, PID off. *Lanes* are many such live arms side by side, a lane of a register for each, over ADVANCE steps a call, or
-//! for forward dynamics all states, in columns.
+//! *Throughput* and *independent*: the states are independent. *Chained*, and steps without such a word: every result
+//! moves the next state. A *step* is `increment` and two sums, under an effort held over the step. A *live step* is the
+//! arm's own, with compensated sums, clock and check for divergence, PID off. *Lanes* are many such live arms side by
+//! side, a lane of a register for each, over ADVANCE steps a call. For forward dynamics they are all states, in columns.
 
 mod compare;
 
@@ -102,7 +102,7 @@ fn start<const N: usize>() -> State<N> {
     }
 }
 
-/// A step of an arm that is known to have weight, as the peers' is: nobody asks at each step what may be left out of it.
+/// A step of an arm with gravity, as in the peers. It omits the check for work that can be left out.
 #[inline(always)]
 fn step<const N: usize>(
     arm: &Arm<N>,

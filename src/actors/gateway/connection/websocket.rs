@@ -272,7 +272,7 @@ struct MonitoredStream<S> {
     stream: S,
     /// Time when the peer last took a byte.
     taken: Instant,
-    /// Bytes of the incoming message: those read since the last complete message, without control frames.
+    /// Bytes of the incoming message, read since the last complete message, without control frames.
     coming: usize,
     /// Bytes that may be read before other connections have a turn. They may be ten thousand empty frames without a
     /// message.

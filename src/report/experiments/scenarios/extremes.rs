@@ -122,7 +122,7 @@ fn huge_steps() -> Observation {
     each(cases)
 }
 
-/// The first joint at 1e8 rad, and at what is left of that without its whole turns.
+/// The first joint at 1e8 rad, and at the same angle without its whole turns.
 fn wound() -> Observation {
     /// The part of 2π that a double falls short of.
     const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;

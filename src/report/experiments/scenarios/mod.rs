@@ -5,8 +5,8 @@
 //! scene that falls short says so. `scenes.txt` has the expectations. `page/scenes.js` has the names, and a live arm
 //! for each.
 //!
-//! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. A seed in the source
-//! gives what is random.
+//! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds. Random values
+//! come from a seed in the source.
 
 mod extremes;
 mod loops;

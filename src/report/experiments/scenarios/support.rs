@@ -1,6 +1,6 @@
 //! A named scene, its observation, and the settings, states and comparisons that scenes share.
 //!
-//! **Invariant:** a seed in the source gives what is random, so a scene does the same every time.
+//! **Invariant:** random values come from a seed in the source, so a scene does the same every time.
 
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;

@@ -88,7 +88,7 @@ impl Consulting {
     async fn told(&mut self, topic: &str) -> Vec<Value> {
         self.client.settle().await;
         let told = self.client.messages(topic);
-        self.client.heard.clear();
+        self.client.received.clear();
         told
     }
 }

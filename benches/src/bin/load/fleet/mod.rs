@@ -15,7 +15,7 @@ use crate::message::Template;
 use pendularm_benches::program::{processor, resident};
 use pendularm_benches::protocol::Protocol;
 
-/// How long a server may take for what is asked of it before the run fails.
+/// Longest wait for a server. After that the run fails.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Before it is measured, a scene runs for so long.
 const WARM_UP: Duration = Duration::from_millis(500);
@@ -27,7 +27,7 @@ const WINDOW: u64 = 256;
 
 /// The publisher, and its rate.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Pace {
+pub enum Traffic {
     /// This many times a second.
     Rate(f64),
     /// As fast as the slowest subscriber takes them.
@@ -36,13 +36,13 @@ pub enum Pace {
     Arm,
 }
 
-/// Topics, each with one publisher and so many subscribers.
+/// Topics, each with one publisher and `subscribers` subscribers.
 #[derive(Clone, Copy)]
 pub struct Scene {
     pub name: &'static str,
     pub topics: usize,
     pub subscribers: usize,
-    pub pace: Pace,
+    pub traffic: Traffic,
 }
 
 /// The outcome of a scene.
@@ -92,15 +92,15 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Connects and subscribes everybody; returns when every subscription holds.
+    /// Connects and subscribes all clients. Returns when every subscription is active.
     pub fn open(protocol: Protocol, address: SocketAddr, scene: Scene) -> Self {
         let names = (0..scene.topics)
-            .map(|topic| match scene.pace {
-                Pace::Arm => "/joint_states".to_owned(),
+            .map(|topic| match scene.traffic {
+                Traffic::Arm => "/joint_states".to_owned(),
                 _ => format!("/load/topic{topic}"),
             })
             .collect();
-        let publishers = if scene.pace == Pace::Arm {
+        let publishers = if scene.traffic == Traffic::Arm {
             0
         } else {
             scene.topics
@@ -219,17 +219,17 @@ impl Fleet {
         }
     }
 
-    /// Sends what is due; gives the time until more may be.
+    /// Sends all due messages. Returns the time until the next ones may be due.
     fn publish(&mut self, now: Instant, next: &mut Instant) -> Duration {
-        match self.scene.pace {
-            Pace::Arm => Duration::from_millis(20),
-            Pace::Flood => {
+        match self.scene.traffic {
+            Traffic::Arm => Duration::from_millis(20),
+            Traffic::Flood => {
                 for topic in 0..self.scene.topics {
                     self.flood(topic);
                 }
                 Duration::from_millis(20)
             }
-            Pace::Rate(rate) => {
+            Traffic::Rate(rate) => {
                 if now >= *next {
                     let period = Duration::from_secs_f64(1.0 / rate);
                     // A tick that was missed is skipped.
@@ -270,7 +270,7 @@ impl Fleet {
     /// Waits until every subscriber has all that was sent to it, and checks that it is so.
     fn drain(&mut self) {
         let deadline = Instant::now() + PATIENCE;
-        if self.scene.pace == Pace::Arm {
+        if self.scene.traffic == Traffic::Arm {
             // A subscriber may be a message ahead of another: all have to reach the newest of now.
             let newest = self
                 .links

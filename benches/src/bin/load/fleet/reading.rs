@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use mio::{Events, Token};
 
-use super::{Fleet, Pace};
+use super::{Fleet, Traffic};
 use crate::message::{now, stamp};
 use pendularm_benches::protocol::Event;
 
@@ -68,7 +68,7 @@ impl Fleet {
             taken += length;
             let link = &mut self.links[number];
             match event {
-                Event::Message(payload) if self.scene.pace == Pace::Arm => {
+                Event::Message(payload) if self.scene.traffic == Traffic::Arm => {
                     let stamp = stamp(payload);
                     // A late one is followed at once by the next, and no step may be due between them: two may have one
                     // stamp, three not.
