@@ -36,7 +36,6 @@ mod http;
 mod launch;
 mod mishaps;
 mod options;
-mod order;
 mod places;
 #[cfg(target_os = "linux")]
 mod present;
