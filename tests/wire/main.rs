@@ -36,6 +36,7 @@ mod http;
 mod launch;
 mod mishaps;
 mod options;
+mod order;
 mod places;
 #[cfg(target_os = "linux")]
 mod present;

@@ -1,0 +1,92 @@
+//! The order of frames where the arm and the gateway run on threads of their own.
+//!
+//! **Invariant:** a race that is possible is given hundreds of chances.
+
+use crate::arm::{stamp, state_where};
+use crate::common::{Client, Runtime};
+use serde_json::{Value, json};
+
+fn call(service: &str, id: impl Into<Value>, args: Value) -> String {
+    let frame = json!({"op": "call_service", "service": service, "id": id.into(), "args": args});
+    format!("{frame}\n")
+}
+
+/// The first `/joint_states` after the response to this call.
+fn states_after<const N: usize>(client: &mut Client, service: &str, args: Value) -> [Value; N] {
+    client.send_bytes(call(service, "call", args).as_bytes());
+    client.receive_where("response", |frame| frame["id"] == "call");
+    client.kept.clear();
+    std::array::from_fn(|_| client.message("/joint_states"))
+}
+
+#[test]
+fn no_state_from_before_follows_the_response_to_a_pause() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    for _ in 0..15 {
+        client.message("/joint_states");
+        let [first, second] = states_after(&mut client, "/arm_sim/pause", json!({"data": true}));
+        assert_eq!(
+            first, second,
+            "the arm moved after the response to the pause"
+        );
+        client.ask("/arm_sim/pause", json!({"data": false}));
+    }
+}
+
+#[test]
+fn no_state_from_before_follows_the_response_to_a_reset() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    for round in 0..30 {
+        // A late arm makes up at most 250 ms: half a second is from before the reset.
+        let (paused, least) = if round % 2 == 0 {
+            (true, 0.1)
+        } else {
+            (false, 0.5)
+        };
+        state_where(&mut client, "a moving arm", |state| stamp(state) > least);
+        client.send_bytes(call("/arm_sim/pause", "pause", json!({"data": paused})).as_bytes());
+        let [after] = states_after(&mut client, "/arm_sim/reset", json!({}));
+        let after = stamp(&after);
+        assert!(
+            after == 0.0 || !paused && after < least,
+            "round {round}: {after} s"
+        );
+        client.ask("/arm_sim/pause", json!({"data": false}));
+    }
+}
+
+/// More than a chunk, and cut at lengths that have nothing to do with those of the messages.
+#[test]
+fn a_flood_arrives_whole_and_in_order_in_every_spelling() {
+    const AT_ONCE: u64 = 1000;
+    let runtime = Runtime::start();
+    let mut subscribers = ["/flood", "flood"].map(|topic| {
+        let mut client = runtime.connect();
+        client.subscribe(topic);
+        (client, topic)
+    });
+    let mut publisher = runtime.connect();
+    publisher.send(&json!({"op": "advertise", "topic": "/flood"}));
+    for first in (0..5000).step_by(AT_ONCE as usize) {
+        let line = |n: u64| match n % 100 {
+            // Spelled so that it has to be read.
+            98 => format!(
+                "{{\"msg\": {{\"n\":{n}}}, \"topic\": \"/flood\", \"op\": \"publish\"}}\r\n"
+            ),
+            _ => format!("{{\"op\":\"publish\",\"topic\":\"/flood\",\"msg\":{{\"n\":{n}}}}}\n"),
+        };
+        let stream: String = (first..first + AT_ONCE).map(line).collect();
+        for piece in stream.as_bytes().chunks(7919) {
+            publisher.send_bytes(piece);
+        }
+        for n in first..first + AT_ONCE {
+            for (client, topic) in &mut subscribers {
+                assert_eq!(client.message(topic)["n"], n);
+            }
+        }
+    }
+}
