@@ -135,26 +135,6 @@ const AT: State<2> = State {
     velocity: [0.75, -4.0],
 };
 
-/// Powers of two, so that every product and sum is exact.
-#[test]
-fn the_effort_is_the_sum_of_three_terms_with_this_steps_error_in_the_integral_already() {
-    let control = pid().control(&AT, 0.125);
-    assert_eq!(control.integral, [0.0625, -0.125]);
-    // kp e + ki I + kd ė, joint by joint.
-    assert_eq!(control.effort, [2.0 + 1.0 - 0.25, -8.0 - 0.25 + 4.0]);
-}
-
-#[test]
-fn the_law_changes_nothing_until_its_integral_is_committed() {
-    let mut pid = pid();
-    let before = pid.clone();
-    let control = pid.control(&AT, 0.125);
-    assert_eq!(pid, before);
-    pid.commit(control.integral);
-    assert_eq!(pid.integral(), &[0.0625, -0.125]);
-    assert_eq!(pid.control(&AT, 0.125).integral, [0.125, -0.25]);
-}
-
 #[test]
 fn the_integral_stops_at_its_limit_and_comes_back_from_it_at_once() {
     let mut pid = pid();
@@ -171,17 +151,6 @@ fn the_integral_stops_at_its_limit_and_comes_back_from_it_at_once() {
         pid.integral(),
         &[INTEGRAL_LIMIT - 1.0, 1.0 - INTEGRAL_LIMIT]
     );
-}
-
-#[test]
-fn going_from_off_to_on_zeroes_the_integral() {
-    let mut pid = pid();
-    pid.commit([3.0, -4.0]);
-    pid.enable(false);
-    assert!(!pid.is_enabled());
-    pid.enable(true);
-    assert!(pid.is_enabled());
-    assert_eq!(pid.integral(), &[0.0; 2]);
 }
 
 #[test]
@@ -211,16 +180,4 @@ fn changing_gains_or_setpoint_keeps_the_integral() {
     assert_eq!(pid.integral(), &[3.0, -4.0]);
     assert_eq!(pid.gains().kp, [1.0; 2]);
     assert_eq!(pid.setpoint(), &setpoint);
-}
-
-#[test]
-fn a_reset_forgets_setpoint_and_integral_and_keeps_gains_and_on() {
-    let mut pid = pid();
-    pid.commit([3.0, -4.0]);
-    let gains = *pid.gains();
-    pid.reset();
-    assert_eq!(pid.setpoint(), &Setpoint::default());
-    assert_eq!(pid.integral(), &[0.0; 2]);
-    assert_eq!(pid.gains(), &gains);
-    assert!(pid.is_enabled());
 }

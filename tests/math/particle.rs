@@ -142,23 +142,6 @@ fn bits(samples: &[f64]) -> Vec<u64> {
 }
 
 #[test]
-fn the_start_is_at_index_zero_and_every_step_adds_one_entry() {
-    for method in Method::ALL {
-        let particle = run("sin(t)", (2.5, -1.25), 0.1, 7, method);
-        assert_eq!(particle.time(0), 0.0);
-        assert_eq!(
-            (particle.positions()[0], particle.velocities()[0]),
-            (2.5, -1.25)
-        );
-        assert_eq!(particle.times().len(), 8);
-        assert_eq!(
-            (particle.positions().len(), particle.velocities().len()),
-            (8, 8)
-        );
-    }
-}
-
-#[test]
 fn times_are_multiples_of_the_timestep_and_not_running_sums() {
     let times: Vec<f64> = run("t", (0.0, 0.0), 0.1, 10, Method::Euler)
         .times()
@@ -178,20 +161,6 @@ fn forces_are_taken_at_multiples_of_the_timestep() {
     };
     assert!(before.is_finite());
     assert_eq!(*end, f64::NEG_INFINITY);
-}
-
-#[test]
-fn the_force_is_evaluated_once_twice_twice_and_four_times_a_step() {
-    for (method, each) in [
-        (Method::Euler, 1),
-        (Method::Midpoint, 2),
-        (Method::Verlet, 2),
-        (Method::Rk4, 4),
-    ] {
-        let particle = run("sin(t)", (0.0, 0.0), 0.1, 25, method);
-        assert_eq!(particle.evaluations(), 25 * each, "{method}");
-        assert_eq!(evaluations(25, method), 25 * each, "{method}");
-    }
 }
 
 #[test]

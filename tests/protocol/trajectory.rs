@@ -32,21 +32,6 @@ fn rejection(msg: &str) -> String {
 }
 
 #[test]
-fn the_documented_message_is_read() {
-    let msg = r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"joint_names":["joint1","joint2"],
-        "points":[{"positions":[0.3,-0.5],"velocities":[0.5,0],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}]}"#;
-    let raw = RawValue::from_string(msg.to_owned()).unwrap();
-    let setpoint = joint_trajectory(&raw, &["joint1", "joint2"]).unwrap();
-    assert_eq!(
-        setpoint,
-        SetpointRequest {
-            position: vec![0.3, -0.5],
-            velocity: vec![0.5, 0.0]
-        }
-    );
-}
-
-#[test]
 fn only_the_last_point_counts() {
     let setpoint = read(r#"{"points":[5,{"positions":"bad"},{"positions":[1,2,3]}]}"#).unwrap();
     assert_eq!(setpoint.position, [1.0, 2.0, 3.0]);

@@ -144,23 +144,6 @@ fn the_longest_message_takes_48_mib_at_worst() {
 }
 
 #[test]
-fn of_names_that_come_twice_the_last_counts() {
-    let tree = MessageTree::read(br#"{"b":1,"a":[2],"b":{"x":3},"a":4,"b":5}"#).unwrap();
-    let root = tree.root();
-    assert_eq!(root.get("b").and_then(Branch::as_u64), Some(5));
-    assert_eq!(root.get("c").map(value), None);
-    let members = root.members().unwrap();
-    assert!(!members.are_in_order());
-    let ordered: Vec<_> = members
-        .in_order()
-        .map(|(name, one)| (name, value(one)))
-        .collect();
-    assert_eq!(ordered, [("a", json!(4)), ("b", json!(5))]);
-    let twice = MessageTree::read(br#"{"a":1,"a":2}"#).unwrap();
-    assert!(!twice.root().members().unwrap().are_in_order());
-}
-
-#[test]
 fn a_value_is_found_at_the_end_of_its_way() {
     let tree = MessageTree::read(br#"{"a":[{"0":{"b":7}}],"":8}"#).unwrap();
     let at = |way: &str| tree.root().pointer(way).map(value);

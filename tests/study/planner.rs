@@ -25,12 +25,7 @@ fn swing(duration: f64, error: f64) -> Task<2> {
     }
 }
 
-/// The largest distance of the end effector from the reference, at fifty instants.
-fn error_of<const N: usize>(task: &Task<N>, law: &Law<N>, candidate: &Candidate) -> f64 {
-    error_within(task.duration, task, law, candidate)
-}
-
-/// The same within the first seconds.
+/// The largest distance of the end effector from the reference within the first seconds, at fifty instants.
 fn error_within<const N: usize>(
     span: f64,
     task: &Task<N>,
@@ -57,31 +52,6 @@ fn error_within<const N: usize>(
         .fold(0.0, f64::max)
 }
 
-#[test]
-fn a_planned_swing_keeps_within_its_error() {
-    for error in [1e-2, 1e-5, 1e-8] {
-        let task = swing(3.0, error);
-        let planned = plan(task).unwrap();
-        for candidate in &planned.candidates {
-            let seen = error_of(&task, &Law::FREE, candidate);
-            assert!(seen <= error, "{candidate:?}: {seen:e}");
-            assert!(
-                (seen - candidate.error).abs() <= 0.2 * error,
-                "{candidate:?}: {seen:e}"
-            );
-        }
-        // Order 4 is the cheapest wherever much is asked.
-        let best = planned.best;
-        assert!(error > 1e-3 || best.method == Method::Rk4, "{planned:?}");
-        // A step a half longer is too long.
-        let longer = Candidate {
-            timestep: task.duration / (task.duration / (1.5 * best.timestep)).ceil(),
-            ..best
-        };
-        assert!(error_of(&task, &Law::FREE, &longer) > error, "{planned:?}");
-    }
-}
-
 /// Under control the held effort causes the error, so that the method with the fewest evaluations
 /// wins.
 #[test]
@@ -95,7 +65,8 @@ fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant(
     };
     let planned = plan(task).unwrap();
     for candidate in &planned.candidates {
-        let seen = error_of(&task, &Law::Continuous(gains, setpoint), candidate);
+        let law = Law::Continuous(gains, setpoint);
+        let seen = error_within(task.duration, &task, &law, candidate);
         assert!(seen <= task.error, "{candidate:?}: {seen:e}");
     }
     let best = planned.best;

@@ -1,4 +1,5 @@
-//! The largest stable timestep, predicted by linearisation: against 50-digit values, closed forms, and runs of the arm.
+//! The largest stable timestep, predicted by linearisation: against 50-digit values, closed forms, and the growth per control
+//! period. `properties/limits.rs` has runs of the arm.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -6,7 +7,7 @@ use pendularm::math::arm::Arm;
 use pendularm::math::dynamics::mass_matrix;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::report::experiments::measure::{LimitPair, growth_per_period};
+use pendularm::report::experiments::measure::growth_per_period;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::{Linear, equilibrium};
 use pendularm::study::stability::{
@@ -191,49 +192,6 @@ fn the_limits_of_the_arm_are_the_stored_ones() {
     }
     println!("worst {worst:e}");
     assert!(worst < 1e-10);
-}
-
-/// Gains of three kinds, and a full controller.
-const KINDS: [(&str, f64, f64, f64); 4] = [
-    ("mild", 50.0, 0.0, 10.0),
-    ("stiff", 1e4, 0.0, 1e2),
-    ("overdamped", 1e2, 0.0, 1e4),
-    ("integral", 1e3, 2e3, 1e2),
-];
-
-fn measure_all<const N: usize>(pose: [f64; N]) -> f64 {
-    let mut worst: f64 = 0.0;
-    for (kind, kp, ki, kd) in KINDS {
-        let gains = Gains {
-            kp: [kp; N],
-            ki: [ki; N],
-            kd: [kd; N],
-        };
-        let control = ControlLoop::new(Arm::default(), gains, Setpoint::at(pose));
-        for method in Method::ALL {
-            for sampling in Sampling::ALL {
-                let control = control.with_method(method);
-                let limit = LimitPair::of_timestep(&control, sampling);
-                let error = limit.off().unwrap();
-                println!(
-                    "{N} {kind} {method} {}: {limit}, {error:.1e}",
-                    sampling.name()
-                );
-                worst = worst.max(error);
-            }
-        }
-    }
-    worst
-}
-
-/// The measurement separates decay from growth to 2e-5; the nonlinear part of a deviation of 1e-6 to 1e-3 rad is below
-/// a thousandth.
-#[test]
-fn the_arm_itself_has_the_limits_that_are_predicted() {
-    let bent = measure_all([0.5, 0.8]).max(measure_all([0.5, 0.8, -0.6]));
-    let straight = measure_all([0.3, 0.0]).max(measure_all([-1.2, 0.0, 0.0]));
-    println!("worst {:e}", bent.max(straight));
-    assert!(bent.max(straight) < 1e-3);
 }
 
 /// Sampled control on a single inertia, in the shipped order (the integral takes up the error before it is used), with the

@@ -149,35 +149,56 @@ fn ops(text: &str) -> Vec<Value> {
     ops
 }
 
+/// The runtime's own messages carry clients' texts too.
 #[test]
 fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it_was() {
-    let (runtime, folder) = talkative("hostile_log_tcp", "text");
-    for text in HOSTILE {
+    for format in ["text", "json"] {
+        let (runtime, folder) = talkative(&format!("hostile_log_{format}"), format);
+        let mut listener = Client::to(runtime.address);
+        for topic in ["/rosout", "/diagnostics"] {
+            listener.subscribe(topic);
+        }
+        for text in HOSTILE {
+            let mut client = Client::to(runtime.address);
+            for op in ops(text) {
+                client.send(&op);
+            }
+            client.send(&json!({"op": "set_level", "level": "info"}));
+            client.send(&json!({"op": "subscribe", "topic": text, "id": text}));
+            client.send(&json!({"op": "advertise", "topic": text}));
+            client.send(&json!({"op": "publish", "topic": text, "msg": {"last": text}}));
+            let last = client.receive_where("message", |frame| frame["msg"]["last"] == text);
+            assert_eq!(last["topic"], text);
+            for frame in &client.kept {
+                let id = &frame["id"];
+                assert!(
+                    id.is_null() || id == text || id == &json!({text: [text]}),
+                    "{frame}"
+                );
+            }
+            // Text that is no JSON at all, in a line of its own and as a first one.
+            client.send_bytes(format!("{text}\n").as_bytes());
+            client.settle();
+            Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
+        }
         let mut client = Client::to(runtime.address);
-        for op in ops(text) {
-            client.send(&op);
-        }
-        client.send(&json!({"op": "set_level", "level": "info"}));
-        client.send(&json!({"op": "subscribe", "topic": text, "id": text}));
-        client.send(&json!({"op": "advertise", "topic": text}));
-        client.send(&json!({"op": "publish", "topic": text, "msg": {"last": text}}));
-        let last = client.receive_where("message", |frame| frame["msg"]["last"] == text);
-        assert_eq!(last["topic"], text);
-        for frame in &client.kept {
-            let id = &frame["id"];
-            assert!(
-                id.is_null() || id == text || id == &json!({text: [text]}),
-                "{frame}"
-            );
-        }
-        // Text that is no JSON at all, in a line of its own and as a first one.
-        client.send_bytes(format!("{text}\n").as_bytes());
+        client.send(&json!({"op": "\u{202e}".repeat(LINE_BYTES)}));
         client.settle();
-        Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
+        // `message` fails on a frame that is not JSON on one line.
+        let status = listener.message("/diagnostics");
+        for frame in listener.kept.iter().chain([&status]) {
+            assert!(!frame.to_string().contains("forged"), "{frame}");
+        }
+        let entries: Vec<_> = fs::read_dir(&folder).unwrap().collect();
+        assert!(entries.is_empty(), "{entries:?}");
+        let log = end_of(runtime);
+        if format == "text" {
+            assert_records(&log);
+        } else {
+            assert_objects(&log);
+            assert!(log.contains("\"level\":\"DEBUG\"") && log.contains("\"connection\":"));
+        }
     }
-    let entries: Vec<_> = fs::read_dir(&folder).unwrap().collect();
-    assert!(entries.is_empty(), "{entries:?}");
-    assert_records(&end_of(runtime));
 }
 
 /// The pipe takes 64 KiB, and the queue its lines. Each client that comes is a line.
@@ -273,52 +294,6 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
     assert_records(&log);
     assert!(
         log.contains("request refused") && log.contains("caf\u{e9}."),
-        "{log}"
-    );
-}
-
-/// A message on the runtime's own topics that carries a client's text is JSON like any other.
-#[test]
-fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
-    let (runtime, _) = talkative("hostile_log_topics", "text");
-    let mut listener = Client::to(runtime.address);
-    for topic in ["/rosout", "/diagnostics"] {
-        listener.subscribe(topic);
-    }
-    for text in HOSTILE {
-        let mut client = Client::to(runtime.address);
-        for op in ops(text) {
-            client.send(&op);
-        }
-        client.send(&json!({"op": "call_service", "service": "/arm_sim/pause", "id": "end"}));
-        client.receive_where("end", |frame| frame["id"] == "end");
-    }
-    // `receive` fails on what is no JSON on one line.
-    let status = listener.message("/diagnostics");
-    for frame in listener.kept.iter().chain([&status]) {
-        assert!(!frame.to_string().contains("forged"), "{frame}");
-    }
-    assert_records(&end_of(runtime));
-}
-
-#[test]
-fn as_json_each_line_of_the_log_is_one_object_whatever_is_sent() {
-    let (runtime, _) = talkative("hostile_log_json", "json");
-    for text in HOSTILE {
-        let mut client = Client::to(runtime.address);
-        for op in ops(text) {
-            client.send(&op);
-        }
-        client.settle();
-    }
-    let long = "\u{202e}".repeat(LINE_BYTES);
-    let mut client = Client::to(runtime.address);
-    client.send(&json!({"op": long, "topic": long}));
-    client.settle();
-    let log = end_of(runtime);
-    assert_objects(&log);
-    assert!(
-        log.contains("\"level\":\"DEBUG\"") && log.contains("\"connection\":"),
         "{log}"
     );
 }

@@ -113,20 +113,3 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
         });
     }
 }
-
-/// Four clients that send requests without a pause until a second has passed.
-#[test]
-fn the_tick_comes_while_clients_step_without_end() {
-    in_virtual_time(async {
-        let bench = TurnsBench::paused().await;
-        let mut asked = 0;
-        for _ in 0..1000 {
-            while asked < bench.answered() + 4 {
-                bench.step(asked as u64 % 4, MAX_STEPS);
-                asked += 1;
-            }
-            advance(Duration::from_millis(1)).await;
-        }
-        bench.assert_ticks(1000, "steps without end");
-    });
-}

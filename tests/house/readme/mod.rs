@@ -40,7 +40,7 @@ fn the_readme_is_read_in_one_sitting() {
 }
 
 #[test]
-fn the_papers_list_every_option_of_the_help_with_its_variable() {
+fn the_papers_list_every_option_of_the_help_with_its_variable_and_default() {
     let help = printed(Command::new(env!("CARGO_BIN_EXE_pendularm")).arg("--help"));
     let rows = table(&text("docs/command-line.md"), "option");
     for row in &rows {
@@ -49,7 +49,11 @@ fn the_papers_list_every_option_of_the_help_with_its_variable() {
             line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
         });
         let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
-        assert!(line.contains(&format!("[env: {variable}]")), "{line}");
+        let mut expected = format!("[env: {variable}]");
+        if let Some(default) = codes(&row[2]).first() {
+            expected += &format!(" [default: {default}]");
+        }
+        assert!(line.ends_with(&expected), "{line}");
     }
     assert_eq!(help.matches("[env: ").count(), rows.len());
 }

@@ -1,4 +1,5 @@
-//! Expressions that are accepted: their values, how many nodes they have and how they are printed.
+//! Expressions that are accepted: their values, how many nodes they have and how they are printed. `properties.rs` has the operators and
+//! functions, and the rules `function-1` to `function-7` of the conformance tests have the precedences.
 //!
 //! **Invariant:** nothing here is rejected.
 
@@ -8,40 +9,8 @@ use super::{T, parse, value};
 #[allow(clippy::too_many_lines, reason = "a table")]
 fn every_text_of_the_table_has_its_value() {
     let table = [
-        // The specifications examples are valid.
-        ("t", T),
-        ("sin(t)", T.sin()),
-        ("t^2 + 3*t - 1", T.powf(2.0) + 3.0 * T - 1.0),
-        ("-t + 1", -T + 1.0),
-        // Plus minus times divide and power are what they are.
-        ("5+3", 8.0),
-        ("5-3", 2.0),
-        ("5*3", 15.0),
-        ("6/4", 1.5),
-        ("5^3", 125.0),
-        // Sums and products group from the left.
-        ("10-4-3", 3.0),
-        ("10-4+3", 9.0),
-        ("1-2-3-4", -8.0),
-        ("24/4/2", 3.0),
-        ("24/4*2", 12.0),
-        ("64/4/2/2", 4.0),
         // Rounding tells the groupings apart: (0.1 + 0.2) + 0.3 is one ulp above 0.1 + (0.2 + 0.3).
         ("0.1+0.2+0.3", 0.600_000_000_000_000_1),
-        // Powers group from the right.
-        ("2^3^2", 512.0),
-        ("2^2^2^2", 65536.0),
-        ("(2^3)^2", 64.0),
-        // Products bind tighter than sums.
-        ("1+2*3", 7.0),
-        ("2*3+1", 7.0),
-        ("7-6/2", 4.0),
-        ("1+2*3-8/4", 5.0),
-        // Powers bind tighter than products.
-        ("2*3^2", 18.0),
-        ("3^2*2", 18.0),
-        ("36/3^2", 4.0),
-        ("2^3*2^2", 32.0),
         // Unary minus binds tighter than power.
         ("-2^2", 4.0),
         ("-t^2", (-T).powf(2.0)),
@@ -68,14 +37,6 @@ fn every_text_of_the_table_has_its_value() {
         ("- - t", T),
         ("2---1", 1.0),
         ("2^--1", 2.0),
-        // Parentheses override every precedence.
-        ("(1+2)*3", 9.0),
-        ("10-(4-3)", 9.0),
-        ("24/(4/2)", 12.0),
-        ("(2*3)^2", 36.0),
-        ("2^(1+2)", 8.0),
-        ("(((t)))", T),
-        ("((1+2)*(3+4))", 21.0),
         // Literals may leave out either side of the point.
         ("0", 0.0),
         ("7", 7.0),
@@ -104,14 +65,6 @@ fn every_text_of_the_table_has_its_value() {
         ("1e99999999999999999999999999", f64::INFINITY),
         ("0e99999999999999999999999999", 0.0),
         ("1e-99999999999999999999999999", 0.0),
-        // Every named function is the standard one.
-        ("sin(t)", T.sin()),
-        ("cos(t)", T.cos()),
-        ("tan(t)", T.tan()),
-        ("exp(t)", T.exp()),
-        ("sqrt(t)", T.sqrt()),
-        ("ln(t)", T.ln()),
-        ("abs(-t)", T),
         // Functions nest and combine.
         ("exp(-t)*cos(5*t)", (-T).exp() * (5.0 * T).cos()),
         ("sqrt(abs(sin(-t)))", (-T).sin().abs().sqrt()),

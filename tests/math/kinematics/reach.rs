@@ -72,18 +72,6 @@ proptest! {
     }
 
     #[test]
-    fn three_links_round_trip_at_every_distance_and_ratio_without_an_orientation(
-        lengths in [length(), length(), length()],
-        share in share(),
-        bearing in -PI..=PI,
-        present in [angle(), angle(), angle()],
-    ) {
-        let Reach { inner, outer } = Reach::of(&lengths);
-        let DVec2 { x, y } = (inner + share * (outer - inner)) * DVec2::from_angle(bearing);
-        check_round_trip(&lengths, &present, &at(x, y));
-    }
-
-    #[test]
     fn three_links_return_to_every_pose_that_they_can_have(
         lengths in [length(), length(), length()],
         pose in [angle(), angle(), angle()],

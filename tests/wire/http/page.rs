@@ -1,13 +1,11 @@
-//! The page and its files: their types, their policy, one connection for all of them, and where they are.
+//! The page and its files: their types, their policy, and where they are. `tests/actors/web/http.rs` has many requests over one connection.
 
 use std::collections::BTreeSet;
-use std::io::{Read, Write};
-use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::common::{Logged, PATIENCE, Runtime, program};
-use crate::web_client::{Answer, folder, get, handshake, rest, try_handshake};
+use crate::common::{Logged, Runtime, program};
+use crate::web_client::{folder, get, handshake, try_handshake};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -40,33 +38,6 @@ fn the_page_and_its_files_are_served_with_their_types() {
         assert_eq!(file.body, *bytes, "{name}");
     }
     assert_eq!(get(runtime.address, "/index.html").status, 404);
-}
-
-/// As a browser does.
-#[test]
-fn all_files_of_the_page_come_over_one_connection() {
-    // A report in the working directory would add a link to the page.
-    let runtime = Runtime::with(&["--report", "no-report"]);
-    let mut stream = TcpStream::connect(runtime.address).unwrap();
-    stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let mut came = Vec::new();
-    for (name, bytes) in ASSETS {
-        let path = name.trim_end_matches("index.html");
-        let request = format!("GET /{path} HTTP/1.1\r\nHost: {}\r\n\r\n", runtime.address);
-        stream.write_all(request.as_bytes()).unwrap();
-        came.clear();
-        while !came.ends_with(b"\r\n\r\n") {
-            let mut byte = [0];
-            stream.read_exact(&mut byte).unwrap();
-            came.push(byte[0]);
-        }
-        let mut body = vec![0; bytes.len()];
-        stream.read_exact(&mut body).unwrap();
-        came.extend(body);
-        assert_eq!(Answer::parse(&came).body, *bytes, "{name}");
-    }
-    stream.shutdown(Shutdown::Write).unwrap();
-    assert!(rest(&mut stream).is_empty());
 }
 
 #[test]
