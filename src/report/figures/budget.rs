@@ -94,8 +94,8 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
     };
     let period = seconds(rk4.timestep);
     section.find(format!(
-        "**Against a law that acts at every instant, Euler is off by {} rad at {period} on {REACH}, and RK4 by {} \
-         rad**. Both hold their effort for a step. {}.",
+        "**Against a law that acts at every instant, Euler is off by {} rad and RK4 by {} rad**. The timestep is \
+         {period}, on {REACH}. Both hold their effort for a step. {}.",
         scientific(euler.total),
         scientific(rk4.total),
         if euler.total < 0.9 * rk4.total {
@@ -105,9 +105,9 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
         }
     ));
     section.find(format!(
-        "**On {REACH}, at a control period of {period}, holding the effort costs {} rad, RK4's truncation {} and \
-         rounding {}**. The hold is measured against a law that acts at every instant. A better method cannot recover \
-         the loss of the control period.",
+        "**Holding the effort costs {} rad, RK4's truncation {} and rounding {}**. These are errors at a control \
+         period of {period}, on {REACH}. The hold is measured against a law that acts at every instant. A better \
+         method cannot recover the loss of the control period.",
         scientific(rk4.hold),
         scientific(rk4.truncation),
         scientific(rk4.rounding)
