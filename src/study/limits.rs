@@ -152,18 +152,16 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
             (held, least, runs_away) = (bound, bound, false);
         }
     } else if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
-        let known = (None, here);
-        let (found, pose) = smallest_of_all_poses(control, None, known).await;
+        let (found, pose) = smallest_of_all_poses(control, None, (None, here)).await;
         runaway = found.map(|_| pose);
     }
     let mut agrees = is_near(bound, least);
     if !agrees {
         // All poses, or only those without gravity if some pose with gravity is unstable.
-        let arm = match runaway {
-            Some(_) => control.arm.weightless(),
-            None => control.arm,
-        };
-        let searched = ControlLoop { arm, ..control };
+        let mut searched = control;
+        if runaway.is_some() {
+            searched.arm = control.arm.weightless();
+        }
         let known = (least, worst);
         (least, worst) = smallest_of_all_poses(searched, Some(Sampling::Held), known).await;
         agrees = is_near(bound, least);
