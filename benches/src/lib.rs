@@ -5,3 +5,5 @@ pub mod healthy;
 pub mod program;
 pub mod protocol;
 pub mod random;
+#[cfg(feature = "library")]
+pub mod step_scene;

@@ -89,6 +89,12 @@ impl<const N: usize> Arm<N> {
         Ok(Self::valid(lengths, masses, gravity))
     }
 
+    /// The same arm without gravity.
+    #[must_use]
+    pub fn weightless(&self) -> Self {
+        Self::valid(self.lengths, self.masses, 0.0)
+    }
+
     fn valid(lengths: [f64; N], masses: [f64; N], gravity: f64) -> Self {
         let mut rods = lengths.map(|length| Rod {
             length,

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use super::svg::{HEIGHT, Key, Marker, Plot, STYLE, WIDTH, csv, escape, lines};
 use crate::math::count::length_in_f64;
-use crate::math::integrator::Method;
 
 /// One part of the report.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -168,11 +167,6 @@ impl Table {
     }
 }
 
-/// A column for each method, and others before them.
-pub(crate) fn by_method<'a>(before: &[&'a str]) -> Vec<&'a str> {
-    [before, &Method::ALL.map(Method::name)].concat()
-}
-
 /// A cell: its text, a line of detail under it, and a class that colours it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
@@ -187,11 +181,6 @@ impl Cell {
             text: text.into(),
             ..Self::default()
         }
-    }
-
-    /// A method's name in its colour.
-    pub(crate) fn method(method: Method) -> Self {
-        Self::new(method.name()).class(method.name())
     }
 
     pub(crate) fn detail(self, detail: impl Into<String>) -> Self {

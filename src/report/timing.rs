@@ -11,23 +11,9 @@ use std::time::Instant;
 
 use crate::math::count::whole;
 
-/// The least and the largest number of repeats, and their total time \[s\].
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Effort {
-    pub(crate) least: usize,
-    pub(crate) most: usize,
-    pub(crate) seconds: f64,
-}
-
-impl Effort {
-    pub(crate) const fn new(least: usize, most: usize, seconds: f64) -> Self {
-        Self {
-            least,
-            most,
-            seconds,
-        }
-    }
-}
+/// The least and the largest number of repeats.
+const LEAST: usize = 3;
+const MOST: usize = 25;
 
 /// Repeats of one computation \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,19 +23,17 @@ pub(crate) struct Timing {
     pub(crate) quartiles: (f64, f64),
 }
 
-/// Times repeats of `work`.
-pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
+/// Times repeats of `work`, of about `seconds` in all.
+pub(crate) fn time<T>(seconds: f64, mut work: impl FnMut() -> T) -> Timing {
     let started = Instant::now();
     black_box(work());
     // Short computations are repeated within one measurement, or the clock itself would be measured.
     const SHORTEST: f64 = 20e-6;
     let once = started.elapsed().as_secs_f64().max(1e-9);
     let batch = (SHORTEST / once).ceil().clamp(1.0, 1000.0);
-    let mut times = Vec::with_capacity(effort.most);
+    let mut times = Vec::with_capacity(MOST);
     let started = Instant::now();
-    while times.len() < effort.most
-        && (times.len() < effort.least || started.elapsed().as_secs_f64() < effort.seconds)
-    {
+    while times.len() < MOST && (times.len() < LEAST || started.elapsed().as_secs_f64() < seconds) {
         let start = Instant::now();
         for _ in 0..whole(batch) {
             black_box(work());

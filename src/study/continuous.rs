@@ -95,17 +95,10 @@ impl<const N: usize> ContinuousLoop<N> {
             &rates,
             self.control.timestep,
         );
-        self.take(
-            &std::array::from_fn(|i| moved[i]),
-            &std::array::from_fn(|i| changed[i]),
-            &std::array::from_fn(|i| moved[N + i]),
-        )
-    }
-
-    fn take(&mut self, dq: &[f64; N], dv: &[f64; N], ds: &[f64; N]) -> bool {
+        let [dq, dv] = [moved, changed].map(|change| std::array::from_fn(|i| change[i]));
         let (state, carry) = (&self.state, &self.carry);
-        let (position, position_carry) = add_carried(&state.position, &carry.position, dq);
-        let (velocity, velocity_carry) = add_carried(&state.velocity, &carry.velocity, dv);
+        let (position, position_carry) = add_carried(&state.position, &carry.position, &dq);
+        let (velocity, velocity_carry) = add_carried(&state.velocity, &carry.velocity, &dv);
         let next = State { position, velocity };
         let finite = next.is_finite();
         if finite {
@@ -116,7 +109,7 @@ impl<const N: usize> ContinuousLoop<N> {
                 velocity: velocity_carry,
             };
             self.integral = std::array::from_fn(|i| {
-                (self.integral[i] + ds[i]).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+                (self.integral[i] + moved[N + i]).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
             });
         }
         finite

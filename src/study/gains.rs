@@ -262,7 +262,7 @@ fn template<const N: usize>() -> Gains<N> {
 /// geometrically with the smallest effective inertia in any pose while the others are free.
 fn inertia<const N: usize>(arm: &Arm<N>, weight: f64) -> [f64; N] {
     let mass = mass_matrix(arm, &[0.0; N]);
-    let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
+    let weightless = arm.weightless();
     let free = |i: usize| {
         let unit = std::array::from_fn(|j| f64::from(u8::from(i == j)));
         let quickest = (0..=4).flat_map(|one| (0..=4).map(move |other| (one, other)));

@@ -8,7 +8,7 @@ use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
 use super::motion::Motion;
 use super::paused::{at_once, pause};
-use super::poses::{self, PoseCandidate, Sought, smallest_of_all_poses};
+use super::poses::{self, PoseCandidate, smallest_of_all_poses};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
@@ -152,18 +152,18 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
             (held, least, runs_away) = (bound, bound, false);
         }
     } else if control.integrating().contains(&true) && control.arm.gravity() > 0.0 {
-        let known = (None, here);
-        let (found, pose) = smallest_of_all_poses(control, Sought::Runaway, known).await;
+        let (found, pose) = smallest_of_all_poses(control, None, (None, here)).await;
         runaway = found.map(|_| pose);
     }
     let mut agrees = is_near(bound, least);
     if !agrees {
         // All poses, or only those without gravity if some pose with gravity is unstable.
-        let sought = match runaway {
-            Some(_) => Sought::WeightlessLimit,
-            None => Sought::Limit(Sampling::Held),
-        };
-        (least, worst) = smallest_of_all_poses(control, sought, (least, worst)).await;
+        let mut searched = control;
+        if runaway.is_some() {
+            searched.arm = control.arm.weightless();
+        }
+        let known = (least, worst);
+        (least, worst) = smallest_of_all_poses(searched, Some(Sampling::Held), known).await;
         agrees = is_near(bound, least);
     }
     let useful = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
@@ -195,8 +195,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         limits.critical = critical(&worst.linear(&control), method, limit);
     }
     pause().await;
-    let sought = Sought::Limit(Sampling::Continuous);
-    let found = smallest_of_all_poses(control, sought, (continuous, here)).await;
+    let known = (continuous, here);
+    let found = smallest_of_all_poses(control, Some(Sampling::Continuous), known).await;
     limits.minimum_continuous = found.0;
     limits
 }

@@ -21,7 +21,6 @@ pub use super::control_loop::no_control;
 pub(crate) use super::equilibrium::gravity_gradient;
 pub use super::equilibrium::{Equilibrium, equilibrium};
 use super::matrix::Matrix;
-use crate::math::arm::Arm;
 use crate::math::dynamics::forward_dynamics;
 
 /// The arm and its control law, linear in the deviation from a pose.
@@ -47,7 +46,7 @@ impl Linear {
         integrating: &[bool; N],
     ) -> Self {
         let ControlLoop { arm, gains, .. } = control;
-        let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
+        let weightless = arm.weightless();
         let solve = |effort: [f64; N]| forward_dynamics(&weightless, position, &[0.0; N], &effort);
         let gradient = gravity_gradient(arm, position);
         let mut gravity = Matrix::zeros(N);

@@ -58,7 +58,7 @@ impl Motion {
             method,
             ..
         } = control;
-        let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
+        let weightless = arm.weightless();
         // The load of every joint is largest for the arm stretched along the horizontal.
         let load = gravity_load(arm, &[0.0; N]);
         let (mut peaks, mut stored, mut driven) = (0.0, 0.0, 0.0);

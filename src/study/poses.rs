@@ -9,8 +9,8 @@
 //! are then the cause.
 //!
 //! An arm whose joints integrate can be sent to every pose, also to unstable ones. Towards the border of unstable poses
-//! the limit falls to zero. They are therefore searched first ([`Sought::Runaway`]), by ascending the largest real part
-//! of any mode in continuous time.
+//! the limit falls to zero. They are therefore searched first, by ascending the largest real part of any mode in
+//! continuous time.
 //!
 //! **Invariant:** the work is bounded: [`cells`] poses, and at most one climb from each.
 
@@ -66,28 +66,18 @@ impl<const N: usize> PoseCandidate<N> {
     }
 }
 
-/// The object of a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sought {
-    /// The smallest limit, of poses with gravity and without.
-    Limit(Sampling),
-    /// The smallest limit of poses without gravity, effort held.
-    WeightlessLimit,
-    /// A pose that is unstable in continuous time: its limit is zero.
-    Runaway,
-}
-
 /// The smallest limit of all poses and of a known one \[s\], with its pose; `None` if there is no limit. A pose that is
-/// unstable in continuous time has a limit of zero. The search pauses after every pose.
+/// unstable in continuous time has a limit of zero. Without `sampling` such a pose is sought, and no other. The search
+/// pauses after every pose.
 pub(super) async fn smallest_of_all_poses<const N: usize>(
     control: ControlLoop<N>,
-    sought: Sought,
+    sampling: Option<Sampling>,
     known: (Option<f64>, PoseCandidate<N>),
 ) -> (Option<f64>, PoseCandidate<N>) {
     let (smallest, worst) = known;
     let mut search = PoseSearch {
         control,
-        sought,
+        sampling,
         smallest,
         worst,
     };
@@ -102,7 +92,8 @@ pub(super) const fn most_bytes<const N: usize>() -> usize {
 
 struct PoseSearch<const N: usize> {
     control: ControlLoop<N>,
-    sought: Sought,
+    /// When the law runs for the sought limit; `None` if an unstable pose is sought.
+    sampling: Option<Sampling>,
     /// The smallest so far \[s\]; `None` while there is no limit.
     smallest: Option<f64>,
     /// The pose of that value.
@@ -111,7 +102,7 @@ struct PoseSearch<const N: usize> {
 
 impl<const N: usize> PoseSearch<N> {
     async fn run(&mut self) {
-        if self.sought != Sought::Runaway {
+        if self.sampling.is_some() {
             for (_, judged) in grid_poses(self.turns()) {
                 self.judge(&judged);
                 pause().await;
@@ -144,21 +135,12 @@ impl<const N: usize> PoseSearch<N> {
 
     /// Whether an unstable pose is sought and was found.
     fn is_found(&self) -> bool {
-        self.sought == Sought::Runaway && self.smallest.is_some()
-    }
-
-    /// The sampling of the sought limit; `None` if an unstable pose is sought.
-    fn sampling(&self) -> Option<Sampling> {
-        match self.sought {
-            Sought::Limit(sampling) => Some(sampling),
-            Sought::WeightlessLimit => Some(Sampling::Held),
-            Sought::Runaway => None,
-        }
+        self.sampling.is_none() && self.smallest.is_some()
     }
 
     /// Analyses per pose of the outer joints. Without gravity the angle of the first joint has no effect.
     fn turns(&self) -> usize {
-        if self.control.arm.gravity() == 0.0 || self.sought == Sought::WeightlessLimit {
+        if self.control.arm.gravity() == 0.0 {
             1
         } else {
             DIRECTIONS + 1
@@ -166,7 +148,7 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     fn judge(&mut self, judged: &PoseCandidate<N>) {
-        let Some(sampling) = self.sampling() else {
+        let Some(sampling) = self.sampling else {
             return;
         };
         let linear = judged.linear(&self.control);
@@ -194,7 +176,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Growth at the smallest limit so far, or in continuous time if an unstable pose is sought.
     fn growth(&mut self, judged: &PoseCandidate<N>) -> f64 {
         let linear = judged.linear(&self.control);
-        let Some(sampling) = self.sampling() else {
+        let Some(sampling) = self.sampling else {
             let modes = Modes::of(&linear);
             if modes.run_away() {
                 self.smallest = Some(0.0);
@@ -231,7 +213,7 @@ impl<const N: usize> PoseSearch<N> {
             let growth_there = self.growth(&next);
             if growth_there > growth {
                 (at, growth, failed) = (next, growth_there, 0);
-                if growth > NEUTRAL && self.sought != Sought::Runaway {
+                if growth > NEUTRAL && self.sampling.is_some() {
                     self.judge(&at);
                     growth = self.growth(&at);
                 }

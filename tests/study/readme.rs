@@ -68,7 +68,7 @@ fn the_timestep_and_the_evaluations_are_runs() {
 fn the_parts_of_the_error_are_runs() {
     let parts = Budget::new(true, 2.0).parts(&[Method::Rk4], 2048)[0];
     agrees(STUDY, "at a control period of ", parts.timestep, 3);
-    agrees(STUDY, "holding the effort costs ", parts.hold, 2);
+    agrees(STUDY, "Holding the effort costs ", parts.hold, 2);
     agrees(STUDY, "RK4's truncation ", parts.truncation, 2);
     agrees(STUDY, "and rounding ", parts.rounding, 2);
 }

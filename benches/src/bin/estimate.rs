@@ -10,8 +10,8 @@ use std::hint::black_box;
 
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
-use pendularm::report::experiments::step_scene::ready;
 use pendularm::study::error_estimate::estimate;
+use pendularm_benches::step_scene::ready;
 
 /// The arm under its controller, stepped by Runge-Kutta 4.
 fn estimates<const N: usize>(count: u64)

@@ -13,7 +13,7 @@ use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
-use pendularm::report::experiments::step_scene::{ready, undamped};
+use pendularm_benches::step_scene::{ready, undamped};
 
 // A function of its own, so that the counts of the arm's code are found by its name however much is inlined into it.
 #[inline(never)]

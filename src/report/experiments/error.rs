@@ -47,8 +47,6 @@ pub struct Scene {
     pub name: &'static str,
     /// The scene in words, for a heading.
     pub title: &'static str,
-    /// Parameters in one line.
-    pub about: String,
     /// How the effort is computed: `none`, `continuous` or `held`.
     pub control: &'static str,
     /// Unit of its errors.
@@ -111,54 +109,33 @@ fn swing<const N: usize>(
     start: State<N>,
 ) -> Scene {
     let control = ControlLoop::free(arm);
-    arm_scene(
-        (name, title, "none"),
-        "no control",
-        (control, start, Sampling::Held),
-    )
+    arm_scene((name, title, "none"), control, start, Sampling::Held)
 }
 
 fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
-    let Gains { kp, kd, .. } = REACH_GAINS;
-    let (kind, goal) = (sampling.name(), REACH_SETPOINT.position);
-    let law = format!(
-        "effort {kind}, kp {kp:?}, kd {kd:?}, to {goal:?} rad, error against the law at every instant"
-    );
+    let names = (name, title, sampling.name());
     let control = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
     let linear = Linear::at_setpoint(&control);
     let limit = |method| Some((method, largest_timestep(&linear, method, sampling)?));
     Scene {
         limits: Method::ALL.into_iter().filter_map(limit).collect(),
-        ..arm_scene(
-            (name, title, kind),
-            &law,
-            (control, State::rest(), sampling),
-        )
+        ..arm_scene(names, control, State::rest(), sampling)
     }
 }
 
 /// An arm in motion. The reference has a continuous-time law with integral gains of 0.
 fn arm_scene<const N: usize>(
     (name, title, control): (&'static str, &'static str, &'static str),
-    law: &str,
-    (law_loop, start, sampling): (ControlLoop<N>, State<N>, Sampling),
+    law_loop: ControlLoop<N>,
+    start: State<N>,
+    sampling: Sampling,
 ) -> Scene {
-    let arm = &law_loop.arm;
-    let State { position, velocity } = start;
-    let about = format!(
-        "{N} links of {:?} m, {:?} kg, gravity {} m/s²; from q = {position:?} rad, q̇ = {velocity:?} rad/s; {law}; \
-         {ARM_DURATION} s",
-        arm.lengths(),
-        arm.masses(),
-        arm.gravity(),
-    );
     let exact_law = Law::Continuous(law_loop.gains, law_loop.setpoint);
-    let reference = ReferenceMotion::new(arm, &start, &exact_law, ARM_DURATION);
+    let reference = ReferenceMotion::new(&law_loop.arm, &start, &exact_law, ARM_DURATION);
     let times = (1..=OUTPUTS).map(|index| ARM_DURATION * in_f64(index) / in_f64(OUTPUTS));
     Scene {
         name,
         title,
-        about,
         control,
         unit: "rad",
         most_steps: u64::MAX,
@@ -207,7 +184,6 @@ fn particle_scene() -> Scene {
     Scene {
         name: "particle",
         title: "1-DOF service, closed form",
-        about: format!("ẍ = {FUNCTION} from x = {X0} m, ẋ = {V0} m/s; {DURATION} s"),
         control: "none",
         unit: "m",
         most_steps: MAX_STEPS,

@@ -18,6 +18,5 @@ pub mod measure;
 pub mod nonlinear;
 pub mod reference;
 pub mod scenarios;
-pub mod step_scene;
 pub mod stiff;
 pub mod task;

@@ -1,8 +1,8 @@
 //! The limits of explicit methods: the cost of an error as the arm gets stiffer, beside two implicit methods.
 //!
-//! The arm is let go from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. The stronger
-//! the brake, or the lighter the link that it brakes, the faster the elbow's own rate `d (M⁻¹)₂₂` beside that of the
-//! swing; the motion hardly changes. An explicit method has to follow that rate, an implicit one has not.
+//! The arm is released from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. A stronger
+//! brake makes the elbow's own rate `d (M⁻¹)₂₂` faster than that of the swing, and hardly changes the motion. An
+//! explicit method has to follow that rate, an implicit one has not.
 //!
 //! | baseline | order | stable | evaluations of a step, with `2 N` for a Jacobian by differences |
 //! | --- | --- | --- | --- |
@@ -25,7 +25,7 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
-use crate::study::control_loop::ControlLoop;
+use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::equilibrium::moved;
 use crate::study::linear::{Linear, gravity_gradient};
 use crate::study::matrix::{Matrix, largest, largest_difference};
@@ -80,15 +80,6 @@ impl Solver {
     }
 }
 
-/// How a scene is made stiff.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum By {
-    /// A stronger brake.
-    Gains,
-    /// A lighter link behind the same brake.
-    Masses,
-}
-
 /// Positions and velocities of both joints.
 type Whole = [f64; 4];
 
@@ -107,31 +98,17 @@ const START: State<2> = State {
 };
 
 impl StiffScene {
-    /// The scene whose elbow is about so many times as fast as its swing.
-    pub fn new(by: By, stiffness: f64) -> Self {
-        let hanging = [-FRAC_PI_2, 0.0];
-        let even = Arm::<2>::default();
-        let rates = |arm: &Arm<2>| {
-            let swing =
-                (gravity_gradient(arm, &hanging)[0] / mass_matrix(arm, &hanging)[0][0]).sqrt();
-            let unit = forward_dynamics(arm, &hanging, &[0.0; 2], &[0.0, 1.0])[1];
-            let still = forward_dynamics(arm, &hanging, &[0.0; 2], &[0.0; 2])[1];
-            (swing, unit - still)
-        };
-        let (swing, mobility) = rates(&even);
-        let (arm, brake) = match by {
-            By::Gains => (even, stiffness * swing / mobility),
-            By::Masses => {
-                let light = Arm::new([1.0; 2], [1.0, 1.0 / stiffness], 9.81).unwrap_or(even);
-                (light, swing / mobility)
-            }
-        };
+    /// The scene whose elbow's rate is `ratio` times that of its swing.
+    pub fn new(ratio: f64) -> Self {
+        let (arm, hanging) = (Arm::<2>::default(), [-FRAC_PI_2, 0.0]);
+        let swing =
+            (gravity_gradient(&arm, &hanging)[0] / mass_matrix(&arm, &hanging)[0][0]).sqrt();
+        let unit = forward_dynamics(&arm, &hanging, &[0.0; 2], &[0.0, 1.0])[1];
+        let still = forward_dynamics(&arm, &hanging, &[0.0; 2], &[0.0; 2])[1];
         let gains = Gains {
-            kp: [0.0; 2],
-            ki: [0.0; 2],
-            kd: [0.0, brake],
+            kd: [0.0, ratio * swing / (unit - still)],
+            ..no_control()
         };
-        let (swing, mobility) = rates(&arm);
         let control = ControlLoop::new(arm, gains, Setpoint::default());
         let outputs = |solver| -> Vec<Vec<f64>> {
             let mut run = ready(&control, solver, REFERENCE_STEPS);
@@ -148,7 +125,7 @@ impl StiffScene {
             .map(|(one, other)| largest_difference(one, other));
         Self {
             control,
-            ratio: brake * mobility / swing,
+            ratio,
             task: Task {
                 duration: DURATION,
                 uncertainty: largest(differences),

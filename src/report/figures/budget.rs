@@ -2,12 +2,13 @@
 //!
 //! **Invariant:** each part is measured separately; their sum bounds the total.
 
-use super::fit::{slope, worst};
+use super::fit::slope;
 use crate::math::integrator::Method;
 use crate::report::experiments::budget::{Budget, Parts};
 use crate::report::experiments::error::{OUTPUTS, REACH};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, scientific, seconds};
+use crate::study::matrix::largest;
 
 const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
@@ -48,10 +49,8 @@ pub(super) fn make(section: &mut Section) {
         format!("slope {:.3}", order.unwrap_or(f64::NAN)),
         order.is_some_and(|order| (order - 1.0).abs() <= 0.1),
     );
-    let rounding = worst(
-        free.iter()
-            .filter_map(|methods| Some(methods.last()?.rounding)),
-    );
+    let last = free.iter().filter_map(|methods| methods.last());
+    let rounding = largest(last.map(|parts| parts.rounding));
     section.claim(
         "Rounding costs RK4 less than 10⁻¹⁴ rad in 2 s of free swing at every timestep",
         format!("at most {} rad", number(rounding)),
@@ -95,8 +94,8 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
     };
     let period = seconds(rk4.timestep);
     section.find(format!(
-        "**Against a law that acts at every instant, Euler is off by {} rad at {period} on {REACH}, and RK4 by {} \
-         rad**. Both hold their effort for a step. {}.",
+        "**Against a law that acts at every instant, Euler is off by {} rad and RK4 by {} rad**. The timestep is \
+         {period}, on {REACH}. Both hold their effort for a step. {}.",
         scientific(euler.total),
         scientific(rk4.total),
         if euler.total < 0.9 * rk4.total {
@@ -106,9 +105,9 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
         }
     ));
     section.find(format!(
-        "**On {REACH}, at a control period of {period}, holding the effort costs {} rad, RK4's truncation {} and \
-         rounding {}**. The hold is measured against a law that acts at every instant. A better method cannot recover \
-         the loss of the control period.",
+        "**Holding the effort costs {} rad, RK4's truncation {} and rounding {}**. These are errors at a control \
+         period of {period}, on {REACH}. The hold is measured against a law that acts at every instant. A better \
+         method cannot recover the loss of the control period.",
         scientific(rk4.hold),
         scientific(rk4.truncation),
         scientific(rk4.rounding)

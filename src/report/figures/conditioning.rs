@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** the truth has at least ten more correct digits than the results.
 
-use super::fit::worst;
 use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
+use crate::study::matrix::largest;
 
 /// Largest allowed loss of the recursion, in digits.
 const ALLOWED: f64 = 2.5;
@@ -38,7 +38,7 @@ pub(super) fn make(section: &mut Section) {
     });
     let worst_of = |poses: &[(&str, Vec<(f64, Lost)>)], of: fn(&Lost) -> f64| {
         let lost = poses.iter().flat_map(|pose| &pose.1);
-        worst(lost.map(|(_, lost)| of(lost)))
+        largest(lost.map(|(_, lost)| of(lost)))
     };
     // Bent and stretched, and folded.
     let (straight, folded) = poses.split_at(2);

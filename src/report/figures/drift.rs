@@ -63,8 +63,8 @@ pub(super) fn make(section: &mut Section) {
     );
     section.find(format!(
         "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} \
-         with RK4**, in {ENSEMBLE} swings let go a billionth of a radian apart. This Verlet is not symplectic: the \
-         forces of an arm depend on velocity.",
+         with RK4**. These are {ENSEMBLE} swings released a billionth of a radian apart. This Verlet is not \
+         symplectic: the forces of an arm depend on velocity.",
         number(duration),
         seconds(TIMESTEP),
         ends_of_ensemble(Method::Verlet, duration),

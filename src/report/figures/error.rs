@@ -3,14 +3,15 @@
 //! **Invariant:** every time is shown with the error of the same steps. Runs that are lost are drawn as lost, and no
 //! value is interpolated between two runs.
 
-use super::fit::{slope, worst};
+use super::fit::slope;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes};
 use crate::report::experiments::task::{LOST, RunOutcome};
-use crate::report::section::{Cell, Section, Table};
-use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, scientific, seconds};
-use crate::report::timing::{Effort, Timing, time};
+use crate::report::section::Section;
+use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, scientific, seconds};
+use crate::report::timing::{Timing, time};
+use crate::study::matrix::largest;
 
 /// Range of errors for a slope's fit \[rad\]: above it higher orders matter, below it rounding.
 const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
@@ -24,18 +25,15 @@ const MOST_SEARCHED: u64 = 1 << 17;
 /// The lower end of the axis of errors \[rad\].
 const LEAST_SHOWN: f64 = 1e-17;
 
-const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
-
 /// A scene with its runs.
 struct Data {
     scene: Scene,
     /// Runs with the timestep halved each time.
     runs: Vec<Run>,
-    /// The run of each method that reaches each of [`TARGETS`] with the fewest steps.
-    reached: Vec<(f64, Run)>,
+    /// Time for the repeats of a run \[s\].
+    timed: f64,
 }
 
-#[derive(Clone, Copy)]
 struct Run {
     method: Method,
     outcome: RunOutcome,
@@ -44,55 +42,30 @@ struct Run {
 
 pub(super) fn make(section: &mut Section) {
     let halvings = section.choose(15, 9);
-    let effort = section.choose(Effort::new(3, 25, 0.05), Effort::new(3, 7, 0.01));
+    let timed = section.choose(0.05, 0.01);
     let scenes = scenes().into_iter();
     let data: Vec<Data> = scenes
-        .map(|scene| Data::new(scene, halvings, effort))
+        .map(|scene| Data::new(scene, halvings, timed))
         .collect();
     findings(section, &data);
     verdicts(section, &data);
-    section.table(&cheapest(&data));
     against_time(section, &data);
     against_timestep(section, &data);
-    section.table(&scene_list(&data));
 }
 
 impl Data {
-    fn new(scene: Scene, halvings: u32, effort: Effort) -> Self {
-        let run = |method, outcome: RunOutcome| Run {
-            method,
-            outcome,
-            timing: time(effort, || scene.task.replay(method, outcome.steps)),
-        };
+    fn new(scene: Scene, halvings: u32, timed: f64) -> Self {
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
         let steps = steps.filter(|steps| *steps <= scene.most_steps);
         let both = steps.flat_map(|steps| Method::ALL.map(|method| (method, steps)));
-        let runs: Vec<Run> = both
-            .map(|(method, steps)| run(method, scene.task.run(method, steps, LOST)))
-            .collect();
-        let mut reached = Vec::new();
-        for method in Method::ALL {
-            // A smaller error takes no fewer steps.
-            let mut least = 1;
-            for target in TARGETS {
-                let enough = runs
-                    .iter()
-                    .map(|run| (run.method, run.outcome))
-                    .find(|(of, it)| {
-                        *of == method && it.error <= target && it.steps <= MOST_SEARCHED
-                    });
-                let fewest = enough.and_then(|(_, outcome)| {
-                    let steps = (least, outcome.steps);
-                    scene.task.fewest(method, target, steps, RESOLUTION)
-                });
-                least = fewest.map_or(least, |outcome| outcome.steps);
-                reached.extend(fewest.map(|outcome| (target, run(method, outcome))));
-            }
-        }
+        let runs = both.map(|(method, steps)| {
+            let outcome = scene.task.run(method, steps, LOST);
+            Run::of(&scene, method, outcome, timed)
+        });
         Self {
+            runs: runs.collect(),
             scene,
-            runs,
-            reached,
+            timed,
         }
     }
 
@@ -100,14 +73,13 @@ impl Data {
         self.runs.iter().filter(move |run| run.method == method)
     }
 
-    /// The runs that reach `target` with the fewest steps of their methods.
-    fn reaching(&self, target: f64) -> impl Iterator<Item = &Run> {
-        let is_near = move |one: &&(f64, Run)| (one.0 / target - 1.0).abs() < 0.1;
-        self.reached.iter().filter(is_near).map(|one| &one.1)
-    }
-
-    fn cost(&self, method: Method, target: f64) -> Option<&Run> {
-        self.reaching(target).find(|run| run.method == method)
+    /// The run of a method that keeps within `error` with the fewest steps.
+    fn cost(&self, method: Method, error: f64) -> Option<Run> {
+        let mut outcomes = self.of(method).map(|run| run.outcome);
+        let enough = outcomes.find(|it| it.error <= error && it.steps <= MOST_SEARCHED)?;
+        let task = &self.scene.task;
+        let fewest = task.fewest(method, error, (1, enough.steps), RESOLUTION)?;
+        Some(Run::of(&self.scene, method, fewest, self.timed))
     }
 
     fn order(&self, method: Method) -> Option<f64> {
@@ -119,24 +91,10 @@ impl Data {
         slope(inside.into_iter().rev().take(4))
     }
 
-    /// Runs long enough to time a step.
-    fn long_runs(&self) -> impl Iterator<Item = &Run> {
-        self.runs.iter().filter(|run| run.outcome.steps >= 1000)
-    }
-
-    /// Time of one step \[s\]: the minimum over the long runs.
-    fn step_time(&self, method: Method) -> Option<f64> {
-        let runs = self.long_runs().filter(|run| run.method == method);
-        runs.filter(|run| run.outcome.error.is_finite())
-            .map(|run| run.timing.minimum / in_f64(run.outcome.steps))
-            .min_by(f64::total_cmp)
-    }
-
-    /// Median time of an evaluation \[s\] in long runs.
+    /// Median time of an evaluation \[s\], in runs long enough to time one.
     fn evaluation_time(&self) -> Option<f64> {
-        let times = self
-            .long_runs()
-            .map(|run| run.timing.minimum / in_f64(run.outcome.evaluations));
+        let long = self.runs.iter().filter(|run| run.outcome.steps >= 1000);
+        let times = long.map(|run| run.timing.minimum / run.evaluations());
         let mut times: Vec<f64> = times.collect();
         times.sort_by(f64::total_cmp);
         times.get(times.len() / 2).copied()
@@ -147,69 +105,23 @@ impl Data {
     }
 }
 
-fn evaluations(run: &Run) -> f64 {
-    in_f64(run.outcome.evaluations)
+impl Run {
+    fn of(scene: &Scene, method: Method, outcome: RunOutcome, timed: f64) -> Self {
+        let timing = time(timed, || scene.task.replay(method, outcome.steps));
+        Self {
+            method,
+            outcome,
+            timing,
+        }
+    }
+
+    fn evaluations(&self) -> f64 {
+        in_f64(self.outcome.evaluations)
+    }
 }
 
 fn of<'a>(data: &'a [Data], name: &str) -> Option<&'a Data> {
     data.iter().find(|data| data.scene.name == name)
-}
-
-fn cheapest(data: &[Data]) -> Table {
-    let heads = TARGETS.map(|target| format!("{} rad", power(target.log10())));
-    let mut table = Table::new(
-        "cheapest",
-        "At a glance: the cheapest method for each error",
-        "Fewest evaluations. Under it: the timestep, evaluations and computing time for one simulated second, and how \
-         many times as many evaluations the next best method needs. Every cell is a run: that of the fewest steps \
-         found to keep the error. The particle's errors are in m.",
-        ["Scene"]
-            .into_iter()
-            .chain(heads.iter().map(String::as_str)),
-    );
-    for data in data {
-        let cells = TARGETS.map(|target| {
-            let mut reached: Vec<&Run> = data.reaching(target).collect();
-            reached.sort_by_key(|run| run.outcome.evaluations);
-            let Some(run) = reached.first() else {
-                return Cell::new("not reached").class("soft");
-            };
-            let next = reached.get(1).map(|next| {
-                let more = number(evaluations(next) / evaluations(run));
-                format!("; {} ×{more}", next.method)
-            });
-            let per_second = (evaluations(run) / data.scene.task.duration).round();
-            Cell::method(run.method).detail(format!(
-                "dt {}; {} evaluations, {} per s{}",
-                seconds(run.outcome.timestep),
-                number(per_second),
-                seconds(run.timing.minimum / data.scene.task.duration),
-                next.unwrap_or_default()
-            ))
-        });
-        let title = Cell::new(data.scene.title);
-        table.rows.push([title].into_iter().chain(cells).collect());
-    }
-    table
-}
-
-fn scene_list(data: &[Data]) -> Table {
-    let mut table = Table::new(
-        "scenes",
-        "The scenes",
-        "Uncertainty: the error bound of the reference itself.",
-        ["Scene", "Parameters", "Uncertainty"],
-    );
-    let row = |Data { scene, .. }: &Data| {
-        let uncertainty = scientific(scene.task.uncertainty);
-        vec![
-            Cell::new(scene.title),
-            Cell::new(&scene.about),
-            Cell::new(uncertainty),
-        ]
-    };
-    table.rows.extend(data.iter().map(row));
-    table
 }
 
 /// A panel for each scene. All share the error axis, so that scenes can be compared. `place` returns the x of a run and
@@ -273,12 +185,14 @@ fn against_time(section: &mut Section, data: &[Data]) {
     section.figure(
         "work-precision-time",
         &title,
-        "One mark per timestep; each timestep is half of the one before, and all methods take the same ones. Time is \
-         the minimum of repeats; whiskers reach from the first to the third quartile. Upper scale: evaluations of the \
-         dynamics, at the median time of one in that scene. A cross at the top edge is a run that diverged. The error \
-         of a reach is the distance from the loop with a continuous-time law. The distance from the loop whose law \
-         runs once a period is the truncation in the figure of the error's parts. Each mark's tooltip has its own \
-         evaluations.",
+        "Arms have the default masses and lengths, and move for 2 s. Free swings start at rest on the horizontal. The \
+         whirl starts at (0, 0.5), and its first joint turns at 10 rad/s. Reaches go to (0.8, -0.6) with kp 200, 100 \
+         and kd 30, 12. The particle has ẍ = cos 2t for 8 s. One mark per timestep; each timestep is half of the one \
+         before, and all methods take the same ones. Time is the minimum of repeats; whiskers reach from the first to \
+         the third quartile. Upper scale: evaluations of the dynamics, at the median time of one in that scene. A \
+         cross at the top edge is a run that diverged. The error of a reach is the distance from the loop with a \
+         continuous-time law. The distance from the loop whose law runs once a period is the truncation in the figure \
+         of the error's parts. Each mark's tooltip has its own evaluations.",
         &plots,
     );
 }
@@ -329,17 +243,17 @@ fn findings(section: &mut Section, data: &[Data]) {
     let cost = |method| swing.and_then(|swing| swing.cost(method, 1e-4));
     if let (Some(swing), Some(rk4), Some(verlet)) = (swing, cost(Method::Rk4), cost(Method::Verlet))
     {
-        let times = |other: f64| number(other / evaluations(rk4));
+        let times = |other: f64| number(other / rk4.evaluations());
         // Euler takes an evaluation a step.
-        let euler = cost(Method::Euler).map(|euler| times(evaluations(euler)));
+        let euler = cost(Method::Euler).map(|euler| times(euler.evaluations()));
         let euler = euler.unwrap_or_else(|| format!("over {}", times(in_f64(MOST_SEARCHED))));
         section.find(format!(
             "**To stay within 10⁻⁴ rad of the true motion on a free 2-link swing of {} s RK4 takes steps of {}**, and \
              {} evaluations per simulated second. Verlet needs {} times as many and Euler {euler} times.",
             number(swing.scene.task.duration),
             seconds(rk4.outcome.timestep),
-            number((evaluations(rk4) / swing.scene.task.duration).round()),
-            times(evaluations(verlet)),
+            number((rk4.evaluations() / swing.scene.task.duration).round()),
+            times(verlet.evaluations()),
         ));
     }
     let held = of(data, "reach-held");
@@ -352,17 +266,6 @@ fn findings(section: &mut Section, data: &[Data]) {
             scientific(rk4.outcome.error),
             scientific(verlet.outcome.error),
             seconds(rk4.outcome.timestep)
-        ));
-    }
-    let step = |name| of(data, name).and_then(|data| data.step_time(Method::Rk4));
-    if let (Some(two), Some(three)) = (step("swing-2"), step("swing-3")) {
-        section.find(format!(
-            "**One RK4 step takes {} with 2 links and {} with 3**. At the default 1 ms the arm runs {} and {} times \
-             faster than the clock.",
-            seconds(two),
-            seconds(three),
-            number(1e-3 / two),
-            number(1e-3 / three),
         ));
     }
 }
@@ -398,7 +301,7 @@ fn verdicts(section: &mut Section, data: &[Data]) {
     let smallest = errors
         .filter(|error| *error > 0.0)
         .fold(f64::INFINITY, f64::min);
-    let uncertainty = worst(data.iter().map(|data| data.scene.task.uncertainty));
+    let uncertainty = largest(data.iter().map(|data| data.scene.task.uncertainty));
     section.claim(
         "References are at least 100 times better known than the smallest error shown",
         format!(

@@ -1,4 +1,4 @@
-//! Slopes of fitted lines, cells of a map, and the largest of many numbers.
+//! Slopes of fitted lines, and cells of a map.
 //!
 //! **Invariant:** there is one more edge than cells, and a cell is measured at its geometric centre.
 
@@ -28,12 +28,4 @@ pub(super) fn centres(edges: &[f64]) -> Vec<f64> {
     pairs
         .map(|pair| pair.iter().product::<f64>().sqrt())
         .collect()
-}
-
-/// The largest of `values`; infinite if one is not a number.
-pub(super) fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, |worst, value| match value {
-        value if value.is_nan() => f64::INFINITY,
-        value => worst.max(value),
-    })
 }

@@ -55,5 +55,5 @@ pub(crate) const SECTIONS: &[Maker] = &[
     untimed("budget", "Where an error comes from", budget::make),
     untimed("drift", "Energy over long swings", drift::make),
     untimed("conditioning", "Uneven arms", conditioning::make),
-    timed("work", "What a scene does not need is left out", work::make),
+    untimed("work", "What a scene does not need is left out", work::make),
 ];

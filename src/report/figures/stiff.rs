@@ -2,14 +2,14 @@
 //!
 //! **Invariant:** a run that would take too many steps is shown as a prediction, and labelled so.
 
-use super::fit::worst;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::stiff::{By, DURATION, Solver, StiffScene};
+use crate::report::experiments::stiff::{DURATION, Solver, StiffScene};
 use crate::report::experiments::task::RunOutcome;
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number, power, scientific};
-use crate::report::timing::{Effort, time};
+use crate::report::timing::time;
+use crate::study::matrix::largest;
 
 /// The allowed error \[rad\].
 const TARGET: f64 = 1e-4;
@@ -17,14 +17,8 @@ const TARGET: f64 = 1e-4;
 /// Resolution of the search for the fewest steps: one in this many.
 const RESOLUTION: u64 = 16;
 
-const FAMILIES: [(By, &str); 2] = [
-    (By::Gains, "a stronger brake"),
-    (By::Masses, "a lighter link"),
-];
-
 /// The cheapest run of a solver within the error, and its time \[s\].
 struct Cost {
-    by: By,
     ratio: f64,
     solver: Solver,
     run: Option<(RunOutcome, f64)>,
@@ -35,40 +29,33 @@ struct Cost {
 pub(super) fn make(section: &mut Section) {
     let most = section.choose(1 << 19, 1 << 15);
     let stride = section.choose(1, 2);
-    let effort = Effort::new(3, 9, section.choose(0.03, 0.005));
+    let timed = section.choose(0.03, 0.005);
     let (mut costs, mut uncertainty) = (Vec::new(), 0.0_f64);
-    for (by, _) in FAMILIES {
-        for exponent in (0..=8).step_by(stride) {
-            let scene = StiffScene::new(by, 10_f64.powi(exponent));
-            let task = &scene.task;
-            uncertainty = uncertainty.max(task.uncertainty);
-            costs.extend(Solver::ALL.map(|solver| {
-                let fewest = scene.fewest_stable_steps(solver);
-                // A run that would be unstable at every allowed number of steps is skipped.
-                let is_possible = fewest.is_none_or(|fewest| fewest <= in_f64(most));
-                let cheapest = || task.fewest(solver, TARGET, (1, most), RESOLUTION);
-                let run = is_possible.then(cheapest).flatten();
-                let run = run.map(|run| {
-                    let timing = time(effort, || task.replay(solver, run.steps));
-                    (run, timing.minimum)
-                });
-                let ratio = scene.ratio;
-                Cost {
-                    by,
-                    ratio,
-                    solver,
-                    run,
-                    fewest,
-                }
-            }));
-        }
+    for exponent in (0..=8).step_by(stride) {
+        let scene = StiffScene::new(10_f64.powi(exponent));
+        let task = &scene.task;
+        uncertainty = uncertainty.max(task.uncertainty);
+        costs.extend(Solver::ALL.map(|solver| {
+            let fewest = scene.fewest_stable_steps(solver);
+            // A run that would be unstable at every allowed number of steps is skipped.
+            let is_possible = fewest.is_none_or(|fewest| fewest <= in_f64(most));
+            let cheapest = || task.fewest(solver, TARGET, (1, most), RESOLUTION);
+            let run = is_possible.then(cheapest).flatten();
+            let run = run.map(|run| {
+                let timing = time(timed, || task.replay(solver, run.steps));
+                (run, timing.minimum)
+            });
+            let ratio = scene.ratio;
+            Cost {
+                ratio,
+                solver,
+                run,
+                fewest,
+            }
+        }));
     }
     section.findings.extend(finding(&costs));
     verdicts(section, &costs, uncertainty);
-    let panels: Vec<Plot> = FAMILIES
-        .into_iter()
-        .flat_map(|it| panels(&costs, it))
-        .collect();
     section.figure(
         "stiff",
         &format!("Cost of {} rad as the arm gets stiffer", power(TARGET.log10())),
@@ -78,34 +65,33 @@ pub(super) fn make(section: &mut Section) {
              report and cannot be chosen on the live arm. Their Jacobians are finite differences, whose evaluations \
              are counted. Lines end where more than {most} steps would be needed."
         ),
-        &panels,
+        &panels(&costs),
     );
 }
 
-fn of(costs: &[Cost], by: By, solver: Solver) -> impl Iterator<Item = &Cost> {
-    let all = costs.iter();
-    all.filter(move |cost| cost.by == by && cost.solver == solver)
+fn of(costs: &[Cost], solver: Solver) -> impl Iterator<Item = &Cost> {
+    costs.iter().filter(move |cost| cost.solver == solver)
 }
 
 /// The stiffness from which a baseline takes less time than every explicit method.
-fn ends(costs: &[Cost], by: By) -> Option<f64> {
+fn ends(costs: &[Cost]) -> Option<f64> {
     let fastest = |ratio: f64, baseline: bool| {
         costs
             .iter()
-            .filter(|cost| cost.by == by && cost.ratio.to_bits() == ratio.to_bits())
+            .filter(|cost| cost.ratio.to_bits() == ratio.to_bits())
             .filter(|cost| cost.solver.is_baseline() == baseline)
             .filter_map(|cost| Some(cost.run?.1))
             .fold(f64::INFINITY, f64::min)
     };
-    let mut ratios = of(costs, by, Solver::Rodas3).map(|cost| cost.ratio);
+    let mut ratios = of(costs, Solver::Rodas3).map(|cost| cost.ratio);
     ratios.find(|&ratio| fastest(ratio, true) < fastest(ratio, false))
 }
 
 fn finding(costs: &[Cost]) -> Option<String> {
-    let last = |solver| of(costs, By::Gains, solver).last();
+    let last = |solver| of(costs, solver).last();
     let implicit = last(Solver::Rodas3)?.run?.0;
     let rk4 = last(Solver::Explicit(Method::Rk4))?;
-    let ends = ends(costs, By::Gains).map(|ratio| number(ratio.round()));
+    let ends = ends(costs).map(|ratio| number(ratio.round()));
     Some(format!(
         "**An explicit method pays for stiffness, an implicit one does not**. The task is a swing of {DURATION} s with \
          a brake at the elbow, within {} rad of the true motion. At a stiffness ratio of {} Rodas3, a baseline of this \
@@ -120,21 +106,15 @@ fn finding(costs: &[Cost]) -> Option<String> {
 }
 
 fn verdicts(section: &mut Section, costs: &[Cost], uncertainty: f64) {
-    let evaluations = |by| -> Vec<f64> {
-        let runs = of(costs, by, Solver::Rodas3).map(|cost| cost.run);
-        runs.map(|run| run.map_or(f64::NAN, |run| in_f64(run.0.evaluations)))
-            .collect()
-    };
-    let is_flat = FAMILIES.into_iter().all(|(by, _)| {
-        let all = evaluations(by);
-        let least = all.iter().copied().fold(f64::INFINITY, f64::min);
-        worst(all) <= 4.0 * least
-    });
-    let seen: Vec<String> = evaluations(By::Gains).into_iter().map(number).collect();
+    let runs = of(costs, Solver::Rodas3).map(|cost| cost.run);
+    let evaluations = runs.map(|run| run.map_or(f64::NAN, |run| in_f64(run.0.evaluations)));
+    let evaluations: Vec<f64> = evaluations.collect();
+    let least = evaluations.iter().copied().fold(f64::INFINITY, f64::min);
+    let seen: Vec<String> = evaluations.iter().copied().map(number).collect();
     section.claim(
         "The cost of Rodas3 hardly depends on stiffness (at most fourfold from 1 to 10⁸)",
         format!("{} evaluations", seen.join(", ")),
-        is_flat,
+        largest(evaluations.into_iter()) <= 4.0 * least,
     );
     // Where accuracy requires more steps than stability, the stability limit is not tested.
     let bound = costs
@@ -162,17 +142,17 @@ fn verdicts(section: &mut Section, costs: &[Cost], uncertainty: f64) {
     );
 }
 
-/// Evaluations and run time of one family.
-fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Plot; 2] {
+/// Evaluations and run time.
+fn panels(costs: &[Cost]) -> [Plot; 2] {
     let panel = |what: &str, y| {
         let x = "stiffness ratio: the elbow's rate per the swing's";
         let x = Axis::log(x, Unit::Number, (0.5, 2e8));
-        Plot::new(format!("Stiff by {words}: {what}"), x, y)
+        Plot::new(what, x, y)
     };
     let y = Axis::log("evaluations of the dynamics", Unit::Number, (10.0, 1e10));
-    let mut evaluations = panel("evaluations", y);
+    let mut evaluations = panel("Evaluations", y);
     let mut times = panel(
-        "run time",
+        "Run time",
         Axis::log("run time", Unit::Seconds, (1e-6, 1.0)),
     );
     for solver in Solver::ALL {
@@ -182,13 +162,13 @@ fn panels(costs: &[Cost], (by, words): (By, &str)) -> [Plot; 2] {
             Solver::ImplicitMidpoint => Key::line("soft", name).marked(Marker::Square),
             Solver::Rodas3 => Key::line("ink", name).marked(Marker::Circle),
         };
-        let runs = || of(costs, by, solver).filter_map(|cost| Some((cost.ratio, cost.run?)));
+        let runs = || of(costs, solver).filter_map(|cost| Some((cost.ratio, cost.run?)));
         let counted = runs().map(|(ratio, (run, _))| (ratio, in_f64(run.evaluations)));
         evaluations.add(Curve::line(key.clone(), counted));
         let timed = runs().map(|(ratio, (_, time))| (ratio, time));
         times.add(Curve::line(key, timed));
         if let Solver::Explicit(method) = solver {
-            let least = of(costs, by, solver).filter_map(|cost| {
+            let least = of(costs, solver).filter_map(|cost| {
                 Some((cost.ratio, cost.fewest? * f64::from(method.evaluations())))
             });
             let key = Key::line(method.name(), "").dashed();

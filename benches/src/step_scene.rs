@@ -1,12 +1,9 @@
-//! The arm whose steps are timed and counted: bent and at rest, with a setpoint at its own pose, so that no run
-//! diverges.
-//!
-//! **Invariant:** the report's times and the benches' counts of instructions are of the same steps.
+//! The arm whose steps are counted: bent and at rest, with a setpoint at its own pose, so that no run diverges.
 
-use crate::math::arm::{Arm, State};
-use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::Simulation;
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
 
 /// The default gains without damping, and with hardly an integral, which would drive an undamped arm away.
 pub fn undamped<const N: usize>() -> Gains<N>
