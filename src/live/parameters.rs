@@ -2,14 +2,14 @@
 //!
 //! **Invariant:** a parameter has no separate value. It is set as the service sets it that has it as a field.
 
-use serde_json::{Value, json};
-
 use super::{ArmRequest, LiveArm, World};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::urdf;
 use crate::services::Ask;
-use crate::services::arm::{AskParameters, NotSet, ParameterChange, ParameterRequest, joint_names};
+use crate::services::arm::{
+    AskParameters, NotSet, ParameterChange, ParameterRequest, ParameterValue, joint_names,
+};
 
 impl<const N: usize> ArmRequest<N> for AskParameters<N> {
     /// Answers for one parameter after the other.
@@ -31,21 +31,22 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
 }
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
-    fn value_of(&self, parameter: Parameter) -> Value {
+    fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
+        use ParameterValue::{Number, Numbers, Text};
         let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
         match parameter {
-            Parameter::Gravity => json!(arm.gravity()),
-            Parameter::Masses => json!(arm.masses().as_slice()),
-            Parameter::Lengths => json!(arm.lengths().as_slice()),
-            Parameter::Kp => json!(gains.kp.as_slice()),
-            Parameter::Ki => json!(gains.ki.as_slice()),
-            Parameter::Kd => json!(gains.kd.as_slice()),
-            Parameter::Integrator => json!(self.simulation.method().name()),
-            Parameter::Timestep => json!(self.simulation.timestep()),
-            Parameter::ControlPeriod => json!(self.simulation.control_period().period),
+            Parameter::Gravity => Number(arm.gravity()),
+            Parameter::Masses => Numbers(*arm.masses()),
+            Parameter::Lengths => Numbers(*arm.lengths()),
+            Parameter::Kp => Numbers(gains.kp),
+            Parameter::Ki => Numbers(gains.ki),
+            Parameter::Kd => Numbers(gains.kd),
+            Parameter::Integrator => Text(self.simulation.method().name().to_owned()),
+            Parameter::Timestep => Number(self.simulation.timestep()),
+            Parameter::ControlPeriod => Number(self.simulation.control_period().period),
             Parameter::RobotDescription => {
                 let (lengths, masses) = (arm.lengths(), arm.masses());
-                json!(urdf::describe(&joint_names::<N>(), lengths, masses))
+                Text(urdf::describe(&joint_names::<N>(), lengths, masses))
             }
         }
     }

@@ -1,8 +1,8 @@
 //! A JSON message for conversion to another encoding.
 //!
-//! A value takes [`VALUE_BYTES`], and the name of a member takes as much. There is at most one value for every two bytes
-//! of text, and each array is one allocation. So the longest message takes at most 64 MiB. Its worst case is deeply nested
-//! arrays. Texts are borrowed from the input, unless they have escapes.
+//! A value takes [`VALUE_BYTES`], and the name of a member takes as much. There is at most one value for every two
+//! bytes of text, and each array is one allocation. So the longest message takes at most 64 MiB. Its worst case is
+//! deeply nested arrays. Texts are borrowed from the input, unless they have escapes.
 //!
 //! **Invariant:** the members of an object are sorted by name, and each name is there once. Of repeated names the last
 //! member counts.

@@ -1,8 +1,8 @@
-//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar services,
-//! which every node of ROS 2 has. All these services are one question, which names parameters.
+//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar
+//! services, which every node of ROS 2 has. All these services are one question, which names parameters.
 //!
-//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration. The answer has
-//! one entry for each entry of the request, in the same order.
+//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration. The answer
+//! has one entry for each entry of the request, in the same order.
 
 use bytes::Bytes;
 use serde_json::value::RawValue;
@@ -43,7 +43,7 @@ pub struct AskParameters<const N: usize> {
 
 impl<const N: usize> Ask for AskParameters<N> {
     /// The requested values.
-    type Answer = Vec<(NamedParameter, Result<Option<Value>, NotSet>)>;
+    type Answer = Vec<(NamedParameter, Result<Option<ParameterValue<N>>, NotSet>)>;
 }
 
 /// A parameter by its name.
@@ -55,6 +55,27 @@ pub struct NamedParameter {
     pub parameter: Option<Parameter>,
     /// The value, as JSON text, for a parameter that does not exist.
     pub default: String,
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue<const N: usize> {
+    /// A number.
+    Number(f64),
+    /// One per joint.
+    Numbers([f64; N]),
+    /// A name or a description.
+    Text(String),
+}
+
+impl<const N: usize> From<ParameterValue<N>> for Value {
+    fn from(value: ParameterValue<N>) -> Self {
+        match value {
+            ParameterValue::Number(number) => number.into(),
+            ParameterValue::Numbers(numbers) => numbers.to_vec().into(),
+            ParameterValue::Text(text) => text.into(),
+        }
+    }
 }
 
 /// A request about one parameter.
@@ -283,13 +304,16 @@ fn read_given<const N: usize>(entry: &RawValue) -> Option<(NamedParameter, Param
 
 impl<const N: usize> Answered for AskParameters<N> {
     fn write(answers: Self::Answer, to: &Address) -> Bytes {
+        let as_json = |answer: Result<Option<ParameterValue<N>>, NotSet>| {
+            answer.map(|value| value.map(Value::from))
+        };
         let values = match to.service() {
             Service::Rosapi(Rosapi::GetParamNames) => {
                 let all = answers.iter().filter_map(|(named, _)| named.parameter);
                 json!({"names": all.map(Parameter::full_name).collect::<Vec<_>>()})
             }
             Service::Rosapi(question) => match answers.into_iter().next() {
-                Some((named, answer)) => rosapi_values(question, &named, answer),
+                Some((named, answer)) => rosapi_values(question, &named, as_json(answer)),
                 None => Value::Null,
             },
             Service::ListParameters => {
@@ -298,8 +322,8 @@ impl<const N: usize> Answered for AskParameters<N> {
             }
             Service::GetParameters => {
                 let values = answers.into_iter();
-                let values =
-                    values.map(|(named, answer)| value_message(&named, answer.ok().flatten()));
+                let values = values
+                    .map(|(named, answer)| value_message(&named, as_json(answer).ok().flatten()));
                 json!({"values": values.collect::<Vec<_>>()})
             }
             Service::GetParameterTypes => {

@@ -1,42 +1,18 @@
-//! Messages of other nodes and of the runtime to the arm, with their effects. Requests that clients can also send are in
-//! `services`.
+//! Messages of other nodes and of the runtime to the arm. Requests that clients can also send are in `services`.
 //!
-//! **Invariant:** the arm advances to now before each [`ArmOrder`]. An input of a client is accepted as a whole, or
-//! answered with a status that names the fault. A setpoint is moved only if it is still the mover's last one. An effort
-//! acts only while the controller is off and its client is connected.
+//! **Invariant:** every message is a plain value, independent of the actor that handles it.
 
 use actix::prelude::*;
 
-use super::node::ArmSim;
 use crate::actors::node::Done;
-use crate::actors::wire::{Nodes, TopicMessage};
-use crate::live::{ArmListener, GoalOrder, GoalProgress, Journal, Obstacle, Pose, Tracking};
+use crate::actors::wire::TopicMessage;
+use crate::live::{ArmListener, GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
-use crate::math::simulation::{ArmInput, Simulation};
-use crate::protocol::catalog::Topic;
-use crate::services::arm::{read_effort, read_setpoint};
+use crate::math::simulation::Simulation;
 use crate::services::study::Present;
 use crate::study::clocks::ClockLimits;
 use crate::study::control_loop::ControlLoop;
-
-/// A message that needs the arm's present state, or changes it.
-pub trait ArmOrder<const N: usize>: Message {
-    /// Its effect, and the answer.
-    fn perform(self, node: &mut ArmSim<N>) -> Self::Result;
-}
-
-impl<const N: usize, M: ArmOrder<N>> Handler<M> for ArmSim<N>
-where
-    M::Result: 'static,
-{
-    type Result = MessageResult<M>;
-
-    fn handle(&mut self, order: M, ctx: &mut Context<Self>) -> MessageResult<M> {
-        self.attend(ctx);
-        MessageResult(order.perform(self))
-    }
-}
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
@@ -45,12 +21,6 @@ where
 #[rtype(result = "f64")]
 pub struct SimulationTime;
 
-impl<const N: usize> ArmOrder<N> for SimulationTime {
-    fn perform(self, node: &mut ArmSim<N>) -> f64 {
-        node.arm.simulation.time()
-    }
-}
-
 /// Requests the offline simulation with the same state. From tests.
 #[derive(Message)]
 #[rtype(result = "Snapshot<N>")]
@@ -58,12 +28,6 @@ pub struct TakeSnapshot<const N: usize>;
 
 /// The whole present simulation.
 pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
-
-impl<const N: usize> ArmOrder<N> for TakeSnapshot<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Snapshot<N> {
-        Snapshot(Box::new(node.arm.simulation.clone()))
-    }
-}
 
 /// The arm's present settings. From `study`, at every call.
 #[derive(Message, Debug, Clone, Copy)]
@@ -86,16 +50,6 @@ pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 #[rtype(result = "()")]
 pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);
 
-impl<const N: usize> ArmOrder<N> for Tell<N> {
-    /// A listener gets the whole simulation first.
-    fn perform(self, node: &mut ArmSim<N>) {
-        let Self(listener) = self;
-        node.arm.tell_state();
-        node.arm.journal = listener.map(Journal::new);
-        node.arm.tell_state();
-    }
-}
-
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
 /// Requests the arm's present pose. From `ik` and `ik_trial` at every request that depends on it, and from the
@@ -103,12 +57,6 @@ impl<const N: usize> ArmOrder<N> for Tell<N> {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;
-
-impl<const N: usize> ArmOrder<N> for ArmPose<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Pose<N> {
-        node.arm.pose()
-    }
-}
 
 /// Begins a goal and ends the previous one, at the same time. From `ik_action`, which then publishes the
 /// trajectory and sends the [`CommandGoal`].
@@ -119,13 +67,6 @@ pub struct TrackGoal<const N: usize> {
     pub goal: GoalOrder<N>,
     /// The receiver of feedback and of the end, unless the end is the answer to its own message.
     pub owner: Recipient<GoalProgress<N>>,
-}
-
-impl<const N: usize> ArmOrder<N> for TrackGoal<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Tracking<N> {
-        node.arm.world.owner = Some(self.owner);
-        node.arm.track_goal(&self.goal)
-    }
 }
 
 /// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before it
@@ -150,24 +91,12 @@ pub struct CommandGoal<const N: usize> {
     pub positions: [f64; N],
 }
 
-impl<const N: usize> ArmOrder<N> for CommandGoal<N> {
-    fn perform(self, node: &mut ArmSim<N>) {
-        node.arm.command_goal(self.number, self.positions);
-    }
-}
-
 /// Preempts the goal, unless it has ended already. From `ik_action`. The answer is how the latest goal ended.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<GoalProgress<N>>")]
 pub struct EndGoal<const N: usize> {
     /// The goal.
     pub number: u64,
-}
-
-impl<const N: usize> ArmOrder<N> for EndGoal<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> Option<GoalProgress<N>> {
-        node.arm.end_goal(self.number)
-    }
 }
 
 /// To the owner of the goal.
@@ -177,25 +106,6 @@ impl<const N: usize> Message for GoalProgress<N> {
 
 // ---- setpoints and efforts ------------------------------------------------------------------------------------------
 
-/// Adds the topics to the registry's table.
-pub(super) fn listen<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
-    let node = arm.clone();
-    let hold = move |message: TopicMessage| match read_setpoint(&message.msg) {
-        Ok(setpoint) => node.do_send(SetSetpoint {
-            setpoint,
-            done: Some(message.done),
-        }),
-        Err(why) => message.refuse(Topic::JointTrajectory, &why),
-    };
-    nodes.listen(Topic::JointTrajectory, hold);
-    let node = arm.clone();
-    let command = move |message: TopicMessage| match read_effort(&message.msg) {
-        Ok(effort) => node.do_send(CommandEffort { effort, message }),
-        Err(why) => message.refuse(Topic::EffortCommands, &why),
-    };
-    nodes.listen(Topic::EffortCommands, command);
-}
-
 /// A setpoint for the controller, from the next step on. From clients, by `/joint_trajectory`.
 #[derive(Message)]
 #[rtype(result = "()")]
@@ -204,12 +114,6 @@ pub struct SetSetpoint<const N: usize> {
     pub setpoint: Setpoint<N>,
     /// Dropped when it has taken effect.
     pub done: Option<Done>,
-}
-
-impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
-    fn perform(self, node: &mut ArmSim<N>) {
-        node.arm.hold(self.setpoint);
-    }
 }
 
 /// Requests the arm's present motion. From `joint_trajectory_controller`, while a goal is active.
@@ -245,30 +149,6 @@ pub struct MoveSetpoint<const N: usize> {
     pub to: Setpoint<N>,
 }
 
-impl<const N: usize> ArmOrder<N> for ArmMotion<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> JointMotion<N> {
-        let (arm, simulation) = (&node.arm, &node.arm.simulation);
-        JointMotion {
-            state: *simulation.state(),
-            setpoint: *simulation.pid().setpoint(),
-            time: simulation.time(),
-            resets: arm.goals.past.resets,
-            stands_still: arm.paused && simulation.time() <= arm.paused_at,
-            obstacle: Obstacle::of(simulation),
-        }
-    }
-}
-
-impl<const N: usize> ArmOrder<N> for MoveSetpoint<N> {
-    fn perform(self, node: &mut ArmSim<N>) -> bool {
-        let is_known = *node.arm.simulation.pid().setpoint() == self.from;
-        if is_known {
-            node.arm.change(ArmInput::Setpoint(self.to));
-        }
-        is_known
-    }
-}
-
 /// An effort to be applied from the next step on. From clients, by `/effort_controller/commands`.
 #[derive(Message)]
 #[rtype(result = "()")]
@@ -277,14 +157,4 @@ pub struct CommandEffort<const N: usize> {
     pub effort: [f64; N],
     /// The client's message. Its client gets an error if the controller is on.
     pub message: TopicMessage,
-}
-
-impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
-    fn perform(self, node: &mut ArmSim<N>) {
-        let Self { effort, message } = self;
-        match node.arm.command(effort) {
-            Ok(()) => node.commander = Some(message.present),
-            Err(why) => message.refuse(Topic::EffortCommands, &why),
-        }
-    }
 }

@@ -7,16 +7,19 @@
 
 mod messages;
 mod node;
+mod orders;
 mod requests;
 mod turn;
+mod waiting;
 mod world;
 
 pub use self::messages::{
-    AddBarrier, ArmMotion, ArmOrder, ArmPose, ArmSettings, Barrier, CommandEffort, CommandGoal,
-    Consult, EndGoal, HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot,
+    AddBarrier, ArmMotion, ArmPose, ArmSettings, Barrier, CommandEffort, CommandGoal, Consult,
+    EndGoal, HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot,
     TakeSnapshot, Tell, TrackGoal,
 };
 pub use self::node::ArmSim;
+pub use self::orders::ArmOrder;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
     ArmEvent, ArmListener, ArmNews, BREATHER, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle,

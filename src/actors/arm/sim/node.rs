@@ -1,12 +1,12 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
 //! The arm wakes 60 times a second. It advances to the present time before it handles a message, so every answer has
-//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond
-//! that are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of
-//! every [turn](super::turn).
+//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
+//! are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
+//! [turn](super::turn).
 //!
-//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An answer
-//! that the arm is at rest follows all news of goals.
+//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An
+//! answer that the arm is at rest follows all news of goals.
 
 use std::collections::VecDeque;
 use std::pin::Pin;
@@ -17,8 +17,8 @@ use actix::prelude::*;
 use tokio::time::Instant;
 
 use super::messages::{AddBarrier, ArmSettings, Barrier, Consult, HeldLimit};
-use super::requests::Steps;
 use super::turn::Turn;
+use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::gauges::Gauges;

@@ -1,29 +1,29 @@
 //! Calls and messages of clients to the arm. The requests are in `services::arm`, and their effects in `live`.
 //!
-//! Requests for more than one row of steps take turns. The effect is that of separate requests for single steps, so other
-//! requests take effect in between.
+//! Requests for more than one row of steps take turns. The effect is that of separate requests for single steps, so
+//! other requests take effect in between.
 //!
-//! **Invariant:** the arm advances to now before it answers. A refused request for steps changes nothing. An accepted one
-//! is completed, unless the arm diverges, is resumed, or the runtime ends.
+//! **Invariant:** the arm advances to now before it answers. A refused request for steps changes nothing. An accepted
+//! one is completed, unless the arm diverges, is resumed, or the runtime ends.
 
 use actix::prelude::*;
 
-use super::messages;
 use super::node::ArmSim;
-use crate::actors::node::{Call, Reply, ShutDown, Unserved};
+use super::orders;
+use super::waiting::Steps;
+use crate::actors::node::{Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
-use crate::live::{ArmRequest, StepsAsked};
+use crate::live::ArmRequest;
 use crate::protocol::catalog::{Direction, Node, Service, Topic};
-use crate::protocol::op::fields::Rejections;
 use crate::services::arm::{
     AskParameters, Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
-    SetState, Step, Stepped, parameter_services,
+    SetState, Step, parameter_services,
 };
 
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        messages::listen(address, nodes);
+        orders::listen(address, nodes);
         nodes.serve::<Disturb<N>>(Service::Disturb, address.clone());
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
@@ -63,12 +63,6 @@ impl<const N: usize, A: ArmRequest<N>> Handler<Call<A>> for ArmSim<N> {
 }
 
 // ---- single steps ---------------------------------------------------------------------------------------------------
-
-/// Requested steps that are not all taken, with the reply.
-pub(super) struct Steps<const N: usize> {
-    pub(super) asked: StepsAsked<N>,
-    pub(super) reply: Reply<Result<Stepped<N>, Rejections>>,
-}
 
 impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     type Result = ();
