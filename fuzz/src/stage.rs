@@ -23,7 +23,6 @@ use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Interest, Publish};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
-use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::RosapiNode;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::Arm;
@@ -198,7 +197,6 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
     )
     .start();
     ArmSim::attach(&arm, nodes);
-    Parameters::attach(&Parameters::of(&arm).start(), nodes);
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let ik = Ik::<2>::new(arm.clone().recipient()).start();

@@ -38,7 +38,6 @@ use crate::actors::panics::contain;
 use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::give_way;
-use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::RosapiNode;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::ros::tf_web::TfRepublisher;
@@ -260,7 +259,6 @@ where
         ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
     ArmSim::attach(&arm, nodes);
-    Parameters::attach(&Parameters::of(&arm).start(), nodes);
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());

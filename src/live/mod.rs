@@ -12,6 +12,7 @@ mod goals;
 mod journal;
 mod limit;
 mod limit_watch;
+mod parameters;
 mod requests;
 mod scene;
 mod steps;

@@ -9,12 +9,11 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{ArmInput, ControlPeriod};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::Rejections;
-use crate::services::Ask;
 use crate::services::arm::{
     DIVERGED, Disturb, Enable, Integrator, Pause, PeriodInForce, Push, Reset, SetGains,
     SetIntegrator, SetParams, SetPeriod, SetState,
 };
-use crate::services::field_by_field::Echo;
+use crate::services::{Ask, Echo};
 
 /// Why an effort is not applied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -218,7 +218,7 @@ impl<W: Write> McapWriter<W> {
             return Ok(());
         };
         let msg = MessageTree::read(msg.as_bytes())?;
-        self.put(at, topic.name(), one, &cdr::encode_tree(one, msg.root()))
+        self.put(at, topic.name(), one, &cdr::encode_tree(one, &msg))
     }
 
     fn put(

@@ -1,21 +1,22 @@
 //! The services: the typed requests, their readers, and the writers of their answers. Both the runtime and the
 //! page without a server use these functions.
 //!
-//! **Invariant:** these are plain values, without actors, sockets or clocks.
+//! **Invariant:** these are plain values, without actors, sockets or clocks. A response has the service's name and the
+//! `id` as the caller spelled them.
 
-mod address;
 pub mod arm;
-pub mod field_by_field;
 pub mod goals;
 pub mod study;
 pub mod trial;
 
 use bytes::Bytes;
+use serde::Serialize;
 
-pub use self::address::Address;
 use crate::protocol::catalog::Service;
+use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::Rejections;
+use crate::protocol::op::fields::{Fields, Rejections};
+use crate::protocol::wire::json::Payload;
 
 /// Why no node or client serves a call.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -47,4 +48,115 @@ pub trait Callable: Ask + Sized {
 pub trait Answered: Callable {
     /// Writes the response.
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
+}
+
+// ---- requests whose fields are checked one by one -------------------------------------------------------------------
+
+/// A request with its valid fields and its rejections. An invalid field never prevents a valid one from taking effect.
+pub trait FieldByField: Ask {
+    /// The request with the valid fields and no rejections yet.
+    fn of(fields: &mut Fields<'_>) -> Self;
+
+    /// Its rejections.
+    fn rejected(&mut self) -> &mut Rejections;
+
+    /// The request with these fields.
+    #[must_use]
+    fn request(mut fields: Fields<'_>) -> Self
+    where
+        Self: Sized,
+    {
+        let mut ask = Self::of(&mut fields);
+        *ask.rejected() = fields.finish();
+        ask
+    }
+}
+
+impl<A: FieldByField> Callable for A {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        Ok(Self::request(Fields::read_or_none(arguments, service)))
+    }
+}
+
+/// The answer to a request whose fields are checked one by one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Echo<T> {
+    /// The values after the request.
+    pub values: T,
+    /// The rejected fields of the request.
+    pub rejected: Rejections,
+}
+
+// ---- the response ---------------------------------------------------------------------------------------------------
+
+/// Destination of a response, with the call's name and id.
+pub struct Address {
+    service: Service,
+    name: Box<str>,
+    id: Option<Payload>,
+    /// The form in which the caller gets the reason of a failed call.
+    error_form: ErrorForm,
+}
+
+impl Address {
+    /// A caller that has spelled `service` as `name`.
+    #[must_use]
+    pub fn new(service: Service, name: Box<str>, id: Option<Payload>) -> Self {
+        Self {
+            service,
+            name,
+            id,
+            error_form: ErrorForm::default(),
+        }
+    }
+
+    /// The form in which the caller gets the reason of a failed call.
+    #[must_use]
+    pub fn with_errors(self, error_form: ErrorForm) -> Self {
+        Self { error_form, ..self }
+    }
+
+    /// The service that was called.
+    #[must_use]
+    pub fn service(&self) -> Service {
+        self.service
+    }
+
+    /// The service's name as the caller spelled it.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The caller's `id`, which the response echoes.
+    #[must_use]
+    pub fn id(&self) -> Option<&Payload> {
+        self.id.as_ref()
+    }
+
+    /// The response with `values`; `result` is true if `status` is empty. Otherwise callers that selected the text get
+    /// it in place of `values`.
+    #[must_use]
+    pub fn response(&self, values: &impl Serialize, status: &str) -> Bytes {
+        let is_good = status.is_empty();
+        if !is_good && self.error_form == ErrorForm::Text {
+            return self.failure(status);
+        }
+        messages::response(&self.name, self.id.as_ref(), values, is_good, status)
+    }
+
+    /// The response `result: false` without values.
+    #[must_use]
+    pub fn failure(&self, why: &str) -> Bytes {
+        messages::failure(&self.name, self.id.as_ref(), why, self.error_form)
+    }
+
+    /// The response with values, or with the reason for none.
+    #[must_use]
+    pub fn outcome<T: Serialize, E: ToString>(&self, outcome: Result<T, E>) -> Bytes {
+        match outcome {
+            Ok(values) => self.response(&values, ""),
+            Err(why) => self.failure(&why.to_string()),
+        }
+    }
 }

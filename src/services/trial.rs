@@ -19,31 +19,38 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 /// Time between two messages of `/ik_trial/status` while nothing changes.
 pub const STATUS_PERIOD: Duration = Duration::from_millis(100);
 
-/// Starts a new trial, unless a field was rejected.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct StartTrial {
-    /// Changed settings.
-    pub changes: Changes,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
+/// A request about the trial.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TrialRequest {
+    /// Starts a new trial, unless a field was rejected.
+    Start {
+        /// Changed settings.
+        changes: Changes,
+        /// Fields that were not valid.
+        rejected: Rejections,
+    },
+    /// Replaces the present target by a new one.
+    Skip,
+    /// Ends the trial.
+    Stop,
 }
 
-impl Ask for StartTrial {
+impl Ask for TrialRequest {
     type Answer = Terms;
 }
 
-/// The settings of trials, and whether one has been started.
+/// The settings of trials, and the outcome of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terms {
     /// The present settings.
     pub settings: Settings,
-    /// Whether a trial has been started.
-    pub outcome: Result<(), NotStarted>,
+    /// Whether it was done.
+    pub outcome: Result<(), TrialRefused>,
 }
 
-/// Why no trial was started.
+/// Why a request about the trial was not done.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NotStarted {
+pub enum TrialRefused {
     /// Fields were rejected.
     #[error("{0}")]
     Rejected(Rejections),
@@ -52,38 +59,34 @@ pub enum NotStarted {
     Refused(#[from] Rejection),
 }
 
-/// Replaces the present target by a new one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SkipTarget;
-
-impl Ask for SkipTarget {
-    type Answer = Result<(), Rejection>;
-}
-
-/// Ends the trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StopTrial;
-
-impl Ask for StopTrial {
-    type Answer = Result<(), Rejection>;
-}
-
-impl Callable for StartTrial {
+impl Callable for TrialRequest {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read_or_none(arguments, service);
-        Ok(Self {
-            changes: Changes {
-                duration: fields.number("duration", Bound::Positive),
-                epsilon: fields.number("epsilon", Bound::Positive),
-                success_hold: fields.number("success_hold", Bound::NonNegative),
-            },
-            rejected: fields.finish(),
+        if service != Service::TrialStart {
+            Fields::read(arguments, service)?;
+        }
+        Ok(match service {
+            Service::TrialSkip => Self::Skip,
+            Service::TrialStop => Self::Stop,
+            _ => {
+                let mut fields = Fields::read_or_none(arguments, service);
+                Self::Start {
+                    changes: Changes {
+                        duration: fields.number("duration", Bound::Positive),
+                        epsilon: fields.number("epsilon", Bound::Positive),
+                        success_hold: fields.number("success_hold", Bound::NonNegative),
+                    },
+                    rejected: fields.finish(),
+                }
+            }
         })
     }
 }
 
-impl Answered for StartTrial {
+impl Answered for TrialRequest {
     fn write(Terms { settings, outcome }: Terms, to: &Address) -> Bytes {
+        if to.service() != Service::TrialStart {
+            return to.outcome(outcome.map(|()| Empty {}));
+        }
         let Settings { duration, criteria } = settings;
         let values = json!({
             "duration": duration,
@@ -92,32 +95,6 @@ impl Answered for StartTrial {
         });
         let status = outcome.map_or_else(|why| why.to_string(), |()| String::new());
         to.response(&values, &status)
-    }
-}
-
-impl Callable for SkipTarget {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Fields::read(arguments, service)?;
-        Ok(Self)
-    }
-}
-
-impl Answered for SkipTarget {
-    fn write(answer: Result<(), Rejection>, to: &Address) -> Bytes {
-        to.outcome(answer.map(|()| Empty {}))
-    }
-}
-
-impl Callable for StopTrial {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Fields::read(arguments, service)?;
-        Ok(Self)
-    }
-}
-
-impl Answered for StopTrial {
-    fn write(answer: Result<(), Rejection>, to: &Address) -> Bytes {
-        to.outcome(answer.map(|()| Empty {}))
     }
 }
 

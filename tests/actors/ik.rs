@@ -3,7 +3,7 @@
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::{Ik, Solve, SolveError};
-use pendularm::actors::arm::sim::{ArmPose, Pose};
+use pendularm::actors::arm::sim::ArmPose;
 use pendularm::actors::node::ask;
 use pendularm::math::kinematics::Target;
 
@@ -19,9 +19,9 @@ impl Actor for Gone {
 }
 
 impl Handler<ArmPose<2>> for Gone {
-    type Result = Pose<2>;
+    type Result = MessageResult<ArmPose<2>>;
 
-    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Self::Result {
         unreachable!("it has ended")
     }
 }

@@ -5,7 +5,9 @@ use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction, SendGoal};
-use pendularm::actors::arm::sim::{ArmPose, CommandGoal, GoalProgress, TrackGoal, Tracking};
+use pendularm::actors::arm::sim::{
+    ArmPose, CommandGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
+};
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
@@ -48,15 +50,19 @@ impl Handler<CommandGoal<2>> for Noting {
 }
 
 impl Handler<TrackGoal<2>> for Noting {
-    type Result = Tracking<2>;
+    type Result = MessageResult<TrackGoal<2>>;
 
-    fn handle(&mut self, goal: TrackGoal<2>, _: &mut Context<Self>) -> Tracking<2> {
+    fn handle(
+        &mut self,
+        TrackGoal { goal, .. }: TrackGoal<2>,
+        _: &mut Context<Self>,
+    ) -> Self::Result {
         self.0.send("announced").unwrap();
-        Tracking {
+        MessageResult(Tracking {
             positions: goal.solution,
             before: None,
             obstacle: None,
-        }
+        })
     }
 }
 
@@ -148,13 +154,14 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
         let (sender, mut news) = unbounded_channel();
         let owner = Owner(sender).start();
         let announce = |number| {
-            stage.arm.send(TrackGoal {
+            let goal = GoalOrder {
                 number,
                 target: glam::DVec2::ONE,
                 criteria: Criteria::default(),
                 solution: [0.0, 1.5],
-                owner: owner.clone().recipient(),
-            })
+            };
+            let owner = owner.clone().recipient();
+            stage.arm.send(TrackGoal { goal, owner })
         };
         let command = |number| CommandGoal {
             number,
@@ -181,20 +188,17 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
         let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
         let (sender, mut news) = unbounded_channel();
         let owner = Owner(sender).start();
-        let tracking = stage
-            .arm
-            .send(TrackGoal {
-                number: 1,
-                target: glam::dvec2(2.0, 0.0),
-                criteria: Criteria {
-                    epsilon: 0.1,
-                    success_hold: 0.0,
-                },
-                solution: [0.0, 0.0],
-                owner: owner.clone().recipient(),
-            })
-            .await
-            .unwrap();
+        let goal = GoalOrder {
+            number: 1,
+            target: glam::dvec2(2.0, 0.0),
+            criteria: Criteria {
+                epsilon: 0.1,
+                success_hold: 0.0,
+            },
+            solution: [0.0, 0.0],
+        };
+        let owner = owner.clone().recipient();
+        let tracking = stage.arm.send(TrackGoal { goal, owner }).await.unwrap();
         assert_eq!(tracking.positions, [0.0, 0.0]);
         pass(ms(100)).await;
         assert!(news.try_recv().is_err());

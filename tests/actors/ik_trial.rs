@@ -13,7 +13,7 @@ use pendularm::actors::arm::ik::{Ik, SolveError};
 use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, IkAction, SendGoal,
 };
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, StartTrial, StopTrial};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, Barrier, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::{Call, Interest, Publish};
@@ -21,26 +21,28 @@ use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;
 use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::op::fields::Rejections;
 use serde_json::{Value, json};
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::Instant;
 
 const STATUS: &str = "/ik_trial/status";
 
-fn start(duration: f64, epsilon: f64, success_hold: f64) -> StartTrial {
-    let changes = Changes {
+fn start(duration: f64, epsilon: f64, success_hold: f64) -> TrialRequest {
+    start_with(Changes {
         duration: Some(duration),
         epsilon: Some(epsilon),
         success_hold: Some(success_hold),
-    };
-    StartTrial {
-        changes,
-        ..StartTrial::default()
-    }
+    })
+}
+
+fn start_with(changes: Changes) -> TrialRequest {
+    let rejected = Rejections::default();
+    TrialRequest::Start { changes, rejected }
 }
 
 /// Starts a trial that must start.
-async fn begin(trial: &Addr<IkTrial<2>>, question: StartTrial) {
+async fn begin(trial: &Addr<IkTrial<2>>, question: TrialRequest) {
     assert_eq!(asked(trial, question).await.outcome, Ok(()));
 }
 
@@ -84,10 +86,10 @@ impl Actor for StandIn {
 }
 
 impl Handler<ArmPose<2>> for StandIn {
-    type Result = Pose<2>;
+    type Result = MessageResult<ArmPose<2>>;
 
-    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
-        self.pose()
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.pose())
     }
 }
 
@@ -241,7 +243,7 @@ fn no_status_is_encoded_while_nobody_wants_it() {
         for (wanted, expected) in [(false, 0), (true, 2), (false, 0)] {
             let topic = Topic::TrialStatus;
             trial.send(Interest { topic, wanted }).await.unwrap();
-            begin(&trial, StartTrial::default()).await;
+            begin(&trial, start_with(Changes::default())).await;
             // The accepted goal, and one message of the 10 Hz.
             pass(ms(150)).await;
             let mut statuses = 0;
@@ -279,7 +281,8 @@ fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
         assert!(quiet.contains(&an_hour().await), "the arm is silent");
         begin(&trial, start(1e9, 1e-9, 0.0)).await;
         assert!(quiet.contains(&an_hour().await), "a trial, unwatched");
-        asked(&trial, StopTrial).await.unwrap();
+        let stopped = asked(&trial, TrialRequest::Stop).await;
+        assert_eq!(stopped.outcome, Ok(()));
         assert!(quiet.contains(&an_hour().await), "after the trial");
         client.subscribe(STATUS).await;
         let listening = async { client.messages_for(ms(3_600_000), STATUS).await.len() };

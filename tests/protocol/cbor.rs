@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 
 fn publish(topic: &str, type_name: Option<&str>, msg: &Value) -> Vec<u8> {
     let tree = MessageTree::from(msg);
-    cbor::publish(topic, type_name, tree.root(), usize::MAX).expect("room")
+    cbor::publish(topic, type_name, &tree, usize::MAX).expect("room")
 }
 
 fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
     let tree = MessageTree::from(msg);
-    cbor::publish_raw(topic, type_name, tree.root(), usize::MAX)
+    cbor::publish_raw(topic, type_name, &tree, usize::MAX)
 }
 
 /// A row: type, message, and the bytes of the message. They are hexadecimal; `"text"` stands for a CBOR text, `f(1.5)` for a CBOR
@@ -107,13 +107,13 @@ fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
     let tree = MessageTree::from(&transforms);
     for (missing, made) in [(0, Some(&long)), (1, None), (long.len(), None)] {
         let most = long.len() - missing;
-        let raw = cbor::publish_raw("/t", type_name, tree.root(), most);
+        let raw = cbor::publish_raw("/t", type_name, &tree, most);
         assert_eq!(raw.as_ref(), made, "{missing}");
     }
     let short = publish("/t", None, &transforms);
     for (missing, made) in [(0, Some(&short)), (1, None)] {
         let most = short.len() - missing;
-        let untyped = cbor::publish("/t", None, tree.root(), most);
+        let untyped = cbor::publish("/t", None, &tree, most);
         assert_eq!(untyped.as_ref(), made, "{missing}");
     }
 }

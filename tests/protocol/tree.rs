@@ -5,30 +5,43 @@
 
 use pendularm::protocol::catalog::types;
 use pendularm::protocol::limits::MAX_FRAME;
-use pendularm::protocol::ros::tree::{Branch, BranchKind, MessageTree, NODE_BYTES};
+use pendularm::protocol::ros::tree::{MessageTree, TreeText, VALUE_BYTES};
 use pendularm::protocol::ros::{cbor, cdr};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
 /// Converts a value of this crate to one of `serde_json`.
-fn value(branch: Branch<'_, '_>) -> Value {
-    match branch.kind() {
-        BranchKind::Null => Value::Null,
-        BranchKind::Bool(value) => value.into(),
-        BranchKind::Number(number) => number.clone().into(),
-        BranchKind::Text(text) => text.into(),
-        BranchKind::Array(entries) => entries.map(value).collect(),
-        BranchKind::Object(members) => {
-            let ordered: Vec<_> = members.in_order().collect();
-            assert!(ordered.is_sorted_by(|one, next| one.0 < next.0));
-            for (name, found) in &ordered {
-                let again = branch.get(name).map(value);
-                assert_eq!(again, Some(value(*found)), "{name} is found too");
+fn value(tree: &MessageTree<'_>) -> Value {
+    match tree {
+        MessageTree::Null => Value::Null,
+        MessageTree::Bool(value) => (*value).into(),
+        MessageTree::Number(number) => number.clone().into(),
+        MessageTree::Text(text) => text.to_string().into(),
+        MessageTree::Array(entries) => entries.iter().map(value).collect(),
+        MessageTree::Object(members) => {
+            assert!(members.is_sorted_by(|one, next| one.0 < next.0));
+            for (TreeText(name), found) in members {
+                assert_eq!(tree.get(name), Some(found), "{name} is found too");
             }
-            let members = ordered.into_iter();
-            let members = members.map(|(name, one)| (name.to_owned(), value(one)));
+            let members = members.iter();
+            let members = members.map(|(TreeText(name), one)| (name.to_string(), value(one)));
             Value::Object(members.collect())
         }
+    }
+}
+
+/// The memory of a value, with what the allocator adds: 8 bytes for each piece, which is a multiple of 16 bytes.
+fn allocated(tree: &MessageTree<'_>) -> usize {
+    let piece = |values: usize| (8 + VALUE_BYTES * values).next_multiple_of(16);
+    match tree {
+        MessageTree::Array(entries) if !entries.is_empty() => {
+            piece(entries.len()) + entries.iter().map(allocated).sum::<usize>()
+        }
+        MessageTree::Object(members) if !members.is_empty() => {
+            let contents = members.iter().map(|(_, value)| allocated(value));
+            piece(2 * members.len()) + contents.sum::<usize>()
+        }
+        _ => 0,
     }
 }
 
@@ -86,7 +99,7 @@ proptest! {
         let read = MessageTree::read(text.as_bytes());
         prop_assert_eq!(read.is_ok(), expected.is_ok(), "{}", text);
         if let (Ok(tree), Ok(expected)) = (read, expected) {
-            prop_assert_eq!(value(tree.root()), expected, "{}", text);
+            prop_assert_eq!(value(&tree), expected, "{}", text);
         }
     }
 
@@ -99,26 +112,18 @@ proptest! {
         let (ours, theirs) = (MessageTree::read(text.as_bytes()).unwrap(), MessageTree::from(&expected));
         let one = types::all().nth(known).unwrap();
         for name in [None, Some(one.name)] {
-            let frame = |tree: &MessageTree| cbor::publish("/t", name, tree.root(), usize::MAX);
+            let frame = |tree: &MessageTree| cbor::publish("/t", name, tree, usize::MAX);
             prop_assert_eq!(frame(&ours), frame(&theirs), "{:?} {}", name, text);
         }
-        let raw = |tree: &MessageTree| cbor::publish_raw("/t", one.name, tree.root(), usize::MAX);
+        let raw = |tree: &MessageTree| cbor::publish_raw("/t", one.name, tree, usize::MAX);
         prop_assert_eq!(raw(&ours), raw(&theirs), "{} {}", one.name, text);
-        prop_assert_eq!(cdr::encode_tree(one, ours.root()), cdr::encode(one, &expected));
-    }
-
-    #[test]
-    fn a_tree_takes_no_more_room_than_was_said_before(text in text()) {
-        if let Ok(tree) = MessageTree::read(text.as_bytes()) {
-            prop_assert_eq!(tree.allocated(), MessageTree::room(text.as_bytes()));
-            prop_assert!(2 * tree.allocated() <= NODE_BYTES * (text.len() + 2), "{}", text);
-        }
+        prop_assert_eq!(cdr::encode_tree(one, &ours), cdr::encode(one, &expected));
     }
 }
 
-/// Texts that take most for their bytes, as long as a frame may be: 12 bytes for one.
+/// Texts that take most for their bytes, as long as a frame may be: 16 bytes for one.
 #[test]
-fn the_longest_message_takes_48_mib_at_worst() {
+fn the_longest_message_takes_64_mib_at_worst() {
     let deep = |open: &str, close: &str| open.repeat(50) + &close.repeat(50) + ",";
     for unit in [
         "1,",
@@ -131,22 +136,17 @@ fn the_longest_message_takes_48_mib_at_worst() {
         &deep("{\"a\":[", "]}"),
     ] {
         let text = format!("[{}0]", unit.repeat((MAX_FRAME - 3) / unit.len()));
-        let room = MessageTree::room(text.as_bytes());
-        assert!(room <= 12 * (text.len() + 2), "{unit}: {room}");
         let tree = MessageTree::read(text.as_bytes()).unwrap();
-        assert_eq!(
-            tree.allocated(),
-            room,
-            "{unit}: one piece of memory, which never grows"
-        );
+        let taken = allocated(&tree);
+        assert!(taken <= 16 * (text.len() + 2), "{unit}: {taken}");
     }
-    const { assert!(12 * MAX_FRAME <= 48 * 1024 * 1024) };
+    const { assert!(16 * MAX_FRAME <= 64 * 1024 * 1024) };
 }
 
 #[test]
 fn a_value_is_found_at_the_end_of_its_way() {
     let tree = MessageTree::read(br#"{"a":[{"0":{"b":7}}],"":8}"#).unwrap();
-    let at = |way: &str| tree.root().pointer(way).map(value);
+    let at = |way: &str| tree.pointer(way).map(value);
     assert_eq!(at("/a/0/0/b"), Some(json!(7)));
     assert_eq!(at("/"), Some(json!(8)));
     assert_eq!(at("/a/1"), None);

@@ -14,7 +14,6 @@ use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::RosapiNode;
 use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
@@ -70,7 +69,6 @@ where
     let study = Study::new(arm.clone().recipient(), pool.clone()).start();
     Study::attach(&study, nodes);
     Integration::attach(&Integration::new(pool.clone()).start(), nodes);
-    Parameters::attach(&Parameters::of(&arm).start(), nodes);
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();

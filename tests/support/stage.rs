@@ -239,29 +239,33 @@ impl Handler<AddBarrier> for SilentArm {
 }
 
 impl Handler<ArmPose<2>> for SilentArm {
-    type Result = Pose<2>;
+    type Result = MessageResult<ArmPose<2>>;
 
-    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
-        Pose {
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(Pose {
             lengths: [1.0, 1.0],
             positions: [0.0, 0.0],
             time: 0.0,
             resets: 0,
             simulated: 0.0,
             obstacle: None,
-        }
+        })
     }
 }
 
 impl Handler<TrackGoal<2>> for SilentArm {
-    type Result = Tracking<2>;
+    type Result = MessageResult<TrackGoal<2>>;
 
-    fn handle(&mut self, goal: TrackGoal<2>, _: &mut Context<Self>) -> Tracking<2> {
-        Tracking {
+    fn handle(
+        &mut self,
+        TrackGoal { goal, .. }: TrackGoal<2>,
+        _: &mut Context<Self>,
+    ) -> Self::Result {
+        MessageResult(Tracking {
             positions: goal.solution,
             before: None,
             obstacle: None,
-        }
+        })
     }
 }
 

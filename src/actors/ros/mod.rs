@@ -1,8 +1,7 @@
-//! The nodes for ROS clients: rosapi, parameters, rosout, and frames for web viewers.
+//! The nodes for ROS clients: rosapi, rosout, and frames for web viewers.
 //!
 //! **Invariant:** these nodes store no state of the arm. They request it.
 
-pub mod parameters;
 pub mod rosapi;
 pub mod rosout;
 pub mod tf_web;

@@ -1,5 +1,5 @@
 //! `/rosapi/*`: the topics, services and nodes that there are, and the time. Topics and services of clients are asked
-//! of the registry, the time of the arm. Questions about parameters are those of [`parameters`](super::parameters).
+//! of the registry, the time of the arm. The arm answers questions about its parameters.
 //!
 //! **Invariant:** nothing is kept between two questions.
 

@@ -5,13 +5,344 @@
 //! routes ([`Nodes`]) defines the node. All errors on the way are handled here: invalid arguments, a dropped
 //! question, and the form of an error.
 //!
-//! **Invariant:** a node sees no JSON. Arguments are read before a node gets the call. Its answer is written
-//! afterwards, by the registry or by the thread that has a long answer.
+//! **Invariant:** a node sees no JSON. Arguments are read before a node gets the call, never on the node's thread. Its
+//! answer is written afterwards, by the registry or by the thread that has a long answer. Every call is answered once:
+//! a caller that is dropped unanswered sends an error.
 
 pub mod action_client;
-mod caller;
-mod routes;
 
-pub use self::caller::{Caller, ServiceCall, TopicMessage};
-pub use self::routes::{Nodes, Route};
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Weak};
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde::Serialize;
+use tokio::sync::oneshot;
+
+use self::action_client::{ActionRequest, CancelSent, Goal, Pursue};
+use crate::actors::ConnectionId;
+use crate::actors::node::{Asker, Call, Done, FrameOut, Interest, Reply, Respond, Unserved, guard};
+use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
+use crate::protocol::catalog::{Action, Service, Topic};
+use crate::protocol::messages::{ErrorForm, Level};
+use crate::protocol::op::Arguments;
+use crate::protocol::wire::json::Payload;
 pub use crate::services::{Address, Answered, Callable};
+
+// ---- the table of routes: the node of each service, action and topic ------------------------------------------------
+
+/// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
+/// so these take a fifth of a millisecond. Usual ones are shorter.
+const LONG_ARGUMENTS: usize = 1024;
+
+/// Passes a message to its node.
+pub type Route<T> = Box<dyn Fn(T) + Send>;
+
+/// The runtime's own nodes, by the services, topics and actions that they serve.
+#[derive(Default)]
+pub struct Nodes {
+    /// Passes a call to the node that answers it.
+    pub services: HashMap<Service, Route<ServiceCall>>,
+    /// Passes a goal to the node that serves its action.
+    pub actions: HashMap<Action, Route<ActionRequest>>,
+    /// Passes a message to the node that subscribes to its topic.
+    pub listeners: HashMap<Topic, Route<TopicMessage>>,
+    /// The node that publishes each of the runtime's topics.
+    pub publishers: HashMap<Topic, Recipient<Interest>>,
+}
+
+impl Nodes {
+    /// A row of a node's table: calls of `service` are this question. Its fields are read here, and the rejected ones
+    /// are reported.
+    pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
+        let node = node.into();
+        let take = move |call: ServiceCall| {
+            let node = node.clone();
+            let length = call.arguments.payload().get().len();
+            let read = move || {
+                let mut caller = call.caller;
+                match A::read(call.service, &call.arguments) {
+                    Ok(ask) => {
+                        let done = caller.done.take();
+                        let asker = ClientAsker {
+                            caller,
+                            write: A::write,
+                        };
+                        let reply = Reply::new(asker, done);
+                        node.do_send(Call { ask, reply });
+                    }
+                    Err(rejections) => caller.refuse(&rejections.status()),
+                }
+            };
+            read_arguments(length, read);
+        };
+        self.services.insert(service, Box::new(take));
+    }
+
+    /// Messages of clients on `topic` are read by `take`.
+    pub fn listen(&mut self, topic: Topic, take: impl Fn(TopicMessage) + Clone + Send + 'static) {
+        let take = move |message: TopicMessage| {
+            let take = take.clone();
+            read_arguments(message.msg.get().len(), move || take(message));
+        };
+        self.listeners.insert(topic, Box::new(take));
+    }
+
+    /// Goals of this kind, and their cancellations, are for this node.
+    pub fn carry_out<G: Goal, A>(&mut self, node: Addr<A>)
+    where
+        A: Actor<Context = Context<A>> + Handler<Pursue<G>> + Handler<CancelSent>,
+    {
+        let take = move |request| match request {
+            ActionRequest::Goal(Pursue { goal, client, done }) => {
+                let node = node.clone();
+                let length = goal.payload().get().len();
+                let read = move || match G::read(&goal) {
+                    Ok(goal) => node.do_send(Pursue { goal, client, done }),
+                    Err(rejections) => client.refuse(&rejections.status()),
+                };
+                read_arguments(length, read);
+            }
+            ActionRequest::Cancel(cancel) => node.do_send(cancel),
+        };
+        self.actions.insert(G::ACTION, Box::new(take));
+    }
+}
+
+/// Reads arguments of `length` bytes: long ones on another thread, while the client's next frames wait.
+fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
+    if length > LONG_ARGUMENTS {
+        // The task is boxed, so only one kind is compiled, and not one for each service.
+        let read: Box<dyn FnOnce() + Send> = Box::new(read);
+        actix_rt::spawn(aside(WorkKind::of(length), read));
+    } else {
+        read();
+    }
+}
+
+// ---- a client's call, and the way back ------------------------------------------------------------------------------
+
+/// A call of one of the runtime's own services, forwarded by the registry.
+pub struct ServiceCall {
+    /// The service that was called.
+    pub service: Service,
+    /// The caller's arguments, not parsed yet.
+    pub arguments: Arguments,
+    /// The way back.
+    pub caller: Caller,
+}
+
+/// A client's message on a topic of the runtime, forwarded by the registry.
+pub struct TopicMessage {
+    /// The message.
+    pub msg: Payload,
+    /// The way back, for an error status.
+    pub respond: Recipient<Respond>,
+    /// The client.
+    pub connection: ConnectionId,
+    /// Ends with the client's connection.
+    pub present: Weak<()>,
+    /// Ends with the client's connection, or when the client unsubscribes from the replies to its message.
+    pub listening: Weak<()>,
+    /// The frame's `id`, if it had one.
+    pub id: Option<Payload>,
+    /// Dropped when the message has taken effect. The connection reads its next frame then.
+    pub done: Done,
+}
+
+impl TopicMessage {
+    /// Sends the client an error status with the reason why the message is not valid for `topic`.
+    pub fn refuse(self, topic: Topic, why: &impl Display) {
+        let msg = format!("{}: {why}", topic.name());
+        let status = Respond::error(self.connection, &msg, self.id.as_ref());
+        self.respond.do_send(Respond {
+            done: Some(self.done),
+            ..status
+        });
+    }
+}
+
+/// The calling client, and the way back to it. If it is dropped unanswered, it sends an error.
+pub struct Caller {
+    registry: Recipient<Respond>,
+    connection: ConnectionId,
+    /// None once the answer has been given.
+    address: Option<Address>,
+    /// The room that is taken for a long answer, or else for the long frame that asked.
+    permit: Option<Permit>,
+    gone: Arc<AtomicBool>,
+    done: Option<Done>,
+    /// The pools for long answers, if the call may have one.
+    memory: Option<Memory>,
+}
+
+impl Caller {
+    /// The client `connection`, which called `service`, spelled `name`. The receiver ends with the call.
+    #[must_use]
+    pub fn new(
+        registry: Recipient<Respond>,
+        connection: ConnectionId,
+        service: Service,
+        name: Box<str>,
+        id: Option<Payload>,
+        gone: Arc<AtomicBool>,
+    ) -> (Self, oneshot::Receiver<()>) {
+        let (done, ended) = guard();
+        let caller = Self {
+            registry,
+            connection,
+            address: Some(Address::new(service, name, id)),
+            permit: None,
+            gone,
+            done: Some(done),
+            memory: None,
+        };
+        (caller, ended)
+    }
+
+    /// Sets the pools for long answers. `asked` is the permit of the call's frame, if that was long.
+    #[must_use]
+    pub fn within(mut self, memory: Memory, asked: Option<Permit>) -> Self {
+        self.memory = Some(memory);
+        self.permit = asked;
+        self
+    }
+
+    /// The form in which the caller gets the reason of a failed call.
+    #[must_use]
+    pub fn with_errors(mut self, form: ErrorForm) -> Self {
+        self.address = self.address.take().map(|address| address.with_errors(form));
+        self
+    }
+
+    /// The connection that called.
+    #[must_use]
+    pub fn connection(&self) -> ConnectionId {
+        self.connection
+    }
+
+    /// The caller's `id`, which the response echoes.
+    #[must_use]
+    pub fn id(&self) -> Option<&Payload> {
+        self.address.as_ref()?.id()
+    }
+
+    /// Whether the caller has disconnected.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+
+    /// Reserves memory for an answer of at most `bytes` bytes, besides the echo of the caller's `id`, before it is
+    /// computed. Short answers need no reservation.
+    ///
+    /// # Errors
+    /// While other answers use it.
+    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+        let (Some(address), Some(memory)) = (&self.address, &self.memory) else {
+            return Ok(());
+        };
+        let id = address.id().map_or(0, |id| id.get().len());
+        let bytes = bytes.saturating_add(id);
+        if bytes > SHORT {
+            self.permit = Some(memory.answer(bytes)?);
+        }
+        Ok(())
+    }
+
+    /// Tells the caller by a status, before the answer, why what it asked for has no effect yet.
+    fn warn(&self, why: &str) {
+        let status = Respond::status(self.connection, Level::Warning, why, self.id());
+        self.registry.do_send(status);
+    }
+
+    /// Answers `result: true`. The call ends when this value is dropped.
+    pub fn succeed(&mut self, values: &impl Serialize) {
+        self.answer_at_once(|address| address.response(values, ""));
+    }
+
+    /// Answers `result: false` with empty values, for the reason `why`.
+    pub fn refuse(&mut self, why: &str) {
+        self.answer_at_once(|address| address.failure(why));
+    }
+
+    /// Answers and ends the call; `write` is called by the registry.
+    fn conclude(
+        mut self,
+        done: Option<Done>,
+        write: impl FnOnce(&Address) -> Bytes + Send + 'static,
+    ) {
+        if let Some(address) = self.address.take() {
+            let service = address.service();
+            let permit = self.permit.take();
+            let write = move || cover(permit.as_ref(), write(&address));
+            self.send(service, FrameOut::unwritten(write), done);
+        }
+    }
+
+    fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
+        if let Some(address) = self.address.take() {
+            let frame = cover(self.permit.as_ref(), write(&address));
+            self.send(address.service(), frame.into(), None);
+        }
+    }
+
+    fn send(&self, service: Service, frame: FrameOut, done: Option<Done>) {
+        self.registry.do_send(Respond {
+            connection: self.connection,
+            frame,
+            service: Some(service),
+            status: None,
+            done,
+        });
+    }
+}
+
+impl Drop for Caller {
+    fn drop(&mut self) {
+        self.answer_at_once(|address| address.failure(&Unserved::Ended.to_string()));
+    }
+}
+
+// ---- a caller that waits for a node's answer ------------------------------------------------------------------------
+
+/// A client that has asked for a `T`.
+struct ClientAsker<T> {
+    caller: Caller,
+    /// Writes the answer.
+    write: fn(T, &Address) -> Bytes,
+}
+
+impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>) {
+        let Self { caller, write } = *self;
+        caller.conclude(done, move |address| match answer {
+            Ok(answer) => write(answer, address),
+            Err(why) => address.failure(&why.to_string()),
+        });
+    }
+
+    fn answer_here(self: Box<Self>, answer: T) {
+        let Self { mut caller, write } = *self;
+        caller.answer_at_once(|address| write(answer, address));
+    }
+
+    fn client(&self) -> Option<ConnectionId> {
+        Some(self.caller.connection())
+    }
+
+    fn is_gone(&self) -> bool {
+        self.caller.is_gone()
+    }
+
+    fn warn(&self, why: &str) {
+        self.caller.warn(why);
+    }
+
+    fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+        self.caller.reserve(bytes)
+    }
+}

@@ -5,10 +5,12 @@
 //!
 //! **Invariant:** no JSON frame begins with the first byte of a frame here.
 
+use serde_json::Number;
+
 use super::cdr;
 use super::sink::Sink;
 use super::stamps::member;
-use super::tree::{Branch, BranchKind};
+use super::tree::{MessageTree, TreeText};
 use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
@@ -35,7 +37,7 @@ const INT32_ARRAY: u64 = 78;
 pub fn publish(
     topic: &str,
     type_name: Option<&str>,
-    msg: Branch<'_, '_>,
+    msg: &MessageTree<'_>,
     most: usize,
 ) -> Option<Vec<u8>> {
     let mut out = head(topic, most);
@@ -52,7 +54,7 @@ pub fn publish(
 pub fn publish_raw(
     topic: &str,
     type_name: &str,
-    msg: Branch<'_, '_>,
+    msg: &MessageTree<'_>,
     most: usize,
 ) -> Option<Vec<u8>> {
     let one = types::find(type_name)?;
@@ -71,7 +73,7 @@ pub fn publish_raw(
 }
 
 /// The time in the message's header; 0 if it has none.
-fn stamp(msg: Branch<'_, '_>) -> (u64, u64) {
+fn stamp(msg: &MessageTree<'_>) -> (u64, u64) {
     let places = [
         "/header/stamp",
         "/stamp",
@@ -79,7 +81,7 @@ fn stamp(msg: Branch<'_, '_>) -> (u64, u64) {
         "/transforms/0/header/stamp",
     ];
     let found = places.into_iter().find_map(|place| msg.pointer(place));
-    let part = |name: &str| found.and_then(|one| member(one, name)?.as_u64());
+    let part = |name: &str| found.and_then(|one| member(one, name)?.number()?.as_u64());
     (
         part("sec").unwrap_or_default(),
         part("nanosec").unwrap_or_default(),
@@ -133,7 +135,7 @@ fn float(out: &mut Sink, value: f64) {
 
 /// Writes every present field, in the type's order. Members that the type does not have are omitted, except the ROS 1
 /// names of stamps.
-fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
+fn message(out: &mut Sink, one: Type, msg: &MessageTree<'_>) {
     let has = |name: &str| msg.get(name).is_some();
     if msg.members().is_none() || (has("sec") && has("secs")) {
         return untyped(out, msg);
@@ -154,10 +156,10 @@ fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
 }
 
 /// A value of type `kind`. If it is a message, `inner` is its type.
-fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
-    match (kind, value.kind()) {
-        ("float64" | "float32", BranchKind::Null) => float(out, f64::NAN),
-        ("float64" | "float32", BranchKind::Number(number)) => {
+fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
+    match (kind, value) {
+        ("float64" | "float32", MessageTree::Null) => float(out, f64::NAN),
+        ("float64" | "float32", MessageTree::Number(number)) => {
             float(out, number.as_f64().unwrap_or(f64::NAN));
         }
         _ => match inner {
@@ -167,7 +169,7 @@ fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>
     }
 }
 
-fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
+fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
     let Some(entries) = value.entries() else {
         return untyped(out, value);
     };
@@ -176,14 +178,16 @@ fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) 
             length(out, TAG, FLOAT64_ARRAY);
             length(out, BYTES, entries.len() as u64 * 8);
             for entry in entries {
-                out.extend(&entry.as_f64().unwrap_or(f64::NAN).to_le_bytes());
+                let entry = entry.number().and_then(Number::as_f64);
+                out.extend(&entry.unwrap_or(f64::NAN).to_le_bytes());
             }
         }
         "int32" => {
             length(out, TAG, INT32_ARRAY);
             length(out, BYTES, entries.len() as u64 * 4);
             for entry in entries {
-                let entry = entry.as_i64().and_then(|entry| i32::try_from(entry).ok());
+                let entry = entry.number().and_then(Number::as_i64);
+                let entry = entry.and_then(|entry| i32::try_from(entry).ok());
                 out.extend(&entry.unwrap_or_default().to_le_bytes());
             }
         }
@@ -197,36 +201,30 @@ fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) 
 }
 
 /// Writes any JSON value. The recursion is as deep as a frame may be nested, which the frame's reader has checked.
-fn untyped(out: &mut Sink, value: Branch<'_, '_>) {
-    match value.kind() {
-        BranchKind::Null => out.push(NULL),
-        BranchKind::Bool(false) => out.push(FALSE),
-        BranchKind::Bool(true) => out.push(TRUE),
-        BranchKind::Number(number) => match (number.as_u64(), number.as_i64()) {
+fn untyped(out: &mut Sink, value: &MessageTree<'_>) {
+    match value {
+        MessageTree::Null => out.push(NULL),
+        MessageTree::Bool(false) => out.push(FALSE),
+        MessageTree::Bool(true) => out.push(TRUE),
+        MessageTree::Number(number) => match (number.as_u64(), number.as_i64()) {
             (Some(number), _) => length(out, UNSIGNED, number),
             // CBOR writes -1 - n for n; the complement of a negative number is that n.
             (None, Some(number)) => length(out, NEGATIVE, (!number).unsigned_abs()),
             (None, None) => float(out, number.as_f64().unwrap_or(f64::NAN)),
         },
-        BranchKind::Text(string) => text(out, string),
-        BranchKind::Array(entries) => {
+        MessageTree::Text(string) => text(out, string),
+        MessageTree::Array(entries) => {
             length(out, ARRAY, entries.len() as u64);
             for entry in entries {
                 untyped(out, entry);
             }
         }
-        BranchKind::Object(members) if members.are_in_order() => object(out, members),
-        BranchKind::Object(members) => object(out, members.in_order()),
-    }
-}
-
-fn object<'t, 'a: 't>(
-    out: &mut Sink,
-    members: impl ExactSizeIterator<Item = (&'t str, Branch<'t, 'a>)>,
-) {
-    length(out, MAP, members.len() as u64);
-    for (name, value) in members {
-        text(out, name);
-        untyped(out, value);
+        MessageTree::Object(members) => {
+            length(out, MAP, members.len() as u64);
+            for (TreeText(name), value) in members {
+                text(out, name);
+                untyped(out, value);
+            }
+        }
     }
 }

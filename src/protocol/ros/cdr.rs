@@ -5,35 +5,35 @@
 //! **Invariant:** the offset of every primitive is a multiple of its size, counted from the end of the 4-byte
 //! header.
 
-use serde_json::Value;
+use serde_json::{Number, Value};
 
 use super::sink::Sink;
 use super::stamps::member;
-use super::tree::{Branch, BranchKind, MessageTree};
+use super::tree::MessageTree;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 /// An absent field: the zero of a number, a text, an array or a message.
-const ABSENT: Branch<'_, '_> = Branch::FALSE;
+static ABSENT: MessageTree<'static> = MessageTree::Bool(false);
 
 /// The bytes of a message of that type.
 #[must_use]
 pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
-    encode_tree(one, MessageTree::from(msg).root())
+    encode_tree(one, &MessageTree::from(msg))
 }
 
 /// The bytes of a message that has been parsed already.
 #[must_use]
-pub fn encode_tree(one: Type, msg: Branch<'_, '_>) -> Vec<u8> {
+pub fn encode_tree(one: Type, msg: &MessageTree<'_>) -> Vec<u8> {
     // No message has more bytes than that.
     encode_within(one, msg, usize::MAX).unwrap_or_default()
 }
 
 /// The bytes of a message, unless there are more than `most`. Two bytes of JSON (`{}`) may become a hundred.
 #[must_use]
-pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<u8>> {
+pub fn encode_within(one: Type, msg: &MessageTree<'_>, most: usize) -> Option<Vec<u8>> {
     let mut sink = Sink::new(most);
     sink.extend(&HEADER);
     sink.message(one, msg);
@@ -46,18 +46,18 @@ pub(super) fn message_type(kind: &str) -> Option<Type> {
 }
 
 impl Sink {
-    fn message(&mut self, one: Type, msg: Branch<'_, '_>) {
+    fn message(&mut self, one: Type, msg: &MessageTree<'_>) {
         for field in one.fields {
-            let value = member(msg, field.name).unwrap_or(ABSENT);
+            let value = member(msg, field.name).unwrap_or(&ABSENT);
             let (kind, count) = field.element();
             // The type is looked up once for all entries.
             let inner = message_type(kind);
             match count {
                 Count::One => self.single(kind, inner, value),
                 Count::Any => {
-                    let entries = value.entries();
-                    self.count(entries.as_ref().map_or(0, ExactSizeIterator::len));
-                    for entry in entries.into_iter().flatten() {
+                    let entries = value.entries().unwrap_or_default();
+                    self.count(entries.len());
+                    for entry in entries {
                         if self.is_over() {
                             return;
                         }
@@ -68,7 +68,7 @@ impl Sink {
                 Count::Exactly(count) => {
                     let mut entries = value.entries().into_iter().flatten();
                     for _ in 0..count {
-                        self.single(kind, inner, entries.next().unwrap_or(ABSENT));
+                        self.single(kind, inner, entries.next().unwrap_or(&ABSENT));
                     }
                 }
             }
@@ -79,16 +79,16 @@ impl Sink {
         clippy::cast_possible_truncation,
         reason = "a float32 is the nearest one"
     )]
-    fn single(&mut self, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
-        let unsigned = || value.as_u64().unwrap_or_default();
-        let signed = || value.as_i64().unwrap_or_default();
-        let float = || match value.kind() {
-            BranchKind::Null => f64::NAN,
-            BranchKind::Number(number) => number.as_f64().unwrap_or_default(),
-            _ => 0.0,
+    fn single(&mut self, kind: &str, inner: Option<Type>, value: &MessageTree<'_>) {
+        let number = value.number();
+        let unsigned = || number.and_then(Number::as_u64).unwrap_or_default();
+        let signed = || number.and_then(Number::as_i64).unwrap_or_default();
+        let float = || match value {
+            MessageTree::Null => f64::NAN,
+            _ => number.and_then(Number::as_f64).unwrap_or_default(),
         };
         match kind {
-            "bool" => self.aligned([u8::from(value.as_bool().unwrap_or_default())]),
+            "bool" => self.aligned([u8::from(*value == MessageTree::Bool(true))]),
             "byte" | "uint8" | "char" => {
                 self.aligned([u8::try_from(unsigned()).unwrap_or(u8::MAX)]);
             }
@@ -112,7 +112,10 @@ impl Sink {
             "uint64" => self.aligned(unsigned().to_le_bytes()),
             "float32" => self.aligned((float() as f32).to_le_bytes()),
             "float64" => self.aligned(float().to_le_bytes()),
-            "string" => self.string(value.as_str().unwrap_or_default()),
+            "string" => self.string(match value {
+                MessageTree::Text(text) => text,
+                _ => "",
+            }),
             other => match inner {
                 // No type contains itself, so this recursion ends.
                 Some(one) => self.message(one, value),

@@ -6,7 +6,7 @@
 
 use bytes::Bytes;
 
-use super::tree::Branch;
+use super::tree::MessageTree;
 use crate::protocol::names;
 
 /// The text of a stamp before and between its two numbers, and the ROS 1 names of the two.
@@ -20,7 +20,7 @@ pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
 }
 
 /// The member of a message for a field of its ROS 2 type. Seconds and nanoseconds may have their ROS 1 names.
-pub(super) fn member<'t, 'a>(msg: Branch<'t, 'a>, field: &str) -> Option<Branch<'t, 'a>> {
+pub(super) fn member<'t, 'a>(msg: &'t MessageTree<'a>, field: &str) -> Option<&'t MessageTree<'a>> {
     let ros1_name = match field {
         "sec" => "secs",
         "nanosec" => "nsecs",

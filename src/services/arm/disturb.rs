@@ -6,8 +6,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::field_by_field::FieldByField;
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, FieldByField};
 
 /// The reason for a refusal after a divergence.
 pub(crate) const DIVERGED: &str =

@@ -1,7 +1,7 @@
-//! The requests to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints and efforts.
+//! The requests to the arm: `/arm_sim/*` and `/pid_controller/*`, setpoints, efforts and parameters.
 //!
-//! A request has the valid fields, and the rejected ones by name. Valid fields take effect, and the answer
-//! echoes the present values.
+//! A request has the valid fields, and the rejected ones by name. Valid fields take effect, and the answer echoes the
+//! present values.
 //!
 //! **Invariant:** an invalid field never prevents a valid one from taking effect.
 
@@ -9,6 +9,7 @@ mod disturb;
 mod gains;
 mod integrator;
 mod messages;
+mod parameters;
 mod params;
 mod period;
 mod reset;
@@ -21,6 +22,10 @@ pub use self::disturb::{Disturb, Push};
 pub use self::gains::SetGains;
 pub use self::integrator::{Integrator, SetIntegrator};
 pub use self::messages::{joint_names, read_effort, read_setpoint};
+pub use self::parameters::{
+    AskParameters, NamedParameter, NotSet, ParameterChange, ParameterRequest, ParameterValue,
+    parameter_services,
+};
 pub use self::params::SetParams;
 pub use self::period::{PeriodInForce, SetPeriod};
 pub use self::reset::Reset;

@@ -7,8 +7,7 @@ use serde::Serialize;
 
 use crate::math::simulation::ControlPeriod;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::field_by_field::{Echo, FieldByField};
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
 /// Sets the time between two runs of the control law.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -7,8 +7,7 @@ use serde::Serialize;
 
 use crate::math::arm::State;
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::services::field_by_field::{Echo, FieldByField};
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
 /// Returns the arm to its starting pose at time 0, unless the request was rejected.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -7,8 +7,7 @@ use bytes::Bytes;
 use super::reset::write_state;
 use crate::math::arm::State;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::field_by_field::{Echo, FieldByField};
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
 /// Sets positions and velocities, running or paused, and ends a divergence.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,8 +12,7 @@ use serde::Serialize;
 use crate::math::arm::State;
 use crate::protocol::messages::Empty;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
-use crate::services::field_by_field::FieldByField;
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, FieldByField};
 
 /// Most steps in one request: the budget of one wake-up, and ten seconds at the default timestep.
 pub const MAX_STEPS: u64 = 10_000;

@@ -7,8 +7,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::services::field_by_field::{Echo, FieldByField};
-use crate::services::{Address, Answered, Ask};
+use crate::services::{Address, Answered, Ask, Echo, FieldByField};
 
 #[derive(Serialize)]
 struct Switch {

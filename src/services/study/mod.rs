@@ -1,16 +1,18 @@
-//! `/study/*`: predictions and offline runs, without effect on the live arm.
+//! `/study/*` and `/arm_sim/integration_step`: predictions and offline runs, without effect on the live arm.
 //!
 //! A missing value is the arm's at the start of the computation. The arm does not change.
 //!
 //! **Invariant:** a computation is done in pieces, each of a fraction of a millisecond.
 
 mod advice;
+mod integration;
 mod rollout;
 mod stability;
 
 use std::time::Duration;
 
 pub use self::advice::{PlanRun, PlannedRun, SuggestGains, Suggested};
+pub use self::integration::{Integrating, IntegrationStep, NotIntegrated};
 pub use self::rollout::{Ran, RolloutWork, RunAnswer, RunOffline};
 pub use self::stability::{PredictStability, Predicted};
 use super::Ask;

@@ -6,7 +6,7 @@ use std::task::Poll;
 
 use super::*;
 use glam::DVec2;
-use pendularm::actors::arm::sim::{CommandGoal, GoalProgress, TrackGoal};
+use pendularm::actors::arm::sim::{CommandGoal, GoalOrder, GoalProgress, TrackGoal};
 use pendularm::math::goal::Criteria;
 
 /// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
@@ -57,14 +57,14 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
         bench.ask(0, weightless);
         let rest = [0.0; 3];
         let owner = owner.start();
-        let goal = TrackGoal {
+        let goal = GoalOrder {
             number: 1,
             target: DVec2::new(0.0, 1.0),
             criteria: Criteria::default(),
             solution: rest,
-            owner: owner.clone().recipient(),
         };
-        bench.arm.send(goal).await.unwrap();
+        let owner = owner.clone().recipient();
+        bench.arm.send(TrackGoal { goal, owner }).await.unwrap();
         let (number, positions) = (1, rest);
         let command = CommandGoal { number, positions };
         bench.arm.send(command).await.unwrap();

@@ -89,10 +89,10 @@ fn settings_as_args<const N: usize>() -> Value {
 }
 
 impl<const N: usize> Handler<ArmSettings<N>> for SettledArm<N> {
-    type Result = Present<N>;
+    type Result = MessageResult<ArmSettings<N>>;
 
-    fn handle(&mut self, _: ArmSettings<N>, _: &mut Context<Self>) -> Present<N> {
-        settings()
+    fn handle(&mut self, _: ArmSettings<N>, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(settings())
     }
 }
 

@@ -15,7 +15,7 @@ use pendularm::services::goals::{CancelRequest, GoalRequest, Solve};
 use pendularm::services::study::{
     Computed, PlanRun, PredictStability, Present, RunOffline, SuggestGains, Work,
 };
-use pendularm::services::trial::{SkipTarget, StartTrial, StopTrial};
+use pendularm::services::trial::TrialRequest;
 use pendularm::services::{Address, Answered, NoService};
 
 use super::Kernel;
@@ -65,16 +65,10 @@ impl<const N: usize> Kernel<N> {
                 }
                 Err(rejected) => self.send(to.failure(&rejected.status())),
             },
-            Service::TrialStart => {
-                self.answer::<StartTrial>(own, &args, &to, |kernel, ask| {
-                    kernel.start_trial(ask, &to)
+            Service::TrialStart | Service::TrialSkip | Service::TrialStop => {
+                self.answer::<TrialRequest>(own, &args, &to, |kernel, ask| {
+                    kernel.change_trial(ask, &to)
                 });
-            }
-            Service::TrialSkip => {
-                self.answer::<SkipTarget>(own, &args, &to, |kernel, _| kernel.skip_target(&to));
-            }
-            Service::TrialStop => {
-                self.answer::<StopTrial>(own, &args, &to, |kernel, _| kernel.stop_trial());
             }
             Service::Stability => {
                 self.begin::<PredictStability<N>, _>(own, &args, to, Computed::work);

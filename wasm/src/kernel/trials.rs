@@ -11,7 +11,9 @@ use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::messages;
 use pendularm::services::Address;
 use pendularm::services::goals::GoalRequest;
-use pendularm::services::trial::{NotStarted, STATUS_PERIOD, StartTrial, Terms, status_message};
+use pendularm::services::trial::{
+    STATUS_PERIOD, Terms, TrialRefused, TrialRequest, status_message,
+};
 
 use super::Kernel;
 
@@ -78,29 +80,29 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Starts a new trial, unless a field was rejected.
-    pub(super) fn start_trial(&mut self, ask: StartTrial, to: &Address) -> Terms {
-        let outcome = if ask.rejected.is_empty() {
-            let pose = self.arm.pose();
-            let target = || sample(&pose.lengths, || self.rng.f64());
-            let decided = self.trial.start(pose.simulated, ask.changes, target);
-            self.decide(decided, Some(to)).map_err(NotStarted::Refused)
-        } else {
-            Err(NotStarted::Rejected(ask.rejected))
+    /// Performs a request about the trial.
+    pub(super) fn change_trial(&mut self, ask: TrialRequest, to: &Address) -> Terms {
+        let pose = self.arm.pose();
+        let target = || sample(&pose.lengths, || self.rng.f64());
+        let outcome = match ask {
+            TrialRequest::Start { rejected, .. } if !rejected.is_empty() => {
+                Err(TrialRefused::Rejected(rejected))
+            }
+            TrialRequest::Start { changes, .. } => {
+                let decided = self.trial.start(pose.simulated, changes, target);
+                self.decide(decided, Some(to))
+            }
+            TrialRequest::Skip => {
+                let decided = self.trial.skip(target);
+                self.decide(decided, Some(to))
+            }
+            TrialRequest::Stop => {
+                let decided = self.trial.stop();
+                self.decide(decided, None)
+            }
         };
         let settings = self.trial.settings();
         Terms { settings, outcome }
-    }
-
-    pub(super) fn skip_target(&mut self, to: &Address) -> Result<(), Rejection> {
-        let lengths = self.arm.pose().lengths;
-        let decided = self.trial.skip(|| sample(&lengths, || self.rng.f64()));
-        self.decide(decided, Some(to))
-    }
-
-    pub(super) fn stop_trial(&mut self) -> Result<(), Rejection> {
-        let decided = self.trial.stop();
-        self.decide(decided, None)
     }
 
     /// Executes the commands. The caller gets a warning if the arm cannot move.
@@ -108,7 +110,7 @@ impl<const N: usize> Kernel<N> {
         &mut self,
         decided: Result<Vec<TrialCommand>, Rejection>,
         warned: Option<&Address>,
-    ) -> Result<(), Rejection> {
+    ) -> Result<(), TrialRefused> {
         let commands = decided?;
         if let (Some(to), Some(obstacle)) = (warned, self.arm.pose().obstacle) {
             self.warn(to, obstacle);

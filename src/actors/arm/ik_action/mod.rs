@@ -22,8 +22,8 @@ pub use self::messages::{
 use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalProgress, TrackGoal, Tracking,
-    joint_names,
+    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal,
+    Tracking, joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
@@ -284,15 +284,15 @@ impl<const N: usize> IkAction<N> {
         let begun = async move {
             let solution = ask(&ik, Solve(target)).await;
             let solution = solution.map_err(|_| GoalRejected::NoAnswer(Node::Ik.name()))??;
-            arm.send(TrackGoal {
+            let goal = GoalOrder {
                 number,
                 target: target.position,
                 criteria,
                 solution,
-                owner: own.recipient(),
-            })
-            .await
-            .map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))
+            };
+            let owner = own.recipient();
+            let tracking = arm.send(TrackGoal { goal, owner }).await;
+            tracking.map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))
         };
         Box::pin(begun.into_actor(self).map(move |tracking, node, _| {
             let is_accepted = tracking.is_ok();

@@ -1,13 +1,14 @@
-//! Messages between the arm and other nodes or the runtime. Requests that clients can also send are in `services`.
+//! Messages of other nodes and of the runtime to the arm. Requests that clients can also send are in `services`.
 //!
 //! **Invariant:** every message is a plain value, independent of the actor that handles it.
 
-use actix::dev::{MessageResponse, OneshotSender};
 use actix::prelude::*;
-use glam::DVec2;
 
-use crate::live::{ArmListener, GoalProgress, Pose, Tracking};
-use crate::math::goal::Criteria;
+use crate::actors::node::Done;
+use crate::actors::wire::TopicMessage;
+use crate::live::{ArmListener, GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
+use crate::math::arm::State;
+use crate::math::pid::Setpoint;
 use crate::math::simulation::Simulation;
 use crate::services::study::Present;
 use crate::study::clocks::ClockLimits;
@@ -26,7 +27,6 @@ pub struct SimulationTime;
 pub struct TakeSnapshot<const N: usize>;
 
 /// The whole present simulation.
-#[derive(MessageResponse)]
 pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
 
 /// The arm's present settings. From `study`, at every call.
@@ -63,14 +63,8 @@ pub struct ArmPose<const N: usize>;
 #[derive(Message)]
 #[rtype(result = "Tracking<N>")]
 pub struct TrackGoal<const N: usize> {
-    /// Identifies the goal between `ik_action` and the arm. Each id is used once.
-    pub number: u64,
-    /// The target of the end effector \[m\].
-    pub target: DVec2,
-    /// The condition for success.
-    pub criteria: Criteria,
-    /// Joint positions that put the end effector there \[rad\].
-    pub solution: [f64; N],
+    /// The goal.
+    pub goal: GoalOrder<N>,
     /// The receiver of feedback and of the end, unless the end is the answer to its own message.
     pub owner: Recipient<GoalProgress<N>>,
 }
@@ -110,18 +104,57 @@ impl<const N: usize> Message for GoalProgress<N> {
     type Result = ();
 }
 
-/// Values of the arm that are answers.
-macro_rules! answers {
-    ($($answer:ident)*) => {
-        $(impl<const N: usize, A: Actor, M: Message<Result = Self>> MessageResponse<A, M> for $answer<N> {
-            fn handle(self, _: &mut A::Context, to: Option<OneshotSender<Self>>) {
-                if let Some(to) = to {
-                    // The receiver may have ended.
-                    let _ = to.send(self);
-                }
-            }
-        })*
-    };
+// ---- setpoints and efforts ------------------------------------------------------------------------------------------
+
+/// A setpoint for the controller, from the next step on. From clients, by `/joint_trajectory`.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct SetSetpoint<const N: usize> {
+    /// The joint state to hold.
+    pub setpoint: Setpoint<N>,
+    /// Dropped when it has taken effect.
+    pub done: Option<Done>,
 }
 
-answers! { Pose Present Tracking }
+/// Requests the arm's present motion. From `joint_trajectory_controller`, while a goal is active.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "JointMotion<N>")]
+pub struct ArmMotion<const N: usize>;
+
+/// The motion of the arm at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointMotion<const N: usize> {
+    /// Positions and velocities.
+    pub state: State<N>,
+    /// The held joint state.
+    pub setpoint: Setpoint<N>,
+    /// Simulation time since the last reset \[s\].
+    pub time: f64,
+    /// The number of resets.
+    pub resets: u64,
+    /// Whether it is paused and no step has been taken since.
+    pub stands_still: bool,
+    /// Why it does not follow its setpoint; `None` if it does.
+    pub obstacle: Option<Obstacle>,
+}
+
+/// Moves the setpoint, if it is still the sender's last one. The answer is whether it was. From
+/// `joint_trajectory_controller`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "bool")]
+pub struct MoveSetpoint<const N: usize> {
+    /// The sender's last setpoint.
+    pub from: Setpoint<N>,
+    /// The next one.
+    pub to: Setpoint<N>,
+}
+
+/// An effort to be applied from the next step on. From clients, by `/effort_controller/commands`.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CommandEffort<const N: usize> {
+    /// Effort per joint \[N m\].
+    pub effort: [f64; N],
+    /// The client's message. Its client gets an error if the controller is on.
+    pub message: TopicMessage,
+}

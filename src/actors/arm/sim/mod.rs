@@ -5,30 +5,29 @@
 //!
 //! **Invariant:** there is no physics here. The live arm and an offline `Simulation` are bit-identical.
 
-mod goals;
-mod inputs;
 mod messages;
 mod node;
+mod orders;
 mod requests;
-mod steps;
 mod turn;
 mod waiting;
 mod world;
 
-pub use self::inputs::{ArmMotion, CommandEffort, JointMotion, MoveSetpoint, SetSetpoint};
 pub use self::messages::{
-    AddBarrier, ArmPose, ArmSettings, Barrier, CommandGoal, Consult, EndGoal, HeldLimit,
-    SimulationTime, Snapshot, TakeSnapshot, Tell, TrackGoal,
+    AddBarrier, ArmMotion, ArmPose, ArmSettings, Barrier, CommandEffort, CommandGoal, Consult,
+    EndGoal, HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot,
+    TakeSnapshot, Tell, TrackGoal,
 };
 pub use self::node::ArmSim;
+pub use self::orders::ArmOrder;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
-    ArmEvent, ArmListener, ArmNews, BREATHER, GoalProgress, LEAST_PAUSE, Obstacle, PUBLISH_RATE,
-    Pose, Tracking, WAKE_UP_BUDGET,
+    ArmEvent, ArmListener, ArmNews, BREATHER, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle,
+    PUBLISH_RATE, Pose, Tracking, WAKE_UP_BUDGET,
 };
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,
     SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step, Stepped, StepsEnd, joint_names,
 };
-pub use crate::services::field_by_field::{Echo, FieldByField};
 pub use crate::services::study::Present;
+pub use crate::services::{Echo, FieldByField};

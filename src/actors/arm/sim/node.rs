@@ -1,11 +1,12 @@
 //! The actor: reads the clock, advances the simulation, wakes for the next tick.
 //!
 //! The arm wakes 60 times a second. It advances to the present time before it handles a message, so every answer has
-//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond
-//! that are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of
-//! every [turn](super::turn).
+//! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
+//! are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
+//! [turn](super::turn).
 //!
-//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
+//! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An
+//! answer that the arm is at rest follows all news of goals.
 
 use std::collections::VecDeque;
 use std::pin::Pin;
@@ -15,18 +16,16 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{
-    ArmSettings, Barrier, Consult, HeldLimit, SimulationTime, Snapshot, TakeSnapshot, Tell,
-};
+use super::messages::{AddBarrier, ArmSettings, Barrier, Consult, HeldLimit};
 use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Interest, Publish};
 use crate::actors::resources::gauges::Gauges;
-use crate::live::{BREATHER, GoalProgress, Journal, LiveArm, PUBLISH_RATE};
+use crate::live::{BREATHER, GoalProgress, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
-use crate::services::study::Present;
+use crate::math::simulation::ArmInput;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -108,30 +107,12 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<SimulationTime> for ArmSim<N> {
-    type Result = f64;
-
-    fn handle(&mut self, _: SimulationTime, ctx: &mut Context<Self>) -> f64 {
-        self.attend(ctx);
-        self.arm.simulation.time()
-    }
-}
-
-impl<const N: usize> Handler<TakeSnapshot<N>> for ArmSim<N> {
-    type Result = Snapshot<N>;
-
-    fn handle(&mut self, _: TakeSnapshot<N>, ctx: &mut Context<Self>) -> Snapshot<N> {
-        self.attend(ctx);
-        Snapshot(Box::new(self.arm.simulation.clone()))
-    }
-}
-
 impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
-    type Result = Present<N>;
+    type Result = MessageResult<ArmSettings<N>>;
 
-    fn handle(&mut self, _: ArmSettings<N>, ctx: &mut Context<Self>) -> Present<N> {
+    fn handle(&mut self, _: ArmSettings<N>, ctx: &mut Context<Self>) -> Self::Result {
         self.count_message(ctx);
-        self.arm.present()
+        MessageResult(self.arm.present())
     }
 }
 
@@ -143,15 +124,11 @@ impl<const N: usize> Handler<Consult<N>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<Tell<N>> for ArmSim<N> {
+impl<const N: usize> Handler<AddBarrier> for ArmSim<N> {
     type Result = ();
 
-    /// A listener gets the whole simulation first.
-    fn handle(&mut self, Tell(listener): Tell<N>, ctx: &mut Context<Self>) {
-        self.attend(ctx);
-        self.arm.tell_state();
-        self.arm.journal = listener.map(Journal::new);
-        self.arm.tell_state();
+    fn handle(&mut self, AddBarrier(owner): AddBarrier, _: &mut Context<Self>) {
+        self.owners.push(owner);
     }
 }
 
@@ -201,6 +178,32 @@ impl<const N: usize> ArmSim<N> {
                 Self::breathe(is_behind, ctx);
             });
         }
+    }
+
+    /// Ends the command of a client that has disconnected.
+    fn end_orphaned_command(&mut self) {
+        let is_gone = |present: &Weak<()>| present.strong_count() == 0;
+        if self.commander.as_ref().is_some_and(is_gone) {
+            self.commander = None;
+            self.arm.change(ArmInput::Command([0.0; N]));
+        }
+    }
+
+    /// Answers after all news of goals have been published. The owner of a goal publishes them, and none may
+    /// follow the answer that the arm is at rest.
+    pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
+        let owners = self.owners.iter();
+        let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();
+        if asked.is_empty() {
+            return answer();
+        }
+        let passed = async move {
+            for one in asked {
+                // An owner that has ended publishes nothing.
+                let _ = one.await;
+            }
+        };
+        ctx.spawn(passed.into_actor(self).map(move |(), _, _| answer()));
     }
 
     /// Requests the limit of the active loop, if it is needed. `study` predicts it on its workers.

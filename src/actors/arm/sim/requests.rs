@@ -1,23 +1,29 @@
 //! Calls and messages of clients to the arm. The requests are in `services::arm`, and their effects in `live`.
 //!
-//! **Invariant:** the arm advances to now before it answers.
+//! Requests for more than one row of steps take turns. The effect is that of separate requests for single steps, so
+//! other requests take effect in between.
+//!
+//! **Invariant:** the arm advances to now before it answers. A refused request for steps changes nothing. An accepted
+//! one is completed, unless the arm diverges, is resumed, or the runtime ends.
 
 use actix::prelude::*;
 
-use super::inputs;
 use super::node::ArmSim;
-use crate::actors::node::Call;
+use super::orders;
+use super::waiting::Steps;
+use crate::actors::node::{Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Direction, Node, Service, Topic};
 use crate::services::arm::{
-    Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod, SetState, Step,
+    AskParameters, Disturb, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
+    SetState, Step, parameter_services,
 };
 
 impl<const N: usize> ArmSim<N> {
     /// Adds this node's services and topics to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        inputs::attach(address, nodes);
+        orders::listen(address, nodes);
         nodes.serve::<Disturb<N>>(Service::Disturb, address.clone());
         nodes.serve::<SetGains<N>>(Service::SetGains, address.clone());
         nodes.serve::<SetIntegrator>(Service::SetIntegrator, address.clone());
@@ -28,6 +34,9 @@ impl<const N: usize> ArmSim<N> {
         nodes.serve::<Step<N>>(Service::Step, address.clone());
         nodes.serve::<Pause>(Service::Pause, address.clone());
         nodes.serve::<Enable>(Service::Enable, address.clone());
+        for service in parameter_services() {
+            nodes.serve::<AskParameters<N>>(service, address.clone());
+        }
         for topic in Topic::ALL {
             let published = topic.direction() == Direction::Published;
             if published && topic.owner() == Node::ArmSim {
@@ -49,6 +58,80 @@ impl<const N: usize, A: ArmRequest<N>> Handler<Call<A>> for ArmSim<N> {
             self.after_barriers(ctx, conclude);
         } else {
             conclude();
+        }
+    }
+}
+
+// ---- single steps ---------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
+    type Result = ();
+
+    /// Only the owner of the goal ends it.
+    fn handle(&mut self, ShutDown(why): ShutDown, ctx: &mut Context<Self>) {
+        self.count_message(ctx);
+        for mut steps in self.steps.drain(..) {
+            steps.reply.refuse(Unserved::Refused(why));
+        }
+    }
+}
+
+impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
+    type Result = ();
+
+    /// The steps do not depend on wall time, and the arm continues from their end when it is resumed.
+    fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
+        self.attend(ctx);
+        let asked = match self.arm.begin_steps(ask) {
+            Ok(asked) => asked,
+            Err(rejected) => return reply.conclude(Err(rejected)),
+        };
+        let steps = Steps { asked, reply };
+        if self.is_stepping && self.arm.judges_steps() {
+            return self.steps.push_back(steps);
+        }
+        self.take_row(steps);
+        if !self.is_stepping {
+            self.go_on_stepping(ctx);
+        }
+    }
+}
+
+impl<const N: usize> ArmSim<N> {
+    /// Yields to all other messages, and waits for the goal's feedback. Then the remaining requests continue, one
+    /// after the other.
+    fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
+        let underway = self.underway.take();
+        self.is_stepping = underway.is_some() || !self.steps.is_empty();
+        if !self.is_stepping {
+            return;
+        }
+        let others = async move {
+            match underway {
+                Some(progress) => drop(progress.await),
+                None => tokio::task::yield_now().await,
+            }
+        };
+        ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
+            if let Some(next) = arm.steps.pop_front() {
+                arm.take_row(next);
+            }
+            arm.go_on_stepping(ctx);
+        }));
+    }
+
+    /// Takes the next row of steps. Answers after the last one, otherwise puts the request at the end of the queue.
+    fn take_row(&mut self, mut steps: Steps<N>) {
+        if steps.reply.caller_is_gone() {
+            return steps.reply.refuse(Unserved::CallerGone);
+        }
+        let (stepped, progress) = self.arm.take_row(&mut steps.asked);
+        if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {
+            self.underway = Some(Box::pin(owner.send(progress)));
+        }
+        match stepped {
+            Some(stepped) => steps.reply.conclude(Ok(stepped)),
+            None => self.steps.push_back(steps),
         }
     }
 }

@@ -87,8 +87,7 @@ impl ToEncode {
             return fragments::split(plain, size, &id, MAX_MESSAGE).map(Some);
         }
         let msg = messages::message_text(spelling, plain);
-        let tree = MessageTree::read(msg).ok()?;
-        let msg = tree.root();
+        let msg = &MessageTree::read(msg).ok()?;
         let bytes = match encoding.compression {
             Compression::CborRaw => cbor::publish_raw(spelling, type_name?, msg, MAX_MESSAGE)?,
             _ => cbor::publish(spelling, type_name, msg, MAX_MESSAGE)?,

@@ -1,25 +1,20 @@
-//! Questions about parameters in JSON, in the forms of rosapi and of ROS 2.
+//! The arm's parameters: `get_param` of rosapi and similar services, and `/arm_sim/get_parameters` and similar
+//! services, which every node of ROS 2 has. All these services are one question, which names parameters.
 //!
-//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration. A question
-//! about a parameter that does not exist reaches the node.
+//! **Invariant:** a value is read as the arm's own service reads it, and has the type of its declaration. The answer
+//! has one entry for each entry of the request, in the same order.
 
-use actix::prelude::*;
 use bytes::Bytes;
-use serde::Serialize;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::{
-    ArmQuestion, AskParameters, NamedParameter, NotSet, ParameterRequest, ParameterValue,
-    Parameters,
-};
-use crate::actors::arm::sim::FieldByField;
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use super::{SetGains, SetIntegrator, SetParams, SetPeriod};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
 use crate::protocol::ros::parameters::{MAX_NAMED, NO_SUCH, Parameter, ParameterType};
 use crate::protocol::wire::json::{self, text};
+use crate::services::{Address, Answered, Ask, Callable, FieldByField};
 
 /// The services of ROS 2.
 const OF_ROS_2: [Service; 5] = [
@@ -32,15 +27,110 @@ const OF_ROS_2: [Service; 5] = [
 /// The value of a parameter that does not exist, as JSON text, because clients parse it.
 const NO_VALUE: &str = "\"\"";
 
-impl<const N: usize> Parameters<N> {
-    /// Adds the services of parameters to the registry's table.
-    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        let of_rosapi = Rosapi::ALL.into_iter();
-        let of_rosapi = of_rosapi.filter(|question| question.is_about_parameters());
-        for service in of_rosapi.map(Service::Rosapi).chain(OF_ROS_2) {
-            nodes.serve::<AskParameters<N>>(service, address.clone());
+/// All services of the parameters.
+pub fn parameter_services() -> impl Iterator<Item = Service> {
+    let of_rosapi = Rosapi::ALL.into_iter();
+    let of_rosapi = of_rosapi.filter(|question| question.is_about_parameters());
+    of_rosapi.map(Service::Rosapi).chain(OF_ROS_2)
+}
+
+/// Asks about parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AskParameters<const N: usize> {
+    /// The named parameters, and the request about each.
+    pub entries: Vec<(NamedParameter, ParameterRequest<N>)>,
+}
+
+impl<const N: usize> Ask for AskParameters<N> {
+    /// The requested values.
+    type Answer = Vec<(NamedParameter, Result<Option<ParameterValue<N>>, NotSet>)>;
+}
+
+/// A parameter by its name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedParameter {
+    /// The name as the client spells it.
+    pub name: String,
+    /// The parameter, if there is one of that name.
+    pub parameter: Option<Parameter>,
+    /// The value, as JSON text, for a parameter that does not exist.
+    pub default: String,
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue<const N: usize> {
+    /// A number.
+    Number(f64),
+    /// One per joint.
+    Numbers([f64; N]),
+    /// A name or a description.
+    Text(String),
+}
+
+impl<const N: usize> From<ParameterValue<N>> for Value {
+    fn from(value: ParameterValue<N>) -> Self {
+        match value {
+            ParameterValue::Number(number) => number.into(),
+            ParameterValue::Numbers(numbers) => numbers.to_vec().into(),
+            ParameterValue::Text(text) => text.into(),
         }
     }
+}
+
+/// A request about one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterRequest<const N: usize> {
+    /// Describes it, without its value.
+    Describe,
+    /// Reads its value.
+    Get,
+    /// Sets it.
+    Set(ParameterChange<N>),
+    /// It cannot be set, for this reason.
+    Refuse(NotSet),
+}
+
+/// A request to the service that has the parameter as a field, with a value for that field alone.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterChange<const N: usize> {
+    /// Gravity, masses and lengths.
+    Params(SetParams<N>),
+    /// Gains.
+    Gains(SetGains<N>),
+    /// Method and timestep.
+    Integrator(SetIntegrator),
+    /// The control period.
+    Period(SetPeriod),
+}
+
+/// Why a parameter was not set.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotSet {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// It has no value of its own.
+    #[error("name: robot_description is made from lengths and masses")]
+    Derived,
+    /// Its value is of another type.
+    #[error("{name} must be a {expected} (type {number}), got type {found}")]
+    WrongType {
+        /// The parameter's name.
+        name: &'static str,
+        /// The name of its type.
+        expected: &'static str,
+        /// The number of its type.
+        number: u8,
+        /// The number of the type that came.
+        found: u8,
+    },
+    /// The value can't be read.
+    #[error("value must be JSON text")]
+    NotJson,
+    /// The arm does not take it.
+    #[error("{0}")]
+    Rejected(Rejections),
 }
 
 // ---- reading --------------------------------------------------------------------------------------------------------
@@ -54,9 +144,6 @@ impl NamedParameter {
         }
     }
 }
-
-/// The parameters of a question, and the request about each.
-type Entries<const N: usize> = Vec<(NamedParameter, Option<ParameterRequest<N>>)>;
 
 impl<const N: usize> Callable for AskParameters<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
@@ -73,10 +160,11 @@ impl<const N: usize> Callable for AskParameters<N> {
             _ => {
                 let names = fields.texts("names", MAX_NAMED).unwrap_or_default();
                 let entry = |name| {
-                    let named = NamedParameter::of(name);
-                    let is_read = service == Service::GetParameters;
-                    let read = named.parameter.filter(|_| is_read);
-                    (named, read.map(|parameter| request(parameter, None)))
+                    let request = match service {
+                        Service::GetParameters => ParameterRequest::Get,
+                        _ => ParameterRequest::Describe,
+                    };
+                    (NamedParameter::of(name), request)
                 };
                 names.into_iter().map(entry).collect()
             }
@@ -86,11 +174,18 @@ impl<const N: usize> Callable for AskParameters<N> {
 }
 
 /// Descriptions of the parameters that `is_meant` selects by name.
-fn described<const N: usize>(is_meant: impl Fn(&str) -> bool) -> Entries<N> {
+fn described<const N: usize>(
+    is_meant: impl Fn(&str) -> bool,
+) -> Vec<(NamedParameter, ParameterRequest<N>)> {
     let names = Parameter::ALL.into_iter().map(Parameter::name);
     let meant = names.filter(|name| is_meant(name));
     meant
-        .map(|name| (NamedParameter::of(name.to_owned()), None))
+        .map(|name| {
+            (
+                NamedParameter::of(name.to_owned()),
+                ParameterRequest::Describe,
+            )
+        })
         .collect()
 }
 
@@ -99,7 +194,7 @@ fn read_rosapi<const N: usize>(
     question: Rosapi,
     service: Service,
     fields: &mut Fields<'_>,
-) -> (NamedParameter, Option<ParameterRequest<N>>) {
+) -> (NamedParameter, ParameterRequest<N>) {
     let mut text = |index: usize| {
         let field = service.fields().get(index)?;
         fields.text(field.name)
@@ -108,46 +203,52 @@ fn read_rosapi<const N: usize>(
     let mut named = NamedParameter::of(name.unwrap_or_default().into_owned());
     let value = value.unwrap_or_default();
     let request = match (question, named.parameter) {
-        (Rosapi::GetParam, parameter) => {
+        (Rosapi::GetParam, _) => {
             named.default = value.into_owned();
-            parameter.map(|parameter| request(parameter, None))
+            ParameterRequest::Get
         }
-        (Rosapi::SetParam, None) => Some(Err(NotSet::Unknown)),
+        (Rosapi::SetParam, None) => ParameterRequest::Refuse(NotSet::Unknown),
         (Rosapi::SetParam, Some(parameter)) => {
             // Literals are accepted as in every frame. They are refused by the parameter's name.
             let text = json::accept_literals(value.into_owned());
             let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson);
-            Some(value.and_then(|value| request(parameter, Some(&value))))
+            value.and_then(|value| change(parameter, &value)).into()
         }
-        _ => None,
+        _ => ParameterRequest::Describe,
     };
     (named, request)
 }
 
-/// The request to the service that has the parameter as a field: with a `value`, or without one to read it.
-fn request<const N: usize>(parameter: Parameter, value: Option<&RawValue>) -> ParameterRequest<N> {
+impl<const N: usize> From<Result<ParameterChange<N>, NotSet>> for ParameterRequest<N> {
+    fn from(change: Result<ParameterChange<N>, NotSet>) -> Self {
+        change.map_or_else(Self::Refuse, Self::Set)
+    }
+}
+
+/// The request that sets a parameter to a value.
+fn change<const N: usize>(
+    parameter: Parameter,
+    value: &RawValue,
+) -> Result<ParameterChange<N>, NotSet> {
     fn read<A: FieldByField>(fields: Fields<'_>, field: &str, parameter: Parameter) -> A {
         let mut ask = A::request(fields);
         ask.rejected().rename(field, parameter.name());
         ask
     }
-    let (service, field) = match (parameter.field(), value) {
-        (Some(field), _) => field,
-        // It is computed from these.
-        (None, None) => (Service::SetParams, ""),
-        (None, Some(_)) => return Err(NotSet::Derived),
-    };
-    let fields = Fields::single(service, field, value);
+    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+    let fields = Fields::single(service, field, Some(value));
     Ok(match service {
-        Service::SetParams => ArmQuestion::Params(read(fields, field, parameter)),
-        Service::SetGains => ArmQuestion::Gains(read(fields, field, parameter)),
-        Service::SetPeriod => ArmQuestion::Period(read(fields, field, parameter)),
-        _ => ArmQuestion::Integrator(read(fields, field, parameter)),
+        Service::SetParams => ParameterChange::Params(read(fields, field, parameter)),
+        Service::SetGains => ParameterChange::Gains(read(fields, field, parameter)),
+        Service::SetPeriod => ParameterChange::Period(read(fields, field, parameter)),
+        _ => ParameterChange::Integrator(read(fields, field, parameter)),
     })
 }
 
 /// The changes of `/arm_sim/set_parameters`.
-fn read_changes<const N: usize>(fields: &mut Fields<'_>) -> Result<Entries<N>, Rejections> {
+fn read_changes<const N: usize>(
+    fields: &mut Fields<'_>,
+) -> Result<Vec<(NamedParameter, ParameterRequest<N>)>, Rejections> {
     let entries = fields.entries("parameters", MAX_NAMED).unwrap_or_default();
     let read = |(index, entry)| {
         read_given(entry).ok_or_else(|| {
@@ -160,9 +261,7 @@ fn read_changes<const N: usize>(fields: &mut Fields<'_>) -> Result<Entries<N>, R
 }
 
 /// Reads a `rcl_interfaces/msg/Parameter`; `None` if it is not one.
-fn read_given<const N: usize>(
-    entry: &RawValue,
-) -> Option<(NamedParameter, Option<ParameterRequest<N>>)> {
+fn read_given<const N: usize>(entry: &RawValue) -> Option<(NamedParameter, ParameterRequest<N>)> {
     let [name, value] = json::members(entry.get(), &["name", "value"]).ok()?;
     let [kind, integer, double, string, integers, doubles] = json::members(
         value?.get(),
@@ -178,7 +277,7 @@ fn read_given<const N: usize>(
     .ok()?;
     let named = NamedParameter::of(text(name?).unwrap_or_default().into_owned());
     let kind = u8::try_from(json::integer(kind?)?).ok()?;
-    let change = |parameter: Parameter| {
+    let read = |parameter: Parameter| {
         let expected = parameter.kind();
         let member = match (expected, kind) {
             (ParameterType::Double, 2) => integer,
@@ -195,23 +294,26 @@ fn read_given<const N: usize>(
                 });
             }
         };
-        request(parameter, Some(member.unwrap_or(RawValue::NULL)))
+        change(parameter, member.unwrap_or(RawValue::NULL))
     };
-    let change = named.parameter.ok_or(NotSet::Unknown).and_then(change);
-    Some((named, Some(change)))
+    let change = named.parameter.ok_or(NotSet::Unknown).and_then(read);
+    Some((named, change.into()))
 }
 
 // ---- writing --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Answered for AskParameters<N> {
     fn write(answers: Self::Answer, to: &Address) -> Bytes {
+        let as_json = |answer: Result<Option<ParameterValue<N>>, NotSet>| {
+            answer.map(|value| value.map(Value::from))
+        };
         let values = match to.service() {
             Service::Rosapi(Rosapi::GetParamNames) => {
                 let all = answers.iter().filter_map(|(named, _)| named.parameter);
                 json!({"names": all.map(Parameter::full_name).collect::<Vec<_>>()})
             }
             Service::Rosapi(question) => match answers.into_iter().next() {
-                Some((named, answer)) => rosapi_values(question, &named, answer),
+                Some((named, answer)) => rosapi_values(question, &named, as_json(answer)),
                 None => Value::Null,
             },
             Service::ListParameters => {
@@ -220,7 +322,8 @@ impl<const N: usize> Answered for AskParameters<N> {
             }
             Service::GetParameters => {
                 let values = answers.into_iter();
-                let values = values.map(|(_, answer)| ValueMessage::from(answer.ok().flatten()));
+                let values = values
+                    .map(|(named, answer)| value_message(&named, as_json(answer).ok().flatten()));
                 json!({"values": values.collect::<Vec<_>>()})
             }
             Service::GetParameterTypes => {
@@ -243,23 +346,16 @@ impl<const N: usize> Answered for AskParameters<N> {
 }
 
 /// The values of an answer of rosapi about one parameter.
-fn rosapi_values<const N: usize>(
+fn rosapi_values(
     question: Rosapi,
     named: &NamedParameter,
-    answer: Result<Option<ParameterValue<N>>, NotSet>,
+    answer: Result<Option<Value>, NotSet>,
 ) -> Value {
     match question {
         Rosapi::HasParam => json!({"exists": named.parameter.is_some()}),
         Rosapi::SetParam => change_values(&answer),
         Rosapi::GetParam => match answer.ok().flatten() {
-            Some(value) => {
-                let value = match value {
-                    ParameterValue::Number(number) => Value::from(number),
-                    ParameterValue::Numbers(numbers) => Value::from(numbers.to_vec()),
-                    ParameterValue::Text(text) => Value::from(text),
-                };
-                json!({"value": value.to_string(), "successful": true, "reason": ""})
-            }
+            Some(value) => json!({"value": value.to_string(), "successful": true, "reason": ""}),
             None => {
                 let value = match named.default.as_str() {
                     "" => NO_VALUE,
@@ -307,39 +403,23 @@ fn type_number(parameter: Option<Parameter>) -> u8 {
 }
 
 /// `rcl_interfaces/msg/ParameterValue`.
-#[derive(Debug, Default, Serialize)]
-struct ValueMessage {
-    r#type: u8,
-    bool_value: bool,
-    integer_value: i64,
-    double_value: f64,
-    string_value: String,
-    byte_array_value: [u8; 0],
-    bool_array_value: [bool; 0],
-    integer_array_value: [i64; 0],
-    double_array_value: Vec<f64>,
-    string_array_value: [String; 0],
-}
-
-impl<const N: usize> From<Option<ParameterValue<N>>> for ValueMessage {
-    fn from(value: Option<ParameterValue<N>>) -> Self {
-        let mut message = Self::default();
-        let kind = match value {
-            None => return message,
-            Some(ParameterValue::Number(number)) => {
-                message.double_value = number;
-                ParameterType::Double
-            }
-            Some(ParameterValue::Numbers(numbers)) => {
-                message.double_array_value = numbers.to_vec();
-                ParameterType::DoubleArray
-            }
-            Some(ParameterValue::Text(text)) => {
-                message.string_value = text;
-                ParameterType::Text
-            }
-        };
-        message.r#type = kind as u8;
-        message
-    }
+fn value_message(named: &NamedParameter, value: Option<Value>) -> Value {
+    let kind = value.as_ref().and(named.parameter).map(Parameter::kind);
+    let value = value.unwrap_or_default();
+    let of = |wanted: ParameterType, default: Value| match kind == Some(wanted) {
+        true => value.clone(),
+        false => default,
+    };
+    json!({
+        "type": kind.map_or(0, |kind| kind as u8),
+        "bool_value": false,
+        "integer_value": 0,
+        "double_value": of(ParameterType::Double, json!(0.0)),
+        "string_value": of(ParameterType::Text, json!("")),
+        "byte_array_value": [],
+        "bool_array_value": [],
+        "integer_array_value": [],
+        "double_array_value": of(ParameterType::DoubleArray, json!([])),
+        "string_array_value": [],
+    })
 }

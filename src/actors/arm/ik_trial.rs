@@ -6,24 +6,18 @@
 //! **Invariant:** time and news of goals are handled in the order in which the arm sent them. No timer runs without a
 //! trial or a subscriber.
 
-mod goals;
-
 use std::time::Duration;
 
 use actix::prelude::*;
 
-pub use self::goals::GoalClient;
-use self::goals::{GoalAnswer, carry_out};
-use super::ik_action::GoalNews;
+use super::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Barrier, Pose};
-use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
+use crate::actors::node::{Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
-use crate::math::trial::{Changes, Conclusion, Rejection, Trial, TrialCommand, sample};
+use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
 use crate::protocol::catalog::{Node, Service, Topic};
 use crate::services::trial::status_message;
-pub use crate::services::trial::{
-    NotStarted, STATUS_PERIOD, SkipTarget, StartTrial, StopTrial, Terms,
-};
+pub use crate::services::trial::{STATUS_PERIOD, Terms, TrialRefused, TrialRequest};
 
 /// Least time between two checks whether a trial is over. The rest of a trial may take long if the arm is paused or
 /// slow.
@@ -79,9 +73,9 @@ impl<const N: usize> IkTrial<N> {
 
     /// Adds this node's services and its topic to the registry's table.
     pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve::<StartTrial>(Service::TrialStart, address.clone());
-        nodes.serve::<SkipTarget>(Service::TrialSkip, address.clone());
-        nodes.serve::<StopTrial>(Service::TrialStop, address.clone());
+        for service in [Service::TrialStart, Service::TrialSkip, Service::TrialStop] {
+            nodes.serve::<TrialRequest>(service, address.clone());
+        }
         let node = address.clone().recipient();
         nodes.publishers.insert(Topic::TrialStatus, node);
     }
@@ -101,9 +95,8 @@ struct PoseKnown<const N: usize> {
 
 /// The node's next action, once it has lengths and time.
 enum Intent {
-    Start(Changes, Reply<Terms>),
-    Skip(Reply<Result<(), Rejection>>),
-    Stop(Reply<Result<(), Rejection>>),
+    /// Performs a request.
+    Perform(TrialRequest, Reply<Terms>),
     /// The trial may be over.
     CheckDeadline,
     /// A status is due.
@@ -118,32 +111,17 @@ impl<const N: usize> Actor for IkTrial<N> {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Call<StartTrial>> for IkTrial<N> {
+impl<const N: usize> Handler<Call<TrialRequest>> for IkTrial<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<StartTrial>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, call: Call<TrialRequest>, ctx: &mut Context<Self>) {
         let Call { ask, mut reply } = call;
-        if ask.rejected.is_empty() {
-            self.ask_arm(Intent::Start(ask.changes, reply), ctx);
-        } else {
-            reply.answer(self.terms(Err(NotStarted::Rejected(ask.rejected))));
+        match ask {
+            TrialRequest::Start { rejected, .. } if !rejected.is_empty() => {
+                reply.answer(self.terms(Err(TrialRefused::Rejected(rejected))));
+            }
+            ask => self.ask_arm(Intent::Perform(ask, reply), ctx),
         }
-    }
-}
-
-impl<const N: usize> Handler<Call<SkipTarget>> for IkTrial<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<SkipTarget>, ctx: &mut Context<Self>) {
-        self.ask_arm(Intent::Skip(call.reply), ctx);
-    }
-}
-
-impl<const N: usize> Handler<Call<StopTrial>> for IkTrial<N> {
-    type Result = ();
-
-    fn handle(&mut self, call: Call<StopTrial>, ctx: &mut Context<Self>) {
-        self.ask_arm(Intent::Stop(call.reply), ctx);
     }
 }
 
@@ -152,27 +130,33 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
 
     fn handle(&mut self, known: PoseKnown<N>, ctx: &mut Context<Self>) {
         let Some(pose) = known.pose else {
-            return known.intent.refuse();
+            // Without an arm there is nothing to do.
+            if let Intent::Perform(_, mut reply) = known.intent {
+                reply.refuse(Unserved::NoAnswer(Node::ArmSim.name()));
+            }
+            return;
         };
         let mut commands = self.hear(&pose);
         let target = || sample(&self.lengths, || self.rng.f64());
-        let (decided, pending) = match known.intent {
-            Intent::Start(changes, reply) => {
-                let decided = self.trial.start(self.clock.1, changes, target);
-                if decided.is_ok() {
-                    self.cancel_deadline(ctx);
-                    warn(&reply, &pose);
+        let (decided, reply) = match known.intent {
+            Intent::Perform(ask, reply) => {
+                let moves_arm = ask != TrialRequest::Stop;
+                let decided = match ask {
+                    TrialRequest::Start { changes, .. } => {
+                        let decided = self.trial.start(self.clock.1, changes, target);
+                        if decided.is_ok() {
+                            self.cancel_deadline(ctx);
+                        }
+                        decided
+                    }
+                    TrialRequest::Skip => self.trial.skip(target),
+                    TrialRequest::Stop => self.trial.stop(),
+                };
+                if let (true, true, Some(obstacle)) = (decided.is_ok(), moves_arm, pose.obstacle) {
+                    reply.warn(&obstacle.to_string());
                 }
-                (decided, Some(Pending::Start(reply)))
+                (decided, Some(reply))
             }
-            Intent::Skip(reply) => {
-                let decided = self.trial.skip(target);
-                if decided.is_ok() {
-                    warn(&reply, &pose);
-                }
-                (decided, Some(Pending::Other(reply)))
-            }
-            Intent::Stop(reply) => (self.trial.stop(), Some(Pending::Other(reply))),
             Intent::CheckDeadline => (Ok(Vec::new()), None),
             Intent::ShowStatus => {
                 self.status_asked = false;
@@ -182,11 +166,11 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
         match decided {
             Ok(more) => {
                 commands.extend(more);
-                self.perform(commands, pending, ctx);
+                self.perform(commands, reply, ctx);
             }
             Err(why) => {
                 self.perform(commands, None, ctx);
-                self.answer(pending, Err(why));
+                self.answer(reply, Err(why.into()));
             }
         }
     }
@@ -226,31 +210,6 @@ impl<const N: usize> Handler<Interest> for IkTrial<N> {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl Intent {
-    /// Without an arm there is nothing to do.
-    fn refuse(self) {
-        let why = Unserved::NoAnswer(Node::ArmSim.name());
-        match self {
-            Self::Start(_, mut reply) => reply.refuse(why),
-            Self::Skip(mut reply) | Self::Stop(mut reply) => reply.refuse(why),
-            Self::CheckDeadline | Self::ShowStatus => {}
-        }
-    }
-}
-
-/// Informs the caller if the trial's goals do not move the arm, with the reason.
-fn warn<T, const N: usize>(reply: &Reply<T>, pose: &Pose<N>) {
-    if let Some(obstacle) = pose.obstacle {
-        reply.warn(&obstacle.to_string());
-    }
-}
-
-/// A call that is answered after its actions have started.
-enum Pending {
-    Start(Reply<Terms>),
-    Other(Reply<Result<(), Rejection>>),
-}
-
 impl<const N: usize> IkTrial<N> {
     /// Sends a request to the arm, and continues after all its earlier messages have been handled.
     fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
@@ -277,7 +236,7 @@ impl<const N: usize> IkTrial<N> {
     fn perform(
         &mut self,
         commands: Vec<TrialCommand>,
-        pending: Option<Pending>,
+        reply: Option<Reply<Terms>>,
         ctx: &mut Context<Self>,
     ) {
         let mut about_goals = Vec::new();
@@ -289,7 +248,7 @@ impl<const N: usize> IkTrial<N> {
         }
         self.keep_timers(ctx);
         if about_goals.is_empty() {
-            return self.answer(pending, Ok(()));
+            return self.answer(reply, Ok(()));
         }
         let carried_out = carry_out(
             about_goals,
@@ -302,7 +261,7 @@ impl<const N: usize> IkTrial<N> {
                 .into_iter()
                 .flat_map(|answer| node.goal_answered(answer))
                 .collect();
-            node.perform(commands, pending, ctx);
+            node.perform(commands, reply, ctx);
         }));
     }
 
@@ -315,17 +274,13 @@ impl<const N: usize> IkTrial<N> {
         }
     }
 
-    fn answer(&self, pending: Option<Pending>, outcome: Result<(), Rejection>) {
-        match pending {
-            Some(Pending::Start(mut reply)) => {
-                reply.answer(self.terms(outcome.map_err(NotStarted::Refused)));
-            }
-            Some(Pending::Other(mut reply)) => reply.answer(outcome),
-            None => {}
+    fn answer(&self, reply: Option<Reply<Terms>>, outcome: Result<(), TrialRefused>) {
+        if let Some(mut reply) = reply {
+            reply.answer(self.terms(outcome));
         }
     }
 
-    fn terms(&self, outcome: Result<(), NotStarted>) -> Terms {
+    fn terms(&self, outcome: Result<(), TrialRefused>) -> Terms {
         Terms {
             settings: self.trial.settings(),
             outcome,
@@ -378,4 +333,68 @@ impl<const N: usize> IkTrial<N> {
             self.ask_arm(Intent::ShowStatus, ctx);
         }
     }
+}
+
+// ---- the goals of a trial: each command is completed before the next ------------------------------------------------
+
+/// The messages to `ik_action`.
+#[derive(Clone)]
+pub struct GoalClient<const N: usize> {
+    /// Sends a goal.
+    pub send: Recipient<Call<SendGoal<N>>>,
+    /// Cancels it.
+    pub cancel: Recipient<Call<CancelGoal>>,
+    /// Waits until all earlier news have arrived.
+    pub barrier: Recipient<Barrier>,
+}
+
+/// The answer of `ik_action` to a goal of the trial.
+struct GoalAnswer<const N: usize> {
+    ticket: u64,
+    /// The goal's id, if it was accepted.
+    goal_id: Option<String>,
+    /// Lengths after a refusal \[m\], which may have been the reason.
+    lengths: Option<[f64; N]>,
+}
+
+/// Sends the trial's commands to `ik_action`, one after another.
+async fn carry_out<const N: usize>(
+    commands: Vec<TrialCommand>,
+    arm: Recipient<ArmPose<N>>,
+    goals: GoalClient<N>,
+    owner: Recipient<GoalNews<N>>,
+) -> Vec<GoalAnswer<N>> {
+    let mut answers = Vec::new();
+    for command in commands {
+        match command {
+            TrialCommand::CancelGoal { goal_id } => {
+                let goal = Meant::Called(goal_id);
+                // A refusal means that the goal has already ended, as wanted.
+                let _ = ask(&goals.cancel, CancelGoal { goal }).await;
+            }
+            TrialCommand::SendGoal {
+                ticket,
+                target,
+                criteria,
+            } => {
+                let goal = SendGoal {
+                    target,
+                    criteria,
+                    owner: Some(GoalOwner::Node(owner.clone())),
+                };
+                let goal_id = ask(&goals.send, goal).await.ok().and_then(Result::ok);
+                let lengths = match goal_id {
+                    Some(_) => None,
+                    None => arm.send(ArmPose).await.ok().map(|pose| pose.lengths),
+                };
+                answers.push(GoalAnswer {
+                    ticket,
+                    goal_id,
+                    lengths,
+                });
+            }
+            TrialCommand::PublishStatus => {}
+        }
+    }
+    answers
 }

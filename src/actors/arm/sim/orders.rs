@@ -1,0 +1,142 @@
+//! The effects of other nodes' messages, and of setpoints and efforts of clients.
+//!
+//! **Invariant:** the arm advances to now before each order. An input of a client is accepted as a whole, or answered
+//! with a status that names the fault. A setpoint is moved only if it is still the mover's last one. An effort acts
+//! only while the controller is off and its client is connected.
+
+use actix::prelude::*;
+
+use super::messages::{
+    ArmMotion, ArmPose, CommandEffort, CommandGoal, EndGoal, JointMotion, MoveSetpoint,
+    SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, Tell, TrackGoal,
+};
+use super::node::ArmSim;
+use crate::actors::wire::{Nodes, TopicMessage};
+use crate::live::{GoalProgress, Journal, Obstacle, Pose, Tracking};
+use crate::math::simulation::ArmInput;
+use crate::protocol::catalog::Topic;
+use crate::services::arm::{read_effort, read_setpoint};
+
+/// A message that needs the arm's present state, or changes it.
+pub trait ArmOrder<const N: usize>: Message {
+    /// Its effect, and the answer.
+    fn perform(self, node: &mut ArmSim<N>) -> Self::Result;
+}
+
+impl<const N: usize, M: ArmOrder<N>> Handler<M> for ArmSim<N>
+where
+    M::Result: 'static,
+{
+    type Result = MessageResult<M>;
+
+    fn handle(&mut self, order: M, ctx: &mut Context<Self>) -> MessageResult<M> {
+        self.attend(ctx);
+        MessageResult(order.perform(self))
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for SimulationTime {
+    fn perform(self, node: &mut ArmSim<N>) -> f64 {
+        node.arm.simulation.time()
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for TakeSnapshot<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> Snapshot<N> {
+        Snapshot(Box::new(node.arm.simulation.clone()))
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for Tell<N> {
+    /// A listener gets the whole simulation first.
+    fn perform(self, node: &mut ArmSim<N>) {
+        let Self(listener) = self;
+        node.arm.tell_state();
+        node.arm.journal = listener.map(Journal::new);
+        node.arm.tell_state();
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for ArmPose<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> Pose<N> {
+        node.arm.pose()
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for TrackGoal<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> Tracking<N> {
+        node.arm.world.owner = Some(self.owner);
+        node.arm.track_goal(&self.goal)
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for CommandGoal<N> {
+    fn perform(self, node: &mut ArmSim<N>) {
+        node.arm.command_goal(self.number, self.positions);
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for EndGoal<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> Option<GoalProgress<N>> {
+        node.arm.end_goal(self.number)
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for SetSetpoint<N> {
+    fn perform(self, node: &mut ArmSim<N>) {
+        node.arm.hold(self.setpoint);
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for ArmMotion<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> JointMotion<N> {
+        let (arm, simulation) = (&node.arm, &node.arm.simulation);
+        JointMotion {
+            state: *simulation.state(),
+            setpoint: *simulation.pid().setpoint(),
+            time: simulation.time(),
+            resets: arm.goals.past.resets,
+            stands_still: arm.paused && simulation.time() <= arm.paused_at,
+            obstacle: Obstacle::of(simulation),
+        }
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for MoveSetpoint<N> {
+    fn perform(self, node: &mut ArmSim<N>) -> bool {
+        let is_known = *node.arm.simulation.pid().setpoint() == self.from;
+        if is_known {
+            node.arm.change(ArmInput::Setpoint(self.to));
+        }
+        is_known
+    }
+}
+
+impl<const N: usize> ArmOrder<N> for CommandEffort<N> {
+    fn perform(self, node: &mut ArmSim<N>) {
+        let Self { effort, message } = self;
+        match node.arm.command(effort) {
+            Ok(()) => node.commander = Some(message.present),
+            Err(why) => message.refuse(Topic::EffortCommands, &why),
+        }
+    }
+}
+
+/// Adds the topics to the registry's table.
+pub(super) fn listen<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    let node = arm.clone();
+    let hold = move |message: TopicMessage| match read_setpoint(&message.msg) {
+        Ok(setpoint) => node.do_send(SetSetpoint {
+            setpoint,
+            done: Some(message.done),
+        }),
+        Err(why) => message.refuse(Topic::JointTrajectory, &why),
+    };
+    nodes.listen(Topic::JointTrajectory, hold);
+    let node = arm.clone();
+    let command = move |message: TopicMessage| match read_effort(&message.msg) {
+        Ok(effort) => node.do_send(CommandEffort { effort, message }),
+        Err(why) => message.refuse(Topic::EffortCommands, &why),
+    };
+    nodes.listen(Topic::EffortCommands, command);
+}

@@ -1,0 +1,63 @@
+//! The arm's parameters: their present values, and the effect of setting one.
+//!
+//! **Invariant:** a parameter has no separate value. It is set as the service sets it that has it as a field.
+
+use super::{ArmRequest, LiveArm, World};
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::ros::parameters::Parameter;
+use crate::protocol::ros::urdf;
+use crate::services::Ask;
+use crate::services::arm::{
+    AskParameters, NotSet, ParameterChange, ParameterRequest, ParameterValue, joint_names,
+};
+
+impl<const N: usize> ArmRequest<N> for AskParameters<N> {
+    /// Answers for one parameter after the other.
+    fn perform<W: World<N>>(self, arm: &mut LiveArm<N, W>) -> <Self as Ask>::Answer {
+        let answers = self.entries.into_iter().map(|(named, request)| {
+            let answer = match request {
+                ParameterRequest::Describe => Ok(None),
+                ParameterRequest::Get => Ok(named.parameter.map(|one| arm.value_of(one))),
+                ParameterRequest::Refuse(why) => Err(why),
+                ParameterRequest::Set(change) => match arm.set(change) {
+                    rejected if rejected.is_empty() => Ok(None),
+                    rejected => Err(NotSet::Rejected(rejected)),
+                },
+            };
+            (named, answer)
+        });
+        answers.collect()
+    }
+}
+
+impl<const N: usize, W: World<N>> LiveArm<N, W> {
+    fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
+        use ParameterValue::{Number, Numbers, Text};
+        let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
+        match parameter {
+            Parameter::Gravity => Number(arm.gravity()),
+            Parameter::Masses => Numbers(*arm.masses()),
+            Parameter::Lengths => Numbers(*arm.lengths()),
+            Parameter::Kp => Numbers(gains.kp),
+            Parameter::Ki => Numbers(gains.ki),
+            Parameter::Kd => Numbers(gains.kd),
+            Parameter::Integrator => Text(self.simulation.method().name().to_owned()),
+            Parameter::Timestep => Number(self.simulation.timestep()),
+            Parameter::ControlPeriod => Number(self.simulation.control_period().period),
+            Parameter::RobotDescription => {
+                let (lengths, masses) = (arm.lengths(), arm.masses());
+                Text(urdf::describe(&joint_names::<N>(), lengths, masses))
+            }
+        }
+    }
+
+    /// Sets a parameter. Returns the rejected value.
+    fn set(&mut self, change: ParameterChange<N>) -> Rejections {
+        match change {
+            ParameterChange::Params(ask) => ask.perform(self).rejected,
+            ParameterChange::Gains(ask) => ask.perform(self).rejected,
+            ParameterChange::Integrator(ask) => ask.perform(self).rejected,
+            ParameterChange::Period(ask) => ask.perform(self).rejected,
+        }
+    }
+}
