@@ -20,7 +20,7 @@ const STEP: &str = "/arm_sim/integration_step";
 /// That all of it fits into the limit is asserted where the limits are.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
-    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 640 * MIB) };
+    const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 752 * MIB) };
     const { assert!(LONG_FRAMES == 3 && LONG_ANSWERS == 96 * MIB && SHORT == 64 * 1024) };
 }
 
