@@ -38,6 +38,21 @@ fn many_steps_at_once_are_the_same_bits_as_one_by_one() {
     }
 }
 
+/// The law is not evaluated while the controller is off. No bit differs from a law with gains of zero.
+#[test]
+fn a_controller_that_is_off_is_one_with_gains_of_zero() {
+    for method in Method::ALL {
+        let mut off = moving(method);
+        off.enable(false);
+        let mut zero = off.clone();
+        zero.set_gains(no_gains());
+        zero.enable(true);
+        assert_eq!(off.advance(1000), 1000);
+        assert_eq!(zero.advance(1000), 1000);
+        assert_eq!(off.state(), zero.state(), "{method}");
+    }
+}
+
 /// A link that turns at 0.1 rad/s without gravity moves by the same increment each step. A million of them add up to
 /// the product. A plain sum would be off by thousands of units in the last place.
 #[test]

@@ -17,9 +17,10 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::flow::has_closed;
+use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME};
 use super::session::Opened;
 use super::timer::Timer;
-use super::transport::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME, ReceivedData};
+use super::transport::ReceivedData;
 use super::turns::Turns;
 use super::writer::ClientWriter;
 use super::{Connection, Ends};

@@ -17,7 +17,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
 };
-use super::transport::CHUNK;
+use super::plain::CHUNK;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;

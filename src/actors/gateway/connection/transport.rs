@@ -1,41 +1,21 @@
 //! The transport of a client's frames: plain bytes, or a WebSocket around them.
 //!
 //! **Invariant:** the reader gets whole messages, or a byte stream. In a stream, a frame ends at its closing brace or
-//! at the end of its line. The writer passes whole frames that end in a newline, for both transports. One poll reads and
-//! writes a bounded number of bytes.
+//! at the end of its line. The writer passes whole frames that end in a newline, for both transports.
 
-use std::io::{self, IoSlice};
-use std::pin::{Pin, pin};
+use std::io;
+use std::pin::Pin;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 
-use bytes::{BufMut, Bytes, BytesMut};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
+use bytes::{Bytes, BytesMut};
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
+use super::plain::{self, ClientLost};
 #[cfg(feature = "web")]
 use super::websocket::WebSocket;
-use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 #[cfg(feature = "web")]
 use crate::actors::resources::memory::Permit;
-
-/// Most bytes of one read. It is enough for a burst of short frames.
-pub(super) const CHUNK: usize = 32 * 1024;
-
-/// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
-/// with unread input resets it.
-pub(super) const DISCARD_TIME: Duration = Duration::from_secs(1);
-pub(super) const DISCARD_BYTES: usize = 16 * 1024 * 1024;
-
-/// Why a client can no longer be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ClientLost {
-    /// It has disconnected.
-    Gone,
-    /// It has violated a rule, and gets an error at the end.
-    #[cfg(feature = "web")]
-    Refused,
-}
 
 /// The stream of a served client, and its protocol.
 pub(super) enum Transport<S> {
@@ -71,7 +51,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<Result<ReceivedData, ClientLost>> {
         Poll::Ready(match self {
-            Self::Plain(stream) => match ready!(poll_read_stream(stream, cx, chunk)) {
+            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk)) {
                 Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
                 Err(_) => Err(ClientLost::Gone),
             },
@@ -112,7 +92,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => poll_read_stream(stream, cx, chunk),
+            Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
         }
@@ -126,7 +106,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => poll_write_stream(stream, cx, frames),
+            Self::Plain(stream) => plain::poll_write(stream, cx, frames),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_write(cx, frames),
         }
@@ -168,53 +148,4 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
             Self::WebSocket(socket) => socket.poll_end(cx, is_refused),
         }
     }
-}
-
-// ---- plain bytes ----------------------------------------------------------------------------------------------------
-
-/// Appends at most [`CHUNK`] available bytes to `chunk`. Returns 0 at the end of the stream.
-pub(super) fn poll_read_stream<S: AsyncRead + Unpin>(
-    stream: &mut S,
-    cx: &mut Context<'_>,
-    chunk: &mut BytesMut,
-) -> Poll<io::Result<usize>> {
-    pin!(read_some(stream, chunk)).poll(cx)
-}
-
-/// The same as [`poll_read_stream`], for a task of its own.
-pub(super) async fn read_some<S: AsyncRead + Unpin>(
-    stream: &mut S,
-    chunk: &mut BytesMut,
-) -> io::Result<usize> {
-    chunk.reserve(CHUNK);
-    stream.read_buf(&mut chunk.limit(CHUNK)).await
-}
-
-/// Writes some of `frames`, in order. Returns the number of bytes.
-fn poll_write_stream<'a, S: AsyncWrite + Unpin>(
-    stream: &mut S,
-    cx: &mut Context<'_>,
-    frames: impl ExactSizeIterator<Item = &'a Bytes>,
-) -> Poll<io::Result<usize>> {
-    let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
-    let mut room = WRITE_BYTES;
-    let mut count = 0;
-    for (slice, frame) in slices.iter_mut().zip(frames) {
-        let offered = frame.len().min(room);
-        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
-        count += 1;
-        room -= offered;
-        if room == 0 {
-            break;
-        }
-    }
-    let stream = Pin::new(stream);
-    let written = match slices.get(..count).unwrap_or_default() {
-        [slice] => ready!(stream.poll_write(cx, slice))?,
-        slices => ready!(stream.poll_write_vectored(cx, slices))?,
-    };
-    Poll::Ready(match written {
-        0 => Err(io::ErrorKind::WriteZero.into()),
-        written => Ok(written),
-    })
 }

@@ -19,7 +19,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::transport::{self, CHUNK, ClientLost};
+use super::plain::{self, CHUNK, ClientLost};
 use super::turns::Turns;
 use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
@@ -134,7 +134,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         self.stream().left = CHUNK;
-        transport::poll_read_stream(self.stream(), cx, chunk)
+        plain::poll_read(self.stream(), cx, chunk)
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
