@@ -42,7 +42,7 @@ def test_a_policy_learns():
     spec = importlib.util.spec_from_file_location("policy", EXAMPLES / "policy.py")
     policy = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(policy)
-    shown = float(" ".join(policy.__doc__.split()).split("what is found, more than ")[1].split(",")[0])
+    shown = float(" ".join(policy.__doc__.split()).split("the found one, more than ")[1].split()[0].rstrip("."))
     random = np.random.default_rng(0).normal(size=(8, policy.SIZE))
     found = policy.train(generations=40)
     before = policy.rewards(random, seed=10**8).max()
