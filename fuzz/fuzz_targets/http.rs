@@ -70,6 +70,13 @@ fn check(input: &[u8]) {
     let &[settings, piece, ref bytes @ ..] = input else {
         return;
     };
+    // A refusal repeats a part of the request.
+    if String::from_utf8_lossy(bytes)
+        .to_ascii_lowercase()
+        .contains(SECRET)
+    {
+        return;
+    }
     let answer = run(converse(admission(settings), bytes, piece.max(1).into()));
     let asks_token = settings & 1 != 0;
     // Escapes of JSON or of an address may spell the token.
