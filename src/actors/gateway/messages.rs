@@ -118,6 +118,8 @@ pub struct Request {
 #[derive(MessageResponse, Default)]
 pub struct Handled {
     effect: Option<oneshot::Receiver<()>>,
+    /// Messages sent to subscribers.
+    deliveries: usize,
 }
 
 impl Handled {
@@ -132,15 +134,23 @@ impl Handled {
     pub fn with(effect: oneshot::Receiver<()>) -> Self {
         Self {
             effect: Some(effect),
+            deliveries: 0,
         }
     }
 
-    /// Waits until the op has taken effect.
-    pub async fn effect(self) {
+    /// The message was also sent to this many subscribers.
+    #[must_use]
+    pub fn delivered(self, deliveries: usize) -> Self {
+        Self { deliveries, ..self }
+    }
+
+    /// Waits until the op has taken effect. Returns how many messages were sent to subscribers.
+    pub async fn effect(self) -> usize {
         if let Some(effect) = self.effect {
             // The sender never sends: dropping it is the signal.
             let _ = effect.await;
         }
+        self.deliveries
     }
 }
 

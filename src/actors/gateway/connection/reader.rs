@@ -257,11 +257,12 @@ impl ClientReader {
         loop {
             if let Some(performing) = &mut self.performing {
                 let (performer, outcome) = ready!(performing.as_mut().poll(cx));
+                let deliveries = performer.deliveries;
                 if self.end_op(connection, performer, outcome) {
                     return Poll::Ready(Ok(()));
                 }
-                ops += 1;
-                if ops == FRAMES_IN_A_ROW {
+                ops += 1 + deliveries;
+                if ops >= FRAMES_IN_A_ROW {
                     // Other connections have a turn.
                     self.turns.end(cx);
                     return Poll::Pending;
@@ -509,6 +510,8 @@ struct Performer {
     permit: Option<Permit>,
     /// Whether a JSON object has arrived. Then the client does not use HTTP, because a request has its head first.
     speaks_json: bool,
+    /// Messages that the last op has sent to subscribers.
+    deliveries: usize,
 }
 
 impl Performer {
@@ -528,6 +531,7 @@ impl Performer {
             fragments: Fragments::default(),
             permit: None,
             speaks_json: false,
+            deliveries: 0,
         }
     }
 
@@ -554,6 +558,7 @@ impl Performer {
 
     /// Performs one part of the stream.
     async fn take(mut self, cut: FramePart) -> (Self, OpOutcome) {
+        self.deliveries = 0;
         let outcome = self.perform_part(cut).await;
         (self, outcome)
     }
@@ -614,7 +619,7 @@ impl Performer {
     }
 
     /// Performs the op of a parsed frame, or sends its error.
-    async fn act_on(&self, incoming: Incoming, length: usize) -> OpOutcome {
+    async fn act_on(&mut self, incoming: Incoming, length: usize) -> OpOutcome {
         let Incoming { id, op } = incoming;
         match op {
             Ok(Op::Subscribe(Subscribe { encoding, .. }))
@@ -695,7 +700,7 @@ impl Performer {
     }
 
     /// Sends an op to the registry. Its frame had `length` bytes.
-    async fn perform(&self, id: Option<Payload>, op: Op, length: usize) -> OpOutcome {
+    async fn perform(&mut self, id: Option<Payload>, op: Op, length: usize) -> OpOutcome {
         let is_computation = matches!(&op, Op::CallService(CallService { service, .. })
             if Service::from_name(service).is_some_and(Service::is_computation));
         let request = Request {
@@ -708,7 +713,7 @@ impl Performer {
             return OpOutcome::Computation(request, length);
         }
         if let Ok(handled) = self.registry.send(request).await {
-            handled.effect().await;
+            self.deliveries = handled.effect().await;
         }
         OpOutcome::Done
     }

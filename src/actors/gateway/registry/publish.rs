@@ -51,9 +51,9 @@ impl Registry {
         }
         let (done, ended) = guard();
         let encode = |spelling: &str| messages::publish_raw(spelling, &msg);
-        self.fan_out(topic, Some(&done), encode, ctx);
+        let handled = Handled::with(ended).delivered(self.fan_out(topic, Some(&done), encode, ctx));
         let Some((topic, listener)) = listener else {
-            return Handled::with(ended);
+            return handled;
         };
         if let Some(tap) = &mut self.tap {
             tap(Tapped::NodeMessage(topic, &msg));
@@ -67,7 +67,7 @@ impl Registry {
             id: origin.id,
             done,
         });
-        Handled::with(ended)
+        handled
     }
 
     /// Delivers messages of a client unchanged, if it advertises the topic.
@@ -78,27 +78,28 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) -> Handled {
         let topic = &*lines.topic;
-        let (done, ended) = guard();
         let client = self.clients.get(&from);
-        if client.is_some_and(|client| client.registered.advertised.contains_key(topic)) {
-            let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
-            self.fan_out(topic, Some(&done), encode, ctx);
+        if client.is_none_or(|client| !client.registered.advertised.contains_key(topic)) {
+            return Handled::at_once();
         }
-        Handled::with(ended)
+        let (done, ended) = guard();
+        let encode = |spelling: &str| messages::respelled(topic, spelling, &lines.frames);
+        Handled::with(ended).delivered(self.fan_out(topic, Some(&done), encode, ctx))
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait.
+    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait. Returns how many there are.
     fn fan_out(
         &self,
         topic: &str,
         done: Option<&Done>,
         encode: impl Fn(&str) -> Bytes,
         ctx: &mut Context<Self>,
-    ) {
+    ) -> usize {
+        let subscribers = self.topics.subscribers(topic);
         let mut plain: Vec<(&str, Bytes)> = Vec::new();
         let mut others: Vec<(&str, Bytes, Encoding)> = Vec::new();
-        for subscriber in self.topics.subscribers(topic) {
+        for subscriber in subscribers {
             let (spelling, encoding) = (&*subscriber.spelling, subscriber.encoding);
             let known = plain.iter().find(|(known, _)| *known == spelling);
             let frame = match known {
@@ -119,6 +120,7 @@ impl Registry {
         for (spelling, frame, encoding) in others {
             self.deliver_encoded(self.to_encode(spelling, frame, encoding), done, ctx);
         }
+        subscribers.len()
     }
 
     /// Delivers a message in another form. A worker thread encodes a long one first.
