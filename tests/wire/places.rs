@@ -139,3 +139,26 @@ fn a_client_that_has_closed_its_socket_waits_for_no_answer() {
     assert!(is_served_at_last(runtime.address));
     assert!(began.elapsed() < Duration::from_secs(10), "{began:?}");
 }
+
+/// A client that waits for one of the few permits of long frames is not read, so the end of its stream is not seen.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_client_that_has_closed_its_socket_waits_for_no_permit_of_a_long_frame() {
+    let runtime = serving("8");
+    // Each holds a permit for a minute.
+    let begun = |_| {
+        let mut client = Client::to(runtime.address);
+        client.settle();
+        let data = "a".repeat(1 << 20);
+        let beginning = format!(r#"{{"op":"publish","topic":"/long","msg":{{"data":"{data}"#);
+        client.send_bytes(beginning.as_bytes());
+        client
+    };
+    let _holders: Vec<Client> = (0..3).map(begun).collect();
+    let waiting: Vec<Client> = (3..7).map(begun).collect();
+    assert!(refused(runtime.address, true).contains("serves 8 clients"));
+    drop(waiting);
+    let began = Instant::now();
+    assert!(is_served_at_last(runtime.address));
+    assert!(began.elapsed() < Duration::from_secs(30), "{began:?}");
+}

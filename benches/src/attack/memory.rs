@@ -148,7 +148,7 @@ pub const ATTACKS: &[Attack] = &[
                 .flat_map(|(clients, begin)| {
                     clients
                         .into_iter()
-                        .map(move |client| client.after(begin).leaves_after(800))
+                        .map(move |client| client.after(begin).stays_for(800))
                 })
                 .collect()
         },

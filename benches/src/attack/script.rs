@@ -45,8 +45,10 @@ pub enum Ear {
 pub enum Exit {
     /// Not by itself.
     Stays,
-    /// Closes; with unread bytes the system makes a reset of it.
+    /// Closes some time after it has sent everything; with unread bytes the system makes a reset of it.
     Closes,
+    /// Closes some time after it has connected.
+    ClosesOnTime,
     /// Stops sending and stays.
     Halves,
 }
@@ -185,6 +187,12 @@ impl Client {
     /// Closes `milliseconds` after it has sent everything.
     pub fn leaves_after(mut self, milliseconds: u64) -> Self {
         self.exit = (Exit::Closes, Duration::from_millis(milliseconds));
+        self
+    }
+
+    /// Closes `milliseconds` after it has connected, whether it has sent everything or not.
+    pub fn stays_for(mut self, milliseconds: u64) -> Self {
+        self.exit = (Exit::ClosesOnTime, Duration::from_millis(milliseconds));
         self
     }
 

@@ -188,6 +188,9 @@ impl<'a> Player<'a> {
         ) = (Some(stream), 0, 0, false, false);
         self.replies.clear();
         self.unread.clear();
+        if self.client.exit.0 == Exit::ClosesOnTime {
+            self.due = Some(Instant::now() + self.client.exit.1);
+        }
     }
 
     /// Does all due actions. Returns whether it can send or read more.
@@ -195,7 +198,7 @@ impl<'a> Player<'a> {
         if self.due.is_some_and(|due| due <= now) {
             self.due = None;
             match (self.client.exit.0, &self.stream) {
-                (Exit::Closes, _) => self.end(now),
+                (Exit::Closes | Exit::ClosesOnTime, _) => self.end(now),
                 (Exit::Halves, Some(stream)) => drop(stream.shutdown(Shutdown::Write)),
                 _ => {}
             }
@@ -332,7 +335,7 @@ impl<'a> Player<'a> {
     }
 
     fn has_said_all(&mut self) {
-        if self.client.exit.0 != Exit::Stays {
+        if matches!(self.client.exit.0, Exit::Closes | Exit::Halves) {
             self.due = Some(Instant::now() + self.client.exit.1);
         }
     }

@@ -84,7 +84,7 @@ pub(super) const WRITE_FRAMES: usize = 64;
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Interval of checks whether a client that has stopped sending has closed its socket.
+/// Interval of checks whether a client that has stopped sending, or is not read, has closed its socket.
 pub(super) const CLOSED_CHECK: Duration = Duration::from_millis(250);
 /// Most waiting computations of one connection, besides the running one. At this limit the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

@@ -69,7 +69,7 @@ struct ClientReader {
     frame_due: Option<Instant>,
     /// Start of the wait for a client that has ended its stream and does not read.
     waits_since: Option<Instant>,
-    /// The next check whether a client that has stopped sending has closed its socket.
+    /// The next check whether a client that is not read has closed its socket.
     closed_check: Option<Instant>,
     /// The stream has ended. Earlier bytes may still wait.
     has_ended: bool,
@@ -187,7 +187,7 @@ impl ClientReader {
                         *answered = None;
                     }
                     if answered.is_some() || connection.is_computing() {
-                        let due = *due;
+                        let due = Some(*due);
                         ready!(self.poll_gone(connection.ends, due, cx));
                         connection.abandon_computations();
                     }
@@ -282,7 +282,11 @@ impl ClientReader {
                 }
             }
             if let Some(room) = &mut self.room {
-                let permit = ready!(room.as_mut().poll(cx));
+                let Poll::Ready(permit) = room.as_mut().poll(cx) else {
+                    // The end of its stream is behind bytes that are not read before.
+                    ready!(self.poll_gone(connection.ends, None, cx));
+                    return Poll::Ready(Err(ClientLost::Gone));
+                };
                 self.room = None;
                 if let Some(performer) = &mut self.performer {
                     performer.permit = Some(permit);
@@ -435,13 +439,18 @@ impl ClientReader {
         }
     }
 
-    /// Waits until a client that has stopped sending has closed its socket, or until `due`.
-    fn poll_gone(&mut self, ends: Ends, due: Instant, cx: &mut task::Context<'_>) -> Poll<()> {
+    /// Waits until the client has closed its socket, or until `due`.
+    fn poll_gone(
+        &mut self,
+        ends: Ends,
+        due: Option<Instant>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<()> {
         loop {
             let check = *self.closed_check.get_or_insert_with(Instant::now);
-            ready!(self.timer.poll(Some(check.min(due)), cx));
+            ready!(self.timer.poll(due.into_iter().chain([check]).min(), cx));
             let now = Instant::now();
-            if now >= due || has_closed(ends) {
+            if due.is_some_and(|due| now >= due) || has_closed(ends) {
                 return Poll::Ready(());
             }
             self.closed_check = Some(now + CLOSED_CHECK);
@@ -462,7 +471,7 @@ impl ClientReader {
         if self.has_ended {
             let since = *self.waits_since.get_or_insert_with(Instant::now);
             let due = since.max(connection.room_since) + RESPONSES_TIME;
-            ready!(self.poll_gone(connection.ends, due, cx));
+            ready!(self.poll_gone(connection.ends, Some(due), cx));
             return Poll::Ready(Err(ClientLost::Gone));
         }
         let messages = self.messages.iter().map(|(message, _)| message.len());
