@@ -423,6 +423,12 @@ impl ClientReader {
         let begin = || Instant::now() + FRAME_TIME;
         let late = is_unfinished.then(|| *self.frame_due.get_or_insert_with(begin));
         self.frame_due = late;
+        if transport.waits_for_room() {
+            ready!(self.poll_gone(connection.ends, late, cx));
+            if late.is_none_or(|late| Instant::now() < late) {
+                return Poll::Ready(Err(ClientLost::Gone));
+            }
+        }
         loop {
             let pieces = self.performer.as_mut();
             let began = pieces.and_then(|performer| performer.fragments.began());

@@ -70,6 +70,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         }
     }
 
+    /// Whether a long message waits for its memory permit, so nothing is read. For a stream, the reader waits instead.
+    pub(super) fn waits_for_room(&self) -> bool {
+        match self {
+            Self::Plain(_) => false,
+            #[cfg(feature = "web")]
+            Self::WebSocket(socket) => socket.waits_for_room(),
+        }
+    }
+
     /// Abandons a frame that takes too long. Returns an error if the transport itself sends `why` to the client.
     pub(super) fn give_up(&mut self, why: &'static str) -> Result<(), ClientLost> {
         match self {

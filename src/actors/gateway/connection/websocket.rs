@@ -122,6 +122,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         self.socket.get_ref().is_unfinished()
     }
 
+    /// Whether a long message waits for its memory permit, so nothing is read.
+    pub(super) fn waits_for_room(&self) -> bool {
+        self.socket.get_ref().waiting.is_some()
+    }
+
     /// Refuses the peer because of an incomplete message. The close frame has the reason `why`.
     pub(super) const fn refuse(&mut self, why: &'static str) {
         self.close_reason = (CloseCode::Policy, why);
