@@ -6,6 +6,7 @@ mod fields;
 mod frame;
 mod json;
 mod messages;
+mod names;
 mod op;
 mod outbox;
 mod rosapi;

@@ -1,4 +1,4 @@
-//! The two ends of a connection.
+//! The two ends of a connection, and its end.
 //!
 //! **Invariant:** if one end is unknown, the client counts as local.
 
@@ -26,4 +26,14 @@ impl From<SocketAddr> for Ends {
         let peer = local;
         Self { local, peer }
     }
+}
+
+/// Why a client can no longer be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ClientLost {
+    /// It has disconnected.
+    Gone,
+    /// It has violated a rule, and gets an error at the end.
+    #[cfg(feature = "web")]
+    Refused,
 }

@@ -76,12 +76,18 @@ pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// Timeout of pending responses to a client that has stopped sending. It is longer than [`DEFAULT_TIMEOUT`]. The client
 /// may have disconnected, which is detected by sending to it, or by the check below on the same machine.
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
+/// Most bytes of one read. It is enough for a burst of short frames.
+pub(super) const READ_BYTES: usize = 32 * KIB;
 /// Bytes offered in one write. Then other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames of a chunk after which the reader yields.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
+/// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
+/// with unread input resets it.
+pub(super) const DISCARD_TIME: Duration = Duration::from_secs(1);
+pub(super) const DISCARD_BYTES: usize = 16 * KIB * KIB;
 /// Delay after which expired pieces of a message are dropped. Also the interval of retries of a client without a place.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Interval of checks whether a client that has stopped sending, or is not read, has closed its socket.

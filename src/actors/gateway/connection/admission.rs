@@ -12,7 +12,7 @@ use tokio::io::AsyncRead;
 use tokio::sync::Semaphore;
 use tokio::time::{Instant, timeout_at};
 
-use super::plain::read_some;
+use super::transport::read_some;
 use crate::actors::gateway::limits::HEAD_TIME;
 use crate::protocol::op::token::Token;
 use crate::protocol::op::{self, Op};

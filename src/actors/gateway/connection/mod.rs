@@ -14,7 +14,6 @@ mod flow;
 #[cfg(feature = "web")]
 mod http;
 mod outgoing;
-mod plain;
 mod reader;
 mod session;
 mod timer;

@@ -17,7 +17,6 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::Instant;
 
 use super::flow::has_closed;
-use super::plain::{CHUNK, ClientLost, DISCARD_BYTES, DISCARD_TIME};
 use super::session::Opened;
 use super::timer::Timer;
 use super::transport::ReceivedData;
@@ -25,8 +24,10 @@ use super::turns::Turns;
 use super::writer::ClientWriter;
 use super::{Connection, Ends};
 use crate::actors::ConnectionId;
+use crate::actors::gateway::ends::ClientLost;
 use crate::actors::gateway::limits::{
-    CLOSED_CHECK, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, RESPONSES_TIME,
+    CLOSED_CHECK, DISCARD_BYTES, DISCARD_TIME, FRAME_TIME, FRAMES_IN_A_ROW, LOOK_AGAIN, READ_BYTES,
+    RESPONSES_TIME,
 };
 use crate::actors::gateway::messages::{Disconnect, Request, Respond, Retire, form_of};
 use crate::actors::gateway::registry::Registry;
@@ -104,10 +105,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         self.transport = Some(opened.transport);
         let (step, performer) = match opened.place {
             Ok(place) => {
-                let (registry, memory) = (self.registry.clone(), self.memory.clone());
-                let wants_text = Arc::clone(&self.wants_text);
-                let id = place.id();
-                let performer = Performer::new(id, registry, memory, wants_text, takes_binary);
+                let performer = Performer {
+                    id: place.id(),
+                    registry: self.registry.clone(),
+                    memory: self.memory.clone(),
+                    wants_text: Arc::clone(&self.wants_text),
+                    takes_binary,
+                    fragments: Fragments::default(),
+                    permit: None,
+                    speaks_json: false,
+                    deliveries: 0,
+                };
                 self.place = Some(place);
                 (ReadStep::Frames, Some(performer))
             }
@@ -292,7 +300,7 @@ impl ClientReader {
                     performer.permit = Some(permit);
                 }
             }
-            if bytes >= CHUNK / 2 {
+            if bytes >= READ_BYTES / 2 {
                 // All chunks of a long frame may be available at once.
                 self.turns.end(cx);
                 return Poll::Pending;
@@ -400,7 +408,9 @@ impl ClientReader {
             return Poll::Ready(Ok(()));
         };
         self.is_last = true;
-        self.performing = Some(Box::pin(performer.take_end(error)));
+        self.performing = Some(Box::pin(
+            performer.take(FramePart::Error(error, Vec::new())),
+        ));
         self.turns.end(cx);
         Poll::Pending
     }
@@ -463,7 +473,7 @@ impl ClientReader {
         }
     }
 
-    /// Waits until something was written or computed. Meanwhile reads up to [`CHUNK`] bytes or [`FRAMES_IN_A_ROW`]
+    /// Waits until something was written or computed. Meanwhile reads up to [`READ_BYTES`] bytes or [`FRAMES_IN_A_ROW`]
     /// messages, to detect the end of the stream. Returns an error if the client has disconnected. A client that has
     /// ended its stream counts as disconnected if nothing was written or computed for [`RESPONSES_TIME`].
     fn poll_ahead<S: AsyncRead + AsyncWrite + Unpin>(
@@ -482,7 +492,7 @@ impl ClientReader {
         }
         let messages = self.messages.iter().map(|(message, _)| message.len());
         let bytes = self.chunk.len() + messages.sum::<usize>();
-        if bytes >= CHUNK || self.messages.len() >= FRAMES_IN_A_ROW {
+        if bytes >= READ_BYTES || self.messages.len() >= FRAMES_IN_A_ROW {
             return Poll::Pending;
         }
         let received = ready!(transport.poll_read(cx, &mut self.chunk))?;
@@ -530,26 +540,6 @@ struct Performer {
 }
 
 impl Performer {
-    fn new(
-        id: ConnectionId,
-        registry: Addr<Registry>,
-        memory: Memory,
-        wants_text: Arc<AtomicBool>,
-        takes_binary: bool,
-    ) -> Self {
-        Self {
-            id,
-            registry,
-            memory,
-            wants_text,
-            takes_binary,
-            fragments: Fragments::default(),
-            permit: None,
-            speaks_json: false,
-            deliveries: 0,
-        }
-    }
-
     /// Waits for the memory permit of a long frame.
     fn room(&self) -> impl Future<Output = Permit> + 'static {
         let memory = self.memory.clone();
@@ -575,12 +565,6 @@ impl Performer {
     async fn take(mut self, cut: FramePart) -> (Self, OpOutcome) {
         self.deliveries = 0;
         let outcome = self.perform_part(cut).await;
-        (self, outcome)
-    }
-
-    /// Sends the client the error at the end of its stream.
-    async fn take_end(self, error: FrameError) -> (Self, OpOutcome) {
-        let outcome = self.complain(&error.to_string(), None).await;
         (self, outcome)
     }
 

@@ -17,11 +17,12 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::admission::{
     Admission, AuthError, HeldSlot, WRONG_TOKEN_TIME, authenticate, first_op, is_command,
 };
-use super::plain::CHUNK;
 use super::transport::Transport;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;
-use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME};
+use crate::actors::gateway::limits::{
+    FRAME_TIME, HEAD_TIME, LINGER, LOOK_AGAIN, OPENING_TIME, READ_BYTES,
+};
 use crate::actors::gateway::messages::{Connect, CountRefusal, Disconnect, Outlets, Refused};
 use crate::actors::gateway::registry::Registry;
 #[cfg(feature = "web")]
@@ -93,7 +94,7 @@ impl ClientSession {
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let mut first = BytesMut::with_capacity(CHUNK);
+        let mut first = BytesMut::with_capacity(READ_BYTES);
         let asks_token = self.admission.token.is_some();
         let mut place = if asks_token {
             // A client without the token makes no request to the registry.

@@ -3,17 +3,18 @@
 //! **Invariant:** the reader gets whole messages, or a byte stream. In a stream, a frame ends at its closing brace or
 //! at the end of its line. The writer passes whole frames that end in a newline, for both transports.
 
-use std::io;
-use std::pin::Pin;
+use std::io::{self, IoSlice};
+use std::pin::{Pin, pin};
 use std::task::{Context, Poll, ready};
 
-use bytes::{Bytes, BytesMut};
-use tokio::io::{AsyncRead, AsyncWrite};
+use bytes::{BufMut, Bytes, BytesMut};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite};
 use tokio::time::Instant;
 
-use super::plain::{self, ClientLost};
 #[cfg(feature = "web")]
 use super::websocket::WebSocket;
+use crate::actors::gateway::ends::ClientLost;
+use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 #[cfg(feature = "web")]
 use crate::actors::resources::memory::Permit;
 
@@ -51,7 +52,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<Result<ReceivedData, ClientLost>> {
         Poll::Ready(match self {
-            Self::Plain(stream) => match ready!(plain::poll_read(stream, cx, chunk)) {
+            Self::Plain(stream) => match ready!(read_available(stream, cx, chunk)) {
                 Ok(bytes) => Ok(ReceivedData::Bytes(bytes)),
                 Err(_) => Err(ClientLost::Gone),
             },
@@ -101,9 +102,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         chunk: &mut BytesMut,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => plain::poll_read(stream, cx, chunk),
+            Self::Plain(stream) => read_available(stream, cx, chunk),
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => socket.poll_swallow(cx, chunk),
+            Self::WebSocket(socket) => read_available(socket.refused_stream(), cx, chunk),
         }
     }
 
@@ -115,7 +116,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
         frames: impl ExactSizeIterator<Item = &'a Bytes>,
     ) -> Poll<io::Result<usize>> {
         match self {
-            Self::Plain(stream) => plain::poll_write(stream, cx, frames),
+            Self::Plain(stream) => write_some(stream, cx, frames),
             #[cfg(feature = "web")]
             Self::WebSocket(socket) => socket.poll_write(cx, frames),
         }
@@ -157,4 +158,53 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
             Self::WebSocket(socket) => socket.poll_end(cx, is_refused),
         }
     }
+}
+
+// ---- a plain stream -------------------------------------------------------------------------------------------------
+
+/// Appends at most [`READ_BYTES`] available bytes to `chunk`. Returns 0 at the end of the stream.
+fn read_available<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    cx: &mut Context<'_>,
+    chunk: &mut BytesMut,
+) -> Poll<io::Result<usize>> {
+    pin!(read_some(stream, chunk)).poll(cx)
+}
+
+/// The same as [`read_available`], for a task of its own.
+pub(super) async fn read_some<S: AsyncRead + Unpin>(
+    stream: &mut S,
+    chunk: &mut BytesMut,
+) -> io::Result<usize> {
+    chunk.reserve(READ_BYTES);
+    stream.read_buf(&mut chunk.limit(READ_BYTES)).await
+}
+
+/// Writes some of `frames`, in order. Returns the number of bytes.
+fn write_some<'a, S: AsyncWrite + Unpin>(
+    stream: &mut S,
+    cx: &mut Context<'_>,
+    frames: impl ExactSizeIterator<Item = &'a Bytes>,
+) -> Poll<io::Result<usize>> {
+    let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
+    let mut room = WRITE_BYTES;
+    let mut count = 0;
+    for (slice, frame) in slices.iter_mut().zip(frames) {
+        let offered = frame.len().min(room);
+        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
+        count += 1;
+        room -= offered;
+        if room == 0 {
+            break;
+        }
+    }
+    let stream = Pin::new(stream);
+    let written = match slices.get(..count).unwrap_or_default() {
+        [slice] => ready!(stream.poll_write(cx, slice))?,
+        slices => ready!(stream.poll_write_vectored(cx, slices))?,
+    };
+    Poll::Ready(match written {
+        0 => Err(io::ErrorKind::WriteZero.into()),
+        written => Ok(written),
+    })
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
-use bytes::{Buf, Bytes, BytesMut};
+use bytes::{Buf, Bytes};
 use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
@@ -19,9 +19,9 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, O
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::plain::{self, CHUNK, ClientLost};
 use super::turns::Turns;
-use crate::actors::gateway::limits::FRAMES_IN_A_ROW;
+use crate::actors::gateway::ends::ClientLost;
+use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM};
 
@@ -89,7 +89,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
     }
 
     fn poll_message(&mut self, cx: &mut Context<'_>) -> Poll<Result<Bytes, ClientLost>> {
-        self.stream().left = CHUNK;
+        self.stream().left = READ_BYTES;
         for _ in 0..FRAMES_IN_A_ROW {
             let message = self.socket.poll_next_unpin(cx);
             self.spent = None;
@@ -132,14 +132,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
         self.close_reason = (CloseCode::Policy, why);
     }
 
-    /// Reads from a refused peer. The input is discarded.
-    pub(super) fn poll_swallow(
-        &mut self,
-        cx: &mut Context<'_>,
-        chunk: &mut BytesMut,
-    ) -> Poll<io::Result<usize>> {
-        self.stream().left = CHUNK;
-        plain::poll_read(self.stream(), cx, chunk)
+    /// The stream, to read from a refused peer.
+    pub(super) fn refused_stream(&mut self) -> &mut MonitoredStream<S> {
+        let stream = self.stream();
+        stream.left = READ_BYTES;
+        stream
     }
 
     // ---- sending ----------------------------------------------------------------------------------------------------
@@ -273,7 +270,7 @@ fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
 type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 
 /// A stream that records when the peer last took a byte, and the bytes that the peer has sent of an incomplete message.
-struct MonitoredStream<S> {
+pub(super) struct MonitoredStream<S> {
     stream: S,
     /// Time when the peer last took a byte.
     taken: Instant,
@@ -296,7 +293,7 @@ impl<S> MonitoredStream<S> {
             stream,
             taken: Instant::now(),
             coming: 0,
-            left: CHUNK,
+            left: READ_BYTES,
             turns: Turns::default(),
             memory,
             permit: None,

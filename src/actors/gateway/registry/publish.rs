@@ -88,7 +88,8 @@ impl Registry {
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait. Returns how many there are.
+    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait. Returns
+    /// the number of subscribers.
     fn fan_out(
         &self,
         topic: &str,
