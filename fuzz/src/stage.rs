@@ -16,7 +16,7 @@ use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::arm::sim::ArmSim;
+use pendularm::actors::arm::sim::{AddBarrier, ArmSim};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
@@ -197,6 +197,7 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
     )
     .start();
     ArmSim::attach(&arm, nodes);
+    arm.do_send(AddBarrier(registry.clone().recipient()));
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let ik = Ik::<2>::new(arm.clone().recipient()).start();

@@ -327,6 +327,13 @@ impl Respond {
     }
 }
 
+/// A barrier in the mailbox of an actor that informs clients of goals, which answers it after all earlier messages. From
+/// the arm, before it reports that it is at rest and after each message about a goal between steps on request. Also from
+/// `ik_trial`, which so gets all news of goals that the arm sent before the time.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct Barrier;
+
 /// Feedback of a goal for the client that sent it. It may be dropped for a slow client. From the node of the goal.
 #[derive(Message)]
 #[rtype(result = "()")]

@@ -22,7 +22,7 @@ use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
-use crate::actors::arm::sim::{ArmSim, Consult};
+use crate::actors::arm::sim::{AddBarrier, ArmSim, Consult};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
@@ -259,6 +259,7 @@ where
         ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
     ArmSim::attach(&arm, nodes);
+    arm.do_send(AddBarrier(registry.clone().recipient()));
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());

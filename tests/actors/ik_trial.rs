@@ -14,8 +14,9 @@ use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, IkAction, SendGoal,
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
-use pendularm::actors::arm::sim::{ArmPose, Barrier, Pose};
+use pendularm::actors::arm::sim::{ArmPose, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::node::Barrier;
 use pendularm::actors::node::{Call, Interest, Publish};
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};

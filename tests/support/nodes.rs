@@ -8,7 +8,7 @@ use pendularm::actors::arm::follow::{PathArm, PathFollower};
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::arm::sim::{ArmPose, ArmSim};
+use pendularm::actors::arm::sim::{AddBarrier, ArmPose, ArmSim};
 use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
@@ -63,6 +63,7 @@ where
     );
     let arm = arm.start();
     ArmSim::attach(&arm, nodes);
+    arm.do_send(AddBarrier(registry.clone().recipient()));
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(&arm));
     start_goal_nodes(registry, pose, tracker, seed, nodes);
     PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);

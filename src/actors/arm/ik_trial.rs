@@ -11,8 +11,8 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use super::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
-use crate::actors::arm::sim::{ArmPose, Barrier, Pose};
-use crate::actors::node::{Call, Interest, Publish, Reply, Unserved, ask};
+use crate::actors::arm::sim::{ArmPose, Pose};
+use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Conclusion, Trial, TrialCommand, sample};
 use crate::protocol::catalog::{Node, Service, Topic};

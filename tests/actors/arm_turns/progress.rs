@@ -6,7 +6,8 @@ use std::task::Poll;
 
 use super::*;
 use glam::DVec2;
-use pendularm::actors::arm::sim::{CommandGoal, GoalOrder, GoalProgress, TrackGoal};
+use pendularm::actors::arm::sim::{AddBarrier, CommandGoal, GoalOrder, GoalProgress, TrackGoal};
+use pendularm::actors::node::Barrier;
 use pendularm::math::goal::Criteria;
 
 /// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
@@ -28,7 +29,27 @@ impl Handler<GoalProgress<3>> for Owner {
     }
 }
 
-/// Each step of a second is reported separately, also if there are ten thousand.
+/// Stands in for the registry: the messages about the goal before each barrier.
+struct Publisher {
+    received: Rc<RefCell<Vec<(f64, u64)>>>,
+    before: Rc<RefCell<Vec<usize>>>,
+}
+
+impl Actor for Publisher {
+    type Context = Context<Self>;
+}
+
+impl Handler<Barrier> for Publisher {
+    type Result = ();
+
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {
+        let before = self.received.borrow().len();
+        self.before.borrow_mut().push(before);
+    }
+}
+
+/// Each step of a second is reported separately, also if there are ten thousand. The next step waits until the report has
+/// been published.
 #[test]
 fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
     in_virtual_time(async {
@@ -45,6 +66,13 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
             turns,
             received: Rc::clone(&received),
         };
+        let before = Rc::default();
+        let publisher = Publisher {
+            received: Rc::clone(&received),
+            before: Rc::clone(&before),
+        };
+        let publisher = publisher.start().recipient();
+        bench.arm.send(AddBarrier(publisher)).await.unwrap();
         let long = SetIntegrator {
             timestep: Some(1.0),
             ..SetIntegrator::default()
@@ -79,6 +107,7 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
         let received = received.borrow();
         assert_eq!(received.len(), 5000);
         assert!(received.is_sorted());
+        assert!(before.borrow().iter().copied().eq(1..=5000));
         let most = received.chunk_by(|(_, one), (_, other)| one == other);
         let most = most.map(<[_]>::len).max().unwrap();
         assert_eq!(most, 1, "in a turn");

@@ -16,8 +16,8 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 #[cfg(doc)]
 use crate::actors::arm::sim::Obstacle;
-use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};
-use crate::actors::node::{Done, ShutDown};
+use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, JointMotion, MoveSetpoint};
+use crate::actors::node::{Barrier, Done, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, CancelSent, Pursue};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};

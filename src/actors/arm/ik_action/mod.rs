@@ -22,10 +22,10 @@ pub use self::messages::{
 use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal,
-    Tracking, joint_names,
+    AddBarrier, ArmSim, CommandGoal, EndGoal, GoalOrder, GoalProgress, TrackGoal, Tracking,
+    joint_names,
 };
-use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
+use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
 use crate::actors::wire::action_client::{CancelSent, Pursue};
 use crate::math::goal::Outcome;

@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 
-use crate::actors::node::Done;
+use crate::actors::node::{Barrier, Done};
 use crate::actors::wire::TopicMessage;
 use crate::live::{ArmListener, GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
 use crate::math::arm::State;
@@ -69,14 +69,8 @@ pub struct TrackGoal<const N: usize> {
     pub owner: Recipient<GoalProgress<N>>,
 }
 
-/// A barrier in the mailbox of an owner of goals, which answers it after all earlier messages. From the arm, before it
-/// reports that it is at rest. Also from `ik_trial`, which so gets all news of goals that the arm sent before the time.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "()")]
-pub struct Barrier;
-
-/// The sender informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest.
-/// From `ik_action` and `joint_trajectory_controller`, when they start.
+/// The sender informs clients of goals, so the arm sends it a [`Barrier`] before it reports that it is at rest, and
+/// between steps on request. From `ik_action` and `joint_trajectory_controller`, when they start, and for the registry.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
 pub struct AddBarrier(pub Recipient<Barrier>);

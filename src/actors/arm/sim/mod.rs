@@ -14,9 +14,9 @@ mod waiting;
 mod world;
 
 pub use self::messages::{
-    AddBarrier, ArmMotion, ArmPose, ArmSettings, Barrier, CommandEffort, CommandGoal, Consult,
-    EndGoal, HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot,
-    TakeSnapshot, Tell, TrackGoal,
+    AddBarrier, ArmMotion, ArmPose, ArmSettings, CommandEffort, CommandGoal, Consult, EndGoal,
+    HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot,
+    Tell, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;

@@ -16,11 +16,11 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{AddBarrier, ArmSettings, Barrier, Consult, HeldLimit};
+use super::messages::{AddBarrier, ArmSettings, Consult, HeldLimit};
 use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
-use crate::actors::node::{Interest, Publish};
+use crate::actors::node::{Barrier, Interest, Publish};
 use crate::actors::resources::gauges::Gauges;
 use crate::live::{BREATHER, GoalProgress, LiveArm, PUBLISH_RATE};
 use crate::math::arm::Arm;
@@ -42,7 +42,7 @@ pub struct ArmSim<const N: usize> {
     pub(super) commander: Option<Weak<()>>,
     /// The node that predicts limits, if there is one.
     pub(super) study: Option<Recipient<HeldLimit<N>>>,
-    /// The nodes that inform clients of goals, which get barriers.
+    /// The actors that inform clients of goals, which get barriers.
     pub(super) owners: Vec<Recipient<Barrier>>,
     /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) underway: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,

@@ -11,7 +11,7 @@ use actix::prelude::*;
 use super::node::ArmSim;
 use super::orders;
 use super::waiting::Steps;
-use crate::actors::node::{Call, ShutDown, Unserved};
+use crate::actors::node::{Barrier, Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Direction, Node, Service, Topic};
@@ -98,18 +98,23 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Yields to all other messages, and waits for the goal's feedback. Then the remaining requests continue, one
-    /// after the other.
+    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry would
+    /// get it faster than it delivers it. Then the remaining requests continue, one after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
         let underway = self.underway.take();
         self.is_stepping = underway.is_some() || !self.steps.is_empty();
         if !self.is_stepping {
             return;
         }
+        let owners = self.owners.clone();
         let others = async move {
-            match underway {
-                Some(progress) => drop(progress.await),
-                None => tokio::task::yield_now().await,
+            let Some(progress) = underway else {
+                return tokio::task::yield_now().await;
+            };
+            // An owner that has ended publishes nothing.
+            let _ = progress.await;
+            for owner in owners {
+                let _ = owner.send(Barrier).await;
             }
         };
         ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {

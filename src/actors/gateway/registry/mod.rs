@@ -38,7 +38,7 @@ use super::messages::{
     Retire, SetTap, TakeCensus, Tap, Tapped, ToClient,
 };
 use crate::actors::ConnectionId;
-use crate::actors::node::{Interest, Respond};
+use crate::actors::node::{Barrier, Interest, Respond};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
@@ -226,6 +226,12 @@ impl Handler<Attach> for Registry {
     fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
         self.nodes = nodes;
     }
+}
+
+impl Handler<Barrier> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
 }
 
 impl Handler<Connect> for Registry {
