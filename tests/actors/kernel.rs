@@ -180,7 +180,7 @@ fn arguments(links: usize) -> Vec<Value> {
         json!({"duration": 0.5, "samples": 7, "reference": true, "timestep": 0.01}),
         json!({"duration": 1e300, "samples": 1_000_000_000}),
         json!({"settling_time": 1e-9, "margin": 0.5}),
-        json!({"error": 0.01, "servo": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
+        json!({"error": 0.01, "controller": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
         json!({"params": {"masses": per_joint(3.0)}, "gains": {"kp": per_joint(200.0)}, "duration": 0.3}),
         json!({"params": {"masses": 3}, "gains": {"kp": "stiff"}}),
     ]

@@ -272,7 +272,7 @@ class Controls(PageTest):
     # Links to share
 
     def test_a_link_changes_nothing_until_it_is_applied(self):
-        page = self.open("#method=verlet&timestep=0.002&gravity=1.62&masses=1,2&servo=on")
+        page = self.open("#method=verlet&timestep=0.002&gravity=1.62&masses=1,2&controller=on")
         page.until("!document.querySelector('#offer').hidden")
         page.run("new Promise((done) => setTimeout(done, 500))")
         self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 9.81)

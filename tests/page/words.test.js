@@ -69,10 +69,6 @@ test("settings survive a link", () => {
   }
 });
 
-test("a link from before, which says servo, is understood", () => {
-  assert.equal(fromFragment("#servo=on").controller, true);
-});
-
 test("a link may hold less, and what is none of ours is left out", () => {
   const settings = fromFragment("#kp=1,2&method=leapfrog&__proto__=1");
   assert.deepEqual(settings.gains, { kp: [1, 2] });

@@ -55,7 +55,7 @@ fn error_within<const N: usize>(
 /// Under control the held effort causes the error, so that the method with the fewest evaluations
 /// wins.
 #[test]
-fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant() {
+fn a_planned_move_under_control_stays_within_its_error_of_the_continuous_law() {
     let (gains, setpoint) = (Gains::default(), Setpoint::at([0.8, -0.6]));
     let task = Task {
         control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),

@@ -147,16 +147,16 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let run = bench.ask(plan_with(0.05)).await.unwrap();
         assert_eq!(run.planned, planned);
         assert_eq!(run.control_period, Some(run.planned.best.timestep));
-        let args = json!({"error": 0.05, "servo": true});
+        let args = json!({"error": 0.05, "controller": true});
         let values = client.ask(Service::Plan.name(), args).await;
         let best = planned.best;
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
         assert_eq!(
             client
-                .refusal(Service::Plan.name(), json!({"error": -1, "servo": 1}))
+                .refusal(Service::Plan.name(), json!({"error": -1, "controller": 1}))
                 .await,
-            "error must be greater than 0, got -1; servo must be true or false, got 1"
+            "error must be greater than 0, got -1; controller must be true or false, got 1"
         );
         let tiny = SuggestGains {
             timestep: Some(2_f64.powi(-20)),
@@ -228,7 +228,7 @@ fn plan_with(error: f64) -> PlanRun<2> {
     PlanRun {
         error,
         duration: None,
-        servo: true,
+        controller: true,
         q0: None,
         qdot0: None,
         params: None,
