@@ -17,7 +17,7 @@ import { DEFAULTS } from "./settings.js";
 export const SCENES = [
   {"id": "S01", "name": "rest without gravity", "links": 3, "expected": "It stays where it is, to the last bit.", "start": [0.3, -1.2, 2], "settings": {"params": {"gravity": 0, "masses": [1, 1, 1], "lengths": [1, 1, 1]}}, "watch": {"seconds": 5}},
   {"id": "S02", "name": "hanging at rest", "links": 3, "expected": "It hangs still.", "start": [-1.5707963267948966, 0, 0], "settings": {}, "watch": {"seconds": 5}},
-  {"id": "S03", "name": "upright", "links": 2, "expected": "It stands for seconds, then falls.", "start": [1.5707963267958966, 1e-12], "settings": {}, "watch": {"seconds": 12}},
+  {"id": "S03", "name": "upright", "links": 2, "expected": "It stays upright for seconds, then falls.", "start": [1.5707963267958966, 1e-12], "settings": {}, "watch": {"seconds": 12}},
   {"id": "S04", "name": "regular swing", "links": 2, "expected": "A small swing keeps its energy.", "start": [-1.2707963267948965, 0], "settings": {}, "watch": {"seconds": 5}},
   {"id": "S05", "name": "chaotic swing, 2 links", "links": 2, "expected": "No two such swings stay alike.", "start": [0, 0], "settings": {}, "watch": {"seconds": 20}},
   {"id": "S06", "name": "chaotic swing, 3 links", "links": 3, "expected": "No two such swings stay alike.", "start": [0, 0, 0], "settings": {}, "watch": {"seconds": 20}},
@@ -53,7 +53,7 @@ export const SCENES = [
   {"id": "S36", "name": "one joint", "links": 0, "expected": "20 000 oscillators; only in the report.", "start": [0], "settings": {}, "hidden": "has one joint"},
   {"id": "S37", "name": "another method, another timestep", "links": 3, "expected": "Change the method while it swings.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
   {"id": "S38", "name": "there and back", "links": 2, "expected": "Backwards it returns, almost.", "start": [0.5, -0.5], "settings": {"integrator": {"method": "rk4", "timestep": 0.004}}, "watch": {"seconds": 2}},
-  {"id": "S39", "name": "step doubling", "links": 3, "expected": "Two half steps tell the error of one.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
+  {"id": "S39", "name": "step doubling", "links": 3, "expected": "Two half steps show the error of one.", "start": [0.3, -1.2, 2], "settings": {}, "watch": {"seconds": 5}},
 ];
 
 /** All settings of a scene. @param {Scene} scene @returns {Settings} */
