@@ -21,6 +21,10 @@ const MOVE: f64 = 4.0;
 
 /// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
 #[derive(Debug, Clone, PartialEq, Args)]
+#[command(after_help = "\
+Examples:
+  pendularm plan --error 0.0001 --duration 2
+  pendularm plan --error 0.01 --controller --setpoint=-0.4,0.6")]
 pub struct PlanOptions {
     /// Largest allowed error of the end effector, in m
     #[arg(long, value_name = "METRES")]

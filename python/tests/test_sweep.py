@@ -145,7 +145,7 @@ def test_a_folder_knows_the_order_of_the_grid(tmp_path):
     assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
 
 
-def test_what_is_damaged_in_a_folder_is_done_again_or_said(tmp_path):
+def test_damaged_pieces_of_a_folder_are_computed_again_or_reported(tmp_path):
     ask = {"grid": {"kp": [1.0, 2.0, 3.0]}, "duration": 0.1, "folder": tmp_path, "piece": 1}
     expected = pendularm.sweep(**ask)["settling_time"]
     assert not list(tmp_path.glob("part-*"))

@@ -122,7 +122,7 @@ fn no_peak_is_overlooked() {
 }
 
 #[test]
-fn what_nobody_can_know_is_not_planned() {
+fn a_chaotic_motion_is_not_planned() {
     let chaos = Task {
         start: State::rest(),
         ..swing(100.0, 1e-3)
@@ -163,7 +163,7 @@ fn a_plan_has_the_fewest_evaluations_of_all_whole_numbers_of_steps() {
 
 /// Without an advised timestep nothing is run, and the error gives the reason.
 #[test]
-fn a_plan_that_ran_nothing_says_why() {
+fn a_plan_without_a_run_gives_the_reason() {
     let gains = Gains {
         kp: [20.0, 5.0],
         ki: [10.0, 2.0],

@@ -16,7 +16,7 @@ use super::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Handled, Publish, Tapped, ToClient};
 use crate::actors::node::{Done, guard};
-use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::Topic;
@@ -88,7 +88,7 @@ impl Registry {
     }
 
     /// Delivers a message, or a series of messages, to every subscriber of `topic`, an absolute name, in all spellings.
-    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. A node cannot wait. Returns how many there are.
+    /// `encode` makes the JSON for a spelling. `done` belongs to a publisher that can wait. Returns their number.
     fn fan_out(
         &self,
         topic: &str,
@@ -131,7 +131,7 @@ impl Registry {
         }
         let done = done.cloned();
         let kind = WorkKind::of(message.plain.len());
-        let making = aside(kind, move || (message.make(), message));
+        let making = run_long_work(kind, move || (message.make(), message));
         ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
             if let Some((made, message)) = made {
                 registry.deliver_made(&message, &made, done.as_ref());
