@@ -150,7 +150,7 @@ bench-peers: ## Compare with Pinocchio and its generated C, MuJoCo, scipy, heyok
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/peers/run.sh
 	@case " $(ARGS) " in *" --quick "*) ;; *) KEEP="$(KEEP)" bash benches/equal_error/run.sh ;; esac
 
-attack: ## Attack the program in some eighty ways and measure the service of a healthy client; ARGS="--only=pings", --list or --quick
+attack: ## Attack the program in about eighty ways and measure the service of a healthy client; ARGS="--only=pings", --list or --quick
 	@echo "make attack: some seven minutes"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
 

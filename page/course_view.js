@@ -243,8 +243,8 @@ function offer(scene, links) {
 async function runScene(scene) {
   const mine = now;
   remember();
-  const { servo: controller = false, ...settings } = settingsOf(scene);
-  const refusals = await setScene({ ...settings, controller }, false);
+  const settings = settingsOf(scene);
+  const refusals = await setScene({ ...settings, controller: settings.controller ?? false }, false);
   if (mine !== now) return;
   await setState(scene.start, scene.velocity);
   setText(byId("course-status"), refusals.length > 0 ? `Refused: ${refusals.join(" ")}` : `${scene.name}: ${scene.expected}`);

@@ -13,7 +13,6 @@ import { METHODS, exact } from "./format.js";
  * @property {Partial<Gains> | null} gains
  * @property {{period?: number, delay?: boolean} | null} period the control period, 0 for every step [s]
  * @property {boolean | null} controller whether it is on
- * @property {boolean} [servo] the same, in the form of the scenes
  * @property {number[] | null} setpoint
  * @property {{position?: number[], velocity?: number[]} | null} [start] the start of the arm [rad, rad/s]; only in links
  */
@@ -85,7 +84,7 @@ export function fromFragment(/** @type {string} */ hash) {
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     period: pick(["period", "delay"], (name) => (name === "period" ? single(name) : onOff(name))),
-    controller: onOff("controller") ?? onOff("servo") ?? null,
+    controller: onOff("controller") ?? null,
     setpoint: numbers("setpoint") ?? null,
     ...(given.has("position") || given.has("velocity") ? { start: pick(["position", "velocity"], numbers) } : {}),
   };

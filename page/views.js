@@ -12,7 +12,7 @@ import { fromFragment, presentSettings, toFragment } from "./settings.js";
 import { set, state, watch } from "./store.js";
 
 /** A link with settings but without a step opens the workbench. */
-const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|controller|servo|setpoint|workbench)\b/;
+const SETTINGS = /(^#|&)(links|method|timestep|gravity|masses|lengths|kp|ki|kd|period|delay|controller|setpoint|workbench)\b/;
 
 export function startViews() {
   byId("view-switch").addEventListener("click", () => show(state.view === "course" ? "workbench" : "course"));

@@ -43,7 +43,7 @@ while IFS=, read -r variant expected; do
     case $variant in "#"* | step) continue ;; esac
     seen=$(per_step "$variant")
     verdict=$(awk "BEGIN { d = 100 * ($seen / $expected - 1); printf \"%+.2f %%%s\", d, (d > 1 || d < -1) ? \": more than 1 %\" : \"\" }")
-    echo "check-work: $variant: $seen instructions, $expected written down, $verdict"
+    echo "check-work: $variant: $seen instructions, $expected recorded, $verdict"
     case $verdict in *more*) failed=1 ;; esac
 done <"$recorded"
-[ $failed = 0 ] || { echo "check-work: if the change is meant, write it down: scripts/check-work.sh --record" >&2; exit 1; }
+[ $failed = 0 ] || { echo "check-work: if the change is intended, record it: scripts/check-work.sh --record" >&2; exit 1; }

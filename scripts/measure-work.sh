@@ -7,7 +7,7 @@ set -euo pipefail
 
 out=${1:?usage: scripts/measure-work.sh DIRECTORY}
 root=$(cd "$(dirname "$0")/.." && pwd)
-command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installed; instruction counts stay unmeasured" >&2; exit 0; }
+command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installed; instruction counts are not measured" >&2; exit 0; }
 mkdir -p "$out"
 # Functions and symbols are counted by name, which a normal release build does not have.
 export CARGO_PROFILE_RELEASE_STRIP=none
@@ -107,7 +107,7 @@ serve() { # name, frames to send first, subscribers of /joint_states
     if [ -z "$survived" ]; then
         # Valgrind 3.19 cannot run programs that read a thread's clock, as a busy server does. Then this count is not
         # measured.
-        echo "measure-work: $name: the program does not survive Valgrind here" >&2
+        echo "measure-work: $name: the program fails under Valgrind here" >&2
         rm -f "$counts"*
         return
     fi

@@ -18,7 +18,7 @@ fi
 
 # The copy of Cargo.lock beside the sources shows the lock file that they were fetched for.
 if cmp -s Cargo.lock vendor/.Cargo.lock; then
-    echo "vendor: vendor/ holds what Cargo.lock asks for"
+    echo "vendor: vendor/ has the sources of Cargo.lock"
 else
     echo "vendor: fetching the sources of the locked dependencies into vendor/"
     rm -rf vendor.new

@@ -18,7 +18,7 @@ use pendularm::logging::{self, LogFormat};
 #[cfg(feature = "cli")]
 use pendularm::options::completions;
 use pendularm::options::{Options, Parsed};
-use pendularm::output::{self, complain};
+use pendularm::output::{self, print_error};
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
@@ -40,14 +40,14 @@ fn main() -> ExitCode {
         Ok(Parsed::Report(options)) => match report::run(&options) {
             Ok(_) => ExitCode::SUCCESS,
             Err(error) => {
-                complain(&error);
+                print_error(&error);
                 ExitCode::FAILURE
             }
         },
         Ok(Parsed::Plan(options)) => match plan::run(&options) {
             Ok(text) => show(&text),
             Err(error) => {
-                complain(&error);
+                print_error(&error);
                 ExitCode::FAILURE
             }
         },
@@ -59,7 +59,7 @@ fn main() -> ExitCode {
         Ok(Parsed::Completions { shell }) => show(&completions(shell)),
         Ok(Parsed::Show(text)) => show(&text),
         Err(error) => {
-            complain(&error);
+            print_error(&error);
             ExitCode::from(BAD_USAGE)
         }
     }
@@ -70,7 +70,7 @@ fn show(text: &str) -> ExitCode {
     match output::print(text) {
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(&format_args!("standard output: {error}"));
+            print_error(&format_args!("standard output: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -83,7 +83,7 @@ fn end(outcome: Result<(), CommandError>) -> ExitCode {
         return ExitCode::SUCCESS;
     };
     if !matches!(error, CommandError::Closed) {
-        complain(&error);
+        print_error(&error);
     }
     ExitCode::from(error.status())
 }
@@ -104,7 +104,7 @@ fn replay(path: &Path) -> ExitCode {
             }
         }
         Err(error) => {
-            complain(&format_args!("{file}: {error}"));
+            print_error(&format_args!("{file}: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -114,7 +114,7 @@ fn serve(options: &Options) -> ExitCode {
     let log = match logging::start(options.log, options.log_format) {
         Ok(log) => log,
         Err(error) => {
-            complain(&format_args!("cannot log to standard error: {error}"));
+            print_error(&format_args!("cannot log to standard error: {error}"));
             return ExitCode::FAILURE;
         }
     };
@@ -125,12 +125,12 @@ fn serve(options: &Options) -> ExitCode {
         std::process::exit(i32::from(FAILED));
     });
     let lines = log.clone();
-    let last_resort = Box::new(move || {
+    let force_exit = Box::new(move || {
         lines.say("pendularm: a thread did not stop in time; the program ends without it");
         lines.finish();
         std::process::exit(0);
     });
-    let outcome = runtime::run(options, last_resort);
+    let outcome = runtime::run(options, force_exit);
     if let (Err(error), LogFormat::Json) = (&outcome, options.log_format) {
         log.say(&error.to_string());
     }
@@ -139,7 +139,7 @@ fn serve(options: &Options) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if options.log_format == LogFormat::Text {
-                complain(&error);
+                print_error(&error);
             }
             ExitCode::FAILURE
         }

@@ -31,6 +31,6 @@ pub fn line(text: &dyn Display) -> String {
 }
 
 /// Prints one line to standard error. An error there cannot be reported.
-pub fn complain(error: &dyn Display) {
+pub fn print_error(error: &dyn Display) {
     let _ = writeln!(io::stderr(), "pendularm: {}", line(error));
 }

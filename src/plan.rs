@@ -14,20 +14,29 @@ use crate::study::paused::at_once;
 use crate::study::planner::{self, MAX_DURATION, PlanError, Planned, Task};
 use crate::value::{Links, ValueReader, needed, read_links};
 
-/// Duration of a move under control \[s\]. With the default gains it settles in this time.
+/// Default duration of a free swing \[s\].
+const SWING: f64 = 10.0;
+/// Default duration of a move under control \[s\]. With the default gains it settles in this time.
 const MOVE: f64 = 4.0;
 
 /// Find the cheapest method and timestep for an allowed error, and measure the error against a reference
 #[derive(Debug, Clone, PartialEq, Args)]
+#[command(after_help = "\
+Examples:
+  pendularm plan --error 0.0001 --duration 2
+  pendularm plan --error 0.01 --controller --setpoint=-0.4,0.6")]
 pub struct PlanOptions {
     /// Largest allowed error of the end effector, in m
     #[arg(long, value_name = "METRES")]
     #[arg(value_parser = ValueReader(read_positive))]
     pub error: f64,
-    /// Duration of a free swing from the starting pose, in s, or `servo` for a move under control
-    #[arg(long, value_name = "SECONDS", default_value = "10")]
-    #[arg(value_parser = ValueReader(read_motion))]
-    pub duration: PlannedMotion,
+    /// Plan a move to the setpoint under control, instead of a free swing
+    #[arg(long)]
+    pub controller: bool,
+    /// Duration of the motion from the starting pose, in s; 10 by default, 4 with `--controller`
+    #[arg(long, value_name = "SECONDS")]
+    #[arg(value_parser = ValueReader(read_duration))]
+    pub duration: Option<f64>,
     /// Number of links of the arm, 2 or 3; `ARM_SIM_LINKS` has no effect here
     #[arg(long, value_name = "N", default_value = "2")]
     #[arg(value_parser = ValueReader(read_links))]
@@ -38,24 +47,15 @@ pub struct PlanOptions {
     pub setpoint: Vec<f64>,
 }
 
-/// The motion for which method and timestep are planned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PlannedMotion {
-    /// Duration of the free swing \[s\].
-    Swing(f64),
-    /// The arm is under control, with the default gains.
-    Servo,
-}
-
 impl PlanOptions {
     /// Checks the options against each other.
     pub(crate) fn checked(mut self) -> Result<Self, String> {
         let joints = self.setpoint.len();
         if joints == 0 {
             self.setpoint = vec![0.8, -0.6, 0.0];
-        } else if self.duration != PlannedMotion::Servo {
+        } else if !self.controller {
             // A free arm has no setpoint, so the option would have no effect.
-            return Err("--setpoint needs --duration servo".to_owned());
+            return Err("--setpoint needs --controller".to_owned());
         } else if joints != self.links.count() {
             return Err(format!(
                 "--setpoint must be a number for each joint, got {joints}"
@@ -79,17 +79,16 @@ pub fn run(options: &PlanOptions) -> Result<String, PlanError> {
 fn plan<const N: usize>(options: &PlanOptions, gains: Gains<N>) -> Result<String, PlanError> {
     let arm = Arm::<N>::default();
     let joint = |i: usize| options.setpoint.get(i).copied().unwrap_or_default();
-    let (control, duration) = match options.duration {
-        PlannedMotion::Swing(duration) => (ControlLoop::free(arm), duration),
-        PlannedMotion::Servo => {
-            let setpoint = Setpoint::at(std::array::from_fn(joint));
-            (ControlLoop::new(arm, gains, setpoint), MOVE)
-        }
+    let (control, usual) = if options.controller {
+        let setpoint = Setpoint::at(std::array::from_fn(joint));
+        (ControlLoop::new(arm, gains, setpoint), MOVE)
+    } else {
+        (ControlLoop::free(arm), SWING)
     };
     let task = Task {
         control,
         start: State::rest(),
-        duration,
+        duration: options.duration.unwrap_or(usual),
         error: options.error,
     };
     at_once(planner::plan(task)).map(|planned| text(&task, &planned))
@@ -143,13 +142,9 @@ fn read_positive(text: &str) -> Result<f64, String> {
     needed(positive, "a number greater than 0", text)
 }
 
-fn read_motion(text: &str) -> Result<PlannedMotion, String> {
-    if text == "servo" {
-        return Ok(PlannedMotion::Servo);
-    }
+fn read_duration(text: &str) -> Result<f64, String> {
     let duration = Some(read_positive(text)?).filter(|duration| *duration <= MAX_DURATION);
-    let duration = needed(duration, &format!("at most {MAX_DURATION} s"), text)?;
-    Ok(PlannedMotion::Swing(duration))
+    needed(duration, &format!("at most {MAX_DURATION} s"), text)
 }
 
 fn read_angle(text: &str) -> Result<f64, String> {

@@ -31,7 +31,7 @@ DURATION, START, GRAVITY = 4.0, (0.3, 0.2), 9.81
 TARGETS = (1e-3, 1e-6, 1e-9)
 REPEATED, REPEATS, LONGEST = 0.02, 3, 1.0
 TOLERANCES = [10.0 ** (-half / 2) for half in range(4, 29)]
-# Methods of first and of second order: a sweep that ends at a second a run cannot reach the finer errors, and that is no fault.
+# Methods of first and of second order. Their sweeps end at a second per run, so the missing finer errors are no fault.
 LOW_ORDER = ("euler", "midpoint", "verlet", "implicitfast")
 # With a larger uncertainty the reference is not usable.
 UNCERTAINTY = 1e-20
@@ -123,7 +123,7 @@ def in_python(links, truth):
     rates(0.0, first)
     for method in ("DOP853", "Radau", "LSODA"):
         for tolerance in TOLERANCES:
-            if tolerance < 2.3e-14:  # scipy raises what is asked to a hundred times a double's rounding
+            if tolerance < 2.3e-14:  # scipy raises smaller tolerances to a hundred times the rounding of a double
                 break
 
             def run(method=method, tolerance=tolerance):

@@ -29,7 +29,7 @@ say "building (release)"
 (cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin load)
 program=${PROGRAM:-$built/pendularm}
 
-# Waits until something listens on port $1; $2 is who it should be.
+# Waits until a server listens on port $1. $2 is its expected name.
 await() {
     local tries
     for tries in $(seq 600); do
@@ -58,7 +58,7 @@ persistence false
 sys_interval 0
 log_type error
 CONF
-# As root it becomes the user of that name, who has to read this, whatever the umask is.
+# As root it switches to the user of that name, who must be able to read this for every umask.
 chmod 755 "$scratch"
 chmod 644 "$scratch/mosquitto.conf"
 mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &

@@ -42,8 +42,8 @@ program() {
     fi
 }
 mkdir -p "$target/peers"
-# The definitions are those of Pinocchio's own CMake files. Against the library: no -march, for the alignment of Eigen's
-# types hangs on it and must be the library's.
+# The definitions are those of Pinocchio's own CMake files. With the library there is no -march, because it
+# changes the alignment of Eigen's types, which must be the library's.
 pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30
     -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12
     -isystem "$prefix/include" -isystem "$prefix/include/eigen3")

@@ -1,4 +1,4 @@
-//! The healthy clients: a caller, a watcher, newcomers. An attack is judged by the service that they get.
+//! The healthy clients: a caller, a subscriber, new clients. An attack is judged by their service.
 //!
 //! **Invariant:** calls are made when they are due, whether or not earlier ones have been answered. A standstill delays all of
 //! them.
@@ -25,18 +25,18 @@ const VISITS: Duration = Duration::from_millis(250);
 /// Bytes of the message that a newcomer sends to itself.
 const MESSAGE: usize = 256 * 1024;
 
-/// The server that is attacked, as the healthy clients know it.
+/// The attacked server, for the healthy clients.
 #[derive(Clone, Copy)]
 pub struct Target {
     /// Address that it listens on.
     pub address: SocketAddr,
-    /// Whether it asks for the token.
+    /// Whether it requires the token.
     pub locked: bool,
-    /// Until a call or a newcomer counts as not answered.
+    /// Time until a call or a new client counts as not answered.
     pub patience: Duration,
 }
 
-/// The calls, messages and visits of the healthy clients, with their delays.
+/// The calls, messages and connections of the healthy clients, with their delays.
 #[derive(Default)]
 pub struct Health {
     /// Calls made.
@@ -49,7 +49,7 @@ pub struct Health {
     pub visits: usize,
     /// Newcomers that were served.
     pub served: usize,
-    /// The longest visit of those that were served \[ms\].
+    /// The longest connection of a served new client \[ms\].
     pub longest_visit: f64,
     /// The fault of the first newcomer that was not served.
     pub visit_fault: Option<String>,
@@ -80,7 +80,7 @@ impl Healthy {
         Ok(Self { stop, threads })
     }
 
-    /// Stops, once the outstanding answers have come or the patience ends.
+    /// Stops when the outstanding answers have arrived, or after the limit.
     pub fn finish(self) -> Health {
         self.stop.store(true, Ordering::Relaxed);
         let lost = |_| Health {
@@ -107,7 +107,7 @@ impl Healthy {
 }
 
 impl Target {
-    /// A client that has shown the token where one is asked for.
+    /// A client that has sent the token if the server requires one.
     fn connect(self) -> Result<Client, String> {
         let open = || {
             let mut client = Client::connect(Framing::Lines, self.address, self.patience)?;
@@ -207,7 +207,7 @@ fn come_and_go(target: Target, stop: &AtomicBool) -> Health {
     health
 }
 
-/// Calls a service that the client provides itself, sends itself a message, and asks for a small computation and the page.
+/// Calls its own service, sends itself a message, and requests a small computation and the page.
 fn visit(target: Target, number: usize) -> Result<(), String> {
     let mut client = target.connect()?;
     let client = &mut client;
@@ -305,7 +305,7 @@ fn see_the_page(target: Target) -> Result<(), String> {
         Ok(head)
     };
     let head = fetch().map_err(|error: std::io::Error| error.to_string())?;
-    // A redirection takes the token out of the address.
+    // A redirection removes the token from the address.
     if head.starts_with(b"HTTP/1.1 2") || head.starts_with(b"HTTP/1.1 3") {
         return Ok(());
     }

@@ -1,6 +1,6 @@
-//! The program as the system sees it: memory, descriptors, threads, processor time, and its lines on standard error.
+//! The program's process: memory, descriptors, threads, processor time, and its lines on standard error.
 //!
-//! **Invariant:** it is stopped by its own process id, however the run ends.
+//! **Invariant:** it is stopped by its own process id at every end of the run.
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -27,11 +27,11 @@ pub struct Program {
 pub struct Log {
     /// The first lines, and those of panics.
     pub lines: Vec<String>,
-    /// Lines that speak of a panic.
+    /// Lines about a panic.
     pub panics: u64,
 }
 
-/// A process as the system sees it.
+/// The state of a process.
 #[derive(Debug, Clone, Copy)]
 pub struct Vitals {
     /// Resident memory \[MB\].
@@ -97,7 +97,7 @@ impl Program {
         self.log.lock().map(|log| log.clone()).unwrap_or_default()
     }
 
-    /// Asks it to end, and says how long that took and with which exit status.
+    /// Ends it by a signal, and returns the time and the exit status.
     pub fn end(mut self) -> Result<(Duration, Option<i32>), String> {
         let pid = self.pid().to_string();
         Command::new("kill")
@@ -128,7 +128,7 @@ impl Log {
     }
 }
 
-/// The process with this id as the system sees it; none once it is gone.
+/// The state of the process with this id. None if it has ended.
 pub fn vitals(pid: u32) -> Option<Vitals> {
     let descriptors = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count();
     let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.count();

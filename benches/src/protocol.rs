@@ -38,7 +38,7 @@ impl Protocol {
         }
     }
 
-    /// Writes the first words of a new connection; `number` tells it from the others.
+    /// Writes the first bytes of a new connection, which `number` identifies.
     pub fn greet(self, number: usize, out: &mut Vec<u8>) {
         if self == Self::Mosquitto {
             let id = format!("load-{number}");

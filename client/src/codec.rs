@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_come_one_by_one_in_whatever_pieces() {
+    fn lines_come_one_by_one_however_they_are_split() {
         let expected = [message("{}"), message(""), message("{\"a\":1}")];
         assert_eq!(events(Framing::Lines, b"{}\n\n{\"a\":1}\n"), expected);
     }
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_server_may_send_is_an_error() {
+    fn invalid_server_frames_are_errors() {
         for bytes in [
             &b"\x81\x80\0\0\0\0"[..], // masked
             b"\xc1\x00",              // a reserved bit

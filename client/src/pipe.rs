@@ -195,7 +195,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     }
 
     /// Whether nothing arrives in this time, not even the end.
-    pub async fn hears_nothing_for(&mut self, time: Duration) -> bool {
+    pub async fn receives_nothing_for(&mut self, time: Duration) -> bool {
         if !self.codec.pending().is_empty() {
             return false;
         }

@@ -1,7 +1,8 @@
-//! Messages as CBOR and as CDR: any JSON as a message of any type that the runtime knows, or of none.
+//! Messages as CBOR and as CDR: any JSON as a message of any known type, or of none.
 //!
-//! Asserted: the frame is CBOR that another reader takes, with the topic. A message of no known type has all members of the JSON. CDR is
-//! as long as its bound allows. `tests/protocol` compares messages of known types with their definitions.
+//! Asserted: the frame is CBOR that another reader accepts, with the topic. A message of no known type has all members
+//! of the JSON. CDR is as long as its bound allows. `tests/protocol` compares messages of known types with their
+//! definitions.
 //!
 //! Input: a byte that chooses the type, the message.
 
@@ -17,7 +18,8 @@ use pendularm_fuzz::limits::{Allowance, READING, hold};
 use serde_json::Value;
 
 const TOPIC: &str = "/\u{e9}/\"a\"";
-/// Bytes of CDR per byte of JSON, and besides: an entry of an array can be an empty object, which is a whole message.
+/// Bytes of CDR per byte of JSON, and a constant: an entry of an array can be an empty object, which is a whole
+/// message.
 const GROWTH: usize = 1024;
 
 fuzz_target!(|input: &[u8]| {

@@ -1,6 +1,6 @@
 //! The field reader against a second reading of the same JSON.
 //!
-//! Asserted: for any arguments of any of the arm's services, both readings take the same fields with the same values,
+//! Asserted: for any arguments of any of the arm's services, both readings accept the same fields with the same values,
 //! to the bit and within their bounds. Every other field is refused by its name, once and in the order of reading. The
 //! status names it and is one bounded line.
 //!
@@ -51,7 +51,7 @@ fn examine(input: &[u8]) {
     }
 }
 
-/// The arguments that a frame with these has, if it is one.
+/// The arguments of a frame with this text, if it is one.
 fn arguments(service: Service, args: &[u8]) -> Option<Arguments> {
     let mut frame = format!(
         "{{\"op\":\"call_service\",\"service\":\"{}\",\"args\":",
@@ -184,7 +184,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The members of an object; `None` where one of its keys is no text, which no name can be told from.
+/// The members of an object. `None` if one of its keys is no text and could be any name.
 fn members<'a>(
     fields: &[Field],
     object: &'a Json,

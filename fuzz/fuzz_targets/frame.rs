@@ -1,7 +1,7 @@
-//! The frame reader against a slow model that has all bytes at once and looks at them one by one.
+//! The frame reader against a slow model that has all bytes at once and reads them one by one.
 //!
-//! Asserted: reader and model find the same frames and complain of the same stretches, in the same order, however the
-//! stream is cut. The reader keeps a bounded part. It says that a line ended behind a frame only where one did.
+//! Asserted: reader and model find the same frames and the same malformed parts, in the same order, for any split of
+//! the stream. The reader keeps a bounded part. It reports a line end after a frame only if there is one.
 //!
 //! Input: a byte that chooses the limit, a byte that chooses the cuts, the stream.
 
@@ -55,7 +55,7 @@ fn check<'a>(
     };
     for piece in pieces {
         reader.push(piece);
-        // A buffer grows by doubling, and is moved together once half of it is done with.
+        // A buffer doubles when it grows, and is compacted when half of it has been read.
         assert!(reader.buffered() <= 4 * (limit + piece.len() + 64) + 16 * 1024);
         reader.by_ref().for_each(&mut judge);
     }
@@ -89,7 +89,7 @@ fn compare(
     assert!(same, "{outcome:?} instead of {wanted:?}");
 }
 
-/// Pieces of 0 to some dozen bytes, as the seed has it.
+/// Pieces of 0 to some dozen bytes, by the seed.
 struct Cuts<'a> {
     stream: &'a [u8],
     seed: u8,
@@ -110,7 +110,7 @@ impl<'a> Iterator for Cuts<'a> {
     }
 }
 
-/// All that a stream holds: frames end where their braces close, or with the line.
+/// The content of a stream: frames end where their braces close, or with the line.
 fn model(stream: &[u8], limit: usize) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     let mut at = 0;
@@ -136,8 +136,8 @@ fn line_end(stream: &[u8], from: usize) -> usize {
     newline.map_or(stream.len(), |offset| from + offset)
 }
 
-/// The kind of the stretch that begins with the brace at `start`, and its end. The first fault decides the kind; it ends where
-/// it would have ended without that, or with the line where brackets do not match.
+/// The kind of the stretch that begins with the brace at `start`, and its end. The first fault decides the kind. The
+/// stretch ends as without the fault, or with the line if brackets do not match.
 fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
     let mut open = Vec::new();
     let mut in_string = false;
@@ -152,7 +152,7 @@ fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
         match (in_string, byte) {
             (false, b'\n') => return (wrong.unwrap_or(Outcome::LineEnded), at),
             (true, b'\n') => return (wrong.unwrap_or(Outcome::LineEndedInString), at),
-            // Nobody looks at an escaped byte, unless it is a newline.
+            // An escaped byte has no meaning, unless it is a newline.
             (true, b'\\') if stream.get(at + 1).is_some_and(|next| *next != b'\n') => {
                 at += 1;
                 if at + 1 - start > limit {
@@ -167,7 +167,7 @@ fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
                 }
             }
             (false, b'}' | b']') => {
-                // Brackets that were opened beyond that depth are not remembered.
+                // Brackets beyond that depth are not stored.
                 let opener = if byte == b'}' { b'{' } else { b'[' };
                 if open.len() <= MAX_NESTING && open.last() != Some(&opener) {
                     return (wrong.unwrap_or(Outcome::Mismatch), line_end(stream, at + 1));

@@ -1,10 +1,10 @@
-//! The first bytes of a connection, and HTTP behind them, with and without a token to be shown.
+//! The first bytes of a connection, and HTTP after them, with and without a token.
 //!
-//! Asserted: the answer is lines of JSON, or well-formed HTTP answers of known headers, as long as they say, and then
-//! the end. A file is never one from outside the report's folder. Without the token in the input, nobody gets the page, a
-//! WebSocket, or more than one line of JSON. `tests/protocol` and `tests/actors` hold the rules of admission.
+//! Asserted: the answer is lines of JSON, or well-formed HTTP answers with known headers and the announced length, and
+//! then the end. Every file is from the report's folder. An input without the token gets no page, no WebSocket, and at
+//! most one line of JSON. `tests/protocol` and `tests/actors` test the rules of admission.
 //!
-//! Input: a byte of settings, a byte that says in which pieces the rest is sent, the rest.
+//! Input: a byte of settings, a byte that selects the pieces, and the bytes to send.
 
 #![no_main]
 
@@ -25,7 +25,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, split};
 use tokio::time::timeout;
 
 const TOKEN: &str = "open-sesame-once-more";
-/// The folder of the report, and what a file beside it says.
+/// The folder of the report, and the content of a file outside of it.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/report/inside");
 const SECRET: &str = "to be given to nobody";
 /// A page is long, and a connection has its buffers.
@@ -37,7 +37,7 @@ const WHOLE: Allowance = Allowance {
 };
 /// Longer than any file of the page.
 const LONGEST: usize = 4 * 1024 * 1024;
-/// Longer than anything here may take.
+/// Longer than any wait of this target.
 const LONG: Duration = Duration::from_secs(600);
 
 const STATUSES: [u16; 11] = [101, 200, 301, 400, 403, 404, 405, 408, 426, 431, 503];
@@ -110,7 +110,8 @@ fn check(input: &[u8]) {
     }
 }
 
-/// Bits: 1 asks for the token, 2 has another name, 4 allows pages without an origin, 8 refuses other pages of this machine.
+/// Bits: 1 requires the token, 2 has another name, 4 allows pages without an origin, 8 refuses other pages of this
+/// machine.
 fn admission(settings: u8) -> Admission {
     let is_set = |bit: u8| settings & bit != 0;
     let token = is_set(1).then(|| Token::new(TOKEN).expect("a token"));
@@ -132,7 +133,7 @@ fn admission(settings: u8) -> Admission {
     }
 }
 
-/// Sends all of it, then the end; gives what comes up to the end.
+/// Sends all bytes, then the end. Returns all bytes up to the end.
 async fn converse(admission: Admission, bytes: &[u8], piece: usize) -> Vec<u8> {
     let stage = Stage::new(admission, Memory::default()).await;
     let (mut input, mut output) = split(stage.connect(256));
@@ -170,8 +171,8 @@ async fn converse(admission: Admission, bytes: &[u8], piece: usize) -> Vec<u8> {
     answer
 }
 
-/// Checks an answer, and returns the bytes behind it. `asks_head`: a request may be one whose answer has no body. Where not
-/// `may_enter`, the answer is a refusal.
+/// Checks an answer, and returns the bytes after it. With `asks_head` a request may have an answer without a body.
+/// Without `may_enter` the answer is a refusal.
 fn check_answer(answer: &[u8], asks_head: bool, may_enter: bool) -> &[u8] {
     let end = answer
         .windows(4)

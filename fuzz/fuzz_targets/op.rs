@@ -1,9 +1,9 @@
-//! Frames into operations: any text that the frame reader lets through.
+//! Frames into operations: any text that the frame reader accepts.
 //!
-//! Asserted: every frame gives one operation or one complaint, and its `id` as it came. Only a JSON object, and the
-//! start of an answer that then fails, gives an operation. Names and numbers are those of the frame, bounded, and so
-//! are repetitions in a complaint. A payload that is passed on or echoed is one line of strict JSON in which nothing
-//! but numbers that overflow has changed.
+//! Asserted: every frame gives one operation or one error, and its unchanged `id`. Only a JSON object, and the start of
+//! an answer with a later fault, gives an operation. Names and numbers are those of the frame, and bounded. So are
+//! quotations in an error. A forwarded or echoed payload is one line of strict JSON in which only numbers that overflow
+//! have changed.
 //!
 //! Input: the frames.
 
@@ -25,7 +25,7 @@ use pendularm_fuzz::json::Json;
 use pendularm_fuzz::limits::{READING, hold};
 use serde_json::value::RawValue;
 
-/// Longest complaint: a sentence of ours and an excerpt of what it is about.
+/// Longest error: a sentence and an excerpt of the frame.
 const LONGEST_COMPLAINT: usize = 512;
 
 fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
@@ -54,14 +54,13 @@ fn judge(frame: &str) {
     let incoming = op::read(frame);
     let id = incoming.id.as_ref();
     let Some(json) = json else {
-        // Only an answer to a call or a goal counts in spite of its fault: that ends.
+        // Only an answer to a call or a goal takes effect despite its fault: the call ends.
         let is_refused = incoming.op.is_err() && id.is_none();
         let ends_a_call = matches!(incoming.op, Ok(Op::BadAnswer { .. }));
         assert!(is_refused || ends_a_call, "{frame:?} is no JSON");
         return;
     };
-    // A key that is no text makes a frame that is taken for no JSON; the members behind it in an answer are not
-    // read.
+    // A frame with a key that is no text counts as no JSON. In an answer the members after it are not read.
     let is_no_json = matches!(incoming.op, Err(OpError::Status(Problem::NotJson(_))));
     let is_cut = id.is_none() && matches!(incoming.op, Ok(Op::BadAnswer { .. }));
     if !is_no_json && !is_cut {
@@ -101,7 +100,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             let line = check_line(&messages::publish_raw(topic, msg));
             check_passed_on(json.get("msg"), line.get("msg"));
             assert_eq!(line.get("topic").and_then(Json::text), Some(&**topic));
-            // The runtime's own subscribers read it further; they must not fail on any text.
+            // The runtime's own subscribers read the message, and must not fail for any text.
             if *topic == *Topic::JointTrajectory.name() {
                 check_setpoint(msg.raw());
             }
@@ -136,7 +135,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             let number = |name: &str| json.get(name).and_then(Json::number);
             let milliseconds = number("throttle_rate").unwrap_or_default();
             assert_eq!(one.throttle, duration(milliseconds / 1000.0, MAX_THROTTLE));
-            // A number beyond every count is as good as the largest.
+            // A number beyond every count has the effect of the largest.
             let length = number("queue_length").unwrap_or_default();
             let longest = MAX_QUEUE_LENGTH as f64;
             assert_eq!(one.queue_length as f64, length.min(longest));
@@ -212,7 +211,7 @@ fn check_line(line: &[u8]) -> Json {
     json
 }
 
-/// Equal but for numbers that overflow, which are `null` now.
+/// Equal, except for numbers that overflow, which are now `null`.
 fn check_passed_on(before: Option<&Json>, after: Option<&Json>) {
     let is_same = match (before, after) {
         (Some(before), Some(after)) => before.becomes(after, |before, after| before == after),

@@ -1,10 +1,10 @@
 //! Whole connections in virtual time: three clients over TCP or WebSocket, and a registry. Behind it is a node that is
 //! prompt, slow or forgetful, or the runtime's own nodes: the arm, inverse kinematics, goals, trials, rosapi.
 //!
-//! Asserted is all that [`pendularm_fuzz::session`] says, and that every position and velocity that the arm publishes is a
-//! number.
+//! Asserted: everything in [`pendularm_fuzz::session`], and that every published position and velocity is a number.
 //!
-//! Input: whether room is scarce, whether clients use WebSocket, whether the runtime's own nodes serve, the script.
+//! Input: whether memory is scarce, whether clients use WebSocket, whether the runtime's own nodes serve, and the
+//! script.
 
 #![no_main]
 

@@ -1,6 +1,6 @@
 //! A second reading of the CBOR (RFC 8949, typed arrays of RFC 8746) that the runtime writes, into JSON.
 //!
-//! A number that is not finite reads as `null`, which is what it was made of.
+//! A number that is not finite is read as `null`, its form in JSON.
 
 use crate::json::Json;
 

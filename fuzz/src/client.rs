@@ -11,7 +11,7 @@ use tokio::task::JoinHandle;
 use pendularm_client::codec::{Codec, Event, Framing};
 use pendularm_client::websocket::{LAST, append, append_close, append_message, handshake, opcode};
 
-/// The ways in which clients speak.
+/// The protocols of clients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Door {
     /// One object per line.
@@ -76,7 +76,7 @@ impl Client {
         client
     }
 
-    /// The way in which it speaks.
+    /// Its protocol.
     #[must_use]
     pub fn door(&self) -> Door {
         self.door

@@ -11,26 +11,26 @@ use std::time::{Duration, Instant};
 /// The cost that an execution may have.
 #[derive(Debug, Clone, Copy)]
 pub struct Allowance {
-    /// Time for an input of any length.
+    /// Processor time for an input of any length.
     pub time: Duration,
     /// For each of its bytes.
     pub time_per_byte: Duration,
-    /// Bytes of memory at once, whatever the input is.
+    /// Bytes of memory at once for any input.
     pub memory: usize,
     /// For each of its bytes.
     pub memory_per_byte: usize,
 }
 
-/// For what reads bytes: linear in them. The fuzzer's own counting and the second reading make it about a microsecond a
-/// byte. The second reading, which converts numbers as the standard library does, takes up to ten where all of them are
-/// awkward.
+/// For targets that read bytes: linear in their number. With the fuzzer's counting and the second reading it is about a
+/// microsecond per byte. The second reading converts numbers by the standard library, which takes up to ten
+/// microseconds per byte for difficult numbers.
 pub const READING: Allowance = Allowance {
     time: Duration::from_millis(10),
     time_per_byte: Duration::from_micros(10),
     memory: 1 << 20,
     memory_per_byte: 1 << 10,
 };
-/// For what computes, or lets clients do things: as much as a script or a plan of a few hundred bytes can ask for.
+/// For targets that compute or play clients: the most that a script or a plan of a few hundred bytes can request.
 pub const DOING: Allowance = Allowance {
     time: Duration::from_secs(5),
     time_per_byte: Duration::ZERO,

@@ -8,7 +8,7 @@ use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pyme
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{joints_or, property};
-use crate::fields::{self, Bound, Handed, Held, Meant, Object, Real, Whole, refused};
+use crate::fields::{self, Argument, Bound, Held, LosslessArgument, Object, Real, Whole, refused};
 
 /// Rods of 2 or 3 links.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,9 +124,9 @@ fn read<const N: usize>(
 }
 
 /// An arm as an argument.
-pub(crate) type Given<'py> = Handed<Held<'py, Arm>>;
+pub(crate) type Given<'py> = Argument<Held<'py, Arm>>;
 
-impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
+impl<'py> LosslessArgument<'_, 'py> for Held<'py, Arm> {}
 
 impl Given<'_> {
     /// Its rods.

@@ -181,7 +181,7 @@ pub(crate) fn held(
 
 /// An argument for this type. It is checked where its field's name is known.
 #[derive(Debug)]
-pub(crate) enum Handed<T> {
+pub(crate) enum Argument<T> {
     Is(T),
     Other(Other),
 }
@@ -201,19 +201,19 @@ impl Display for Other {
 }
 
 /// Any number.
-pub(crate) type Real = Handed<f64>;
+pub(crate) type Real = Argument<f64>;
 /// A whole number that is not negative.
-pub(crate) type Whole = Handed<u64>;
+pub(crate) type Whole = Argument<u64>;
 /// True or false, Python's or NumPy's.
-pub(crate) type Flag = Handed<bool>;
+pub(crate) type Flag = Argument<bool>;
 /// A name.
-pub(crate) type Name = Handed<String>;
+pub(crate) type Name = Argument<String>;
 
-impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
+impl<'a, 'py, T: LosslessArgument<'a, 'py>> FromPyObject<'a, 'py> for Argument<T> {
     type Error = Infallible;
 
     fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
-        let is_beyond = match T::is_meant(value).then(|| value.extract::<T>()) {
+        let is_beyond = match T::is_lossless(value).then(|| value.extract::<T>()) {
             Some(Ok(found)) => return Ok(Self::Is(found)),
             Some(Err(why)) => why.into().is_instance_of::<PyOverflowError>(value.py()),
             None => false,
@@ -226,16 +226,16 @@ impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
 }
 
 /// A type of arguments.
-pub(crate) trait Meant<'a, 'py>: FromPyObject<'a, 'py> {
+pub(crate) trait LosslessArgument<'a, 'py>: FromPyObject<'a, 'py> {
     /// Whether Python's conversion of a value to this type loses nothing.
-    fn is_meant(_value: Borrowed<'a, 'py, PyAny>) -> bool {
+    fn is_lossless(_value: Borrowed<'a, 'py, PyAny>) -> bool {
         true
     }
 }
 
-impl Meant<'_, '_> for f64 {
+impl LosslessArgument<'_, '_> for f64 {
     /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
-    fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
+    fn is_lossless(value: Borrowed<'_, '_, PyAny>) -> bool {
         let is_real = || {
             // NumPy would allocate all of a range before it finds that it is not a number.
             if !value.hasattr("__float__")? && !value.hasattr("__index__")? {
@@ -249,15 +249,15 @@ impl Meant<'_, '_> for f64 {
     }
 }
 
-impl Meant<'_, '_> for u64 {
+impl LosslessArgument<'_, '_> for u64 {
     /// Booleans would count as 0 and 1, and masked numbers would lose their masks.
-    fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
+    fn is_lossless(value: Borrowed<'_, '_, PyAny>) -> bool {
         !value.is_instance_of::<PyBool>() && is_masked(&value).is_ok_and(|is_masked| !is_masked)
     }
 }
 
-impl Meant<'_, '_> for bool {}
-impl Meant<'_, '_> for String {}
+impl LosslessArgument<'_, '_> for bool {}
+impl LosslessArgument<'_, '_> for String {}
 
 impl Real {
     /// Any number.

@@ -48,7 +48,7 @@ def test_an_interrupted_call_leaves_no_effort_on(links):
     assert np.allclose(batch.position[0], single.position, rtol=1e-12)
 
 
-def test_what_is_refused_has_not_happened():
+def test_a_refused_call_changes_nothing():
     for _ in range(5):
         batch, other = pendularm.Batch(2), pendularm.Batch(1, threads=1)
         batch.set_setpoint([1.0, 1.0])
@@ -120,7 +120,7 @@ def test_a_call_waits_for_the_whole_of_another():
     assert batch.position.tolist() == alone.position.tolist()
 
 
-def test_who_only_looks_keeps_nobody_from_stepping():
+def test_a_client_that_only_reads_delays_no_step():
     arm, batch, said = pendularm.Arm(), pendularm.Batch(2000, threads=1), []
 
     def call(change):
@@ -167,7 +167,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="there is no such signal here")
-def test_who_waits_hears_signals(start_child):
+def test_a_waiting_thread_handles_signals(start_child):
     run = start_child(WAITING)
     assert run.stdout.readline() == "1 None\n"
     assert run.stdout.readline() == "waiting\n"

@@ -103,7 +103,7 @@ def test_shapes_are_checked():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_what_is_not_finite_is_refused_by_its_place(links, bad):
+def test_a_value_that_is_not_finite_is_refused_by_its_place(links, bad):
     arm, good, one, many = pendularm.Arm(links), np.zeros(links), np.zeros(links), np.zeros((4, links))
     one[1] = many[2, 1] = bad
     shown = "NaN" if np.isnan(bad) else str(bad)

@@ -252,7 +252,7 @@ def test_masked_actions_are_refused():
         one.step(np.ma.masked_equal(np.eye(2, dtype=np.float32)[0], 1))
 
 
-def test_what_the_batch_refuses_has_the_callers_name(name):
+def test_errors_of_the_batch_have_the_callers_name(name):
     for arms in [0, 2.5, 10**7]:
         with pytest.raises(ValueError, match=f"^num_envs must be between 1 and 1000000, got {arms}$"):
             gymnasium.make_vec(name, arms)

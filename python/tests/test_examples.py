@@ -20,7 +20,7 @@ def test_an_example_needs_the_wheel_and_not_an_index_that_has_it(name):
 
 # Jupyter's own warnings are Jupyter's.
 @pytest.mark.filterwarnings("ignore")
-def test_the_lesson_shows_what_it_says(tmp_path, play_notebook):
+def test_the_lesson_agrees_with_its_text(tmp_path, play_notebook):
     import nbformat
 
     notebook = nbformat.read(EXAMPLES / "lesson.ipynb", as_version=4)

@@ -45,7 +45,7 @@ TAKERS = {
 
 @pytest.mark.parametrize("long", LONG, ids=["range", "huge", "endless", "inside", "behind"])
 @pytest.mark.parametrize("take", TAKERS.values(), ids=TAKERS.keys())
-def test_what_is_too_long_is_refused_at_once(take, long):
+def test_a_sequence_that_is_too_long_is_refused_at_once(take, long):
     with pytest.raises(ValueError):
         take(long)
 

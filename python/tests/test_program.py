@@ -141,7 +141,7 @@ def test_a_report_can_be_read(tmp_path):
         (b"\0" * 100, "cannot be read: line contains NUL"),
     ],
 )
-def test_a_report_that_cannot_be_read_is_said_so(tmp_path, table, said):
+def test_an_unreadable_report_is_an_error(tmp_path, table, said):
     (tmp_path / "error.csv").write_bytes(table)
     with pytest.raises(ValueError, match=rf"error\.csv {said}"):
         pendularm.read_report(tmp_path)
@@ -153,7 +153,7 @@ def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path):
     assert {name: column.tolist() for name, column in table.items()} == {"a": [1.0], "b": ["x"]}
 
 
-def test_no_report_is_said_so(tmp_path):
+def test_a_missing_report_is_an_error(tmp_path):
     with pytest.raises(FileNotFoundError, match="holds no report"):
         pendularm.read_report(tmp_path)
 

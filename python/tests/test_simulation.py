@@ -193,7 +193,7 @@ def test_a_settled_arm_carries_its_gravity_load(links):
     assert np.allclose(arm.effort, dynamics.gravity_load(arm.arm, arm.position), rtol=1e-4)
 
 
-def test_divergence_is_told_and_reset_clears_it():
+def test_a_divergence_is_shown_and_a_reset_clears_it():
     arm = pendularm.Simulation(method="euler", timestep=0.1)
     arm.enable()
     arm.set_setpoint([1.0, 1.0])

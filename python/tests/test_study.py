@@ -99,7 +99,7 @@ def test_a_run_has_the_nearest_number_of_steps(duration, timestep, steps):
             lambda run: swept.append(run) or run.times[-1],
             duration=duration,
             samples=samples,
-            servo=False,
+            controller=False,
         )
         assert swept[0].times[:, 0].tolist() == run.times.tolist()
         assert swept[0].positions[:, 0].tolist() == run.positions.tolist()

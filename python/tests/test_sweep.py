@@ -129,9 +129,9 @@ def test_a_folder_holds_one_sweep(tmp_path):
 def test_numbers_of_numpy_are_numbers(tmp_path):
     ask = {"grid": {"kp": [1.0, 2.0]}, "folder": tmp_path}
     one = pendularm.sweep(
-        duration=np.float32(0.5), samples=np.int64(11), links=np.int8(2), servo=np.bool_(True), piece=np.int64(1), **ask
+        duration=np.float32(0.5), samples=np.int64(11), links=np.int8(2), controller=np.bool_(True), piece=np.int64(1), **ask
     )
-    other = pendularm.sweep(duration=0.5, samples=11, links=2, servo=True, piece=1, **ask)
+    other = pendularm.sweep(duration=0.5, samples=11, links=2, controller=True, piece=1, **ask)
     assert np.array_equal(one["settling_time"], other["settling_time"])
 
 
@@ -145,7 +145,7 @@ def test_a_folder_knows_the_order_of_the_grid(tmp_path):
     assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
 
 
-def test_what_is_damaged_in_a_folder_is_done_again_or_said(tmp_path):
+def test_damaged_pieces_of_a_folder_are_computed_again_or_reported(tmp_path):
     ask = {"grid": {"kp": [1.0, 2.0, 3.0]}, "duration": 0.1, "folder": tmp_path, "piece": 1}
     expected = pendularm.sweep(**ask)["settling_time"]
     assert not list(tmp_path.glob("part-*"))
@@ -314,7 +314,7 @@ def test_a_function_may_be_the_metric():
         assert run.positions.shape == (51, run.diverged.size, 2)
         return {"last": run.times[-1], "largest": np.abs(run.velocities).max(axis=(0, 2))}
 
-    found = pendularm.sweep({"timestep": [0.001, 0.003, 0.2]}, both, links=2, duration=1.0, samples=51, servo=False)
+    found = pendularm.sweep({"timestep": [0.001, 0.003, 0.2]}, both, links=2, duration=1.0, samples=51, controller=False)
     # The nearest whole step of each.
     assert found["last"].tolist() == [1.0, 333 * 0.003, 1.0]
     assert (found["largest"] > 1).all()

@@ -47,6 +47,6 @@ def test_a_notebook_shows_the_progress(wanted, play_notebook):
     assert "Warning" not in str(shown)
 
 
-def test_nothing_is_shown_off_a_terminal(capfd):
+def test_nothing_is_shown_without_a_terminal(capfd):
     pendularm.sweep({"kp": [1, 2]}, duration=0.1)
     assert capfd.readouterr() == ("", "")

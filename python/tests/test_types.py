@@ -32,7 +32,7 @@ def test_numpys_truth_is_one_by_its_type(tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-def test_everything_public_says_what_it_is():
+def test_everything_public_has_a_docstring():
     for name in pendularm.__all__:
         thing = getattr(pendularm, name)
         assert thing.__doc__, name

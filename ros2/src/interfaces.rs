@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn only_our_own_services_tell_how_a_call_went() {
+    fn only_our_own_services_have_success_and_message() {
         let ours = ServiceInterface::of_catalogue("pendularm_interfaces/srv/TrialStop", &[], &[]);
         assert!(ours.tells_outcome());
         assert_eq!(ours.request.fields, NOTHING);

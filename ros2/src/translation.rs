@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_is_told_with_the_values_that_hold() {
+    fn a_refusal_has_the_present_values() {
         let of = ServiceInterface::of_catalogue(
             Service::SetParams.type_name(),
             Service::SetParams.fields(),

@@ -120,7 +120,7 @@ def test_joint_states_are_decoded_and_numbered(peer, session):
     return received
 
 
-def test_who_comes_late_gets_the_last_description(peer):
+def test_a_late_subscriber_gets_the_last_description(peer):
     received = peer.subscribe("/robot_description", "std_msgs/msg/String", qos=LATCHED)
     wait_for("the description", lambda: received)
     assert "<robot" in received[-1].data, received[-1].data[:80]
@@ -284,7 +284,7 @@ def test_the_bridge_listens_nowhere(bridge):
     assert states == [("tcp", "01")] * 2, states
 
 
-def test_an_arm_with_a_token_wants_to_see_it(port):
+def test_an_arm_with_a_token_requires_it(port):
     token = "sixteen-or-more-characters"
     arm, address = start_arm(0, "--token", token)
     without = start_bridge(address, port, "--namespace", "/right")
@@ -313,7 +313,7 @@ def main():
     say(f"hashes of {test_hashes_of_standard_types_are_those_of_jazzy(session)}")
     test_the_bridge_listens_nowhere(bridge)
     states = test_joint_states_are_decoded_and_numbered(peer, session)
-    test_who_comes_late_gets_the_last_description(peer)
+    test_a_late_subscriber_gets_the_last_description(peer)
     say(f"the arm has gone to {test_a_trajectory_moves_the_arm(peer, states)}")
     test_services_answer_and_say_what_is_wrong(peer)
     say(f"refused: {test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session)}")
@@ -322,7 +322,7 @@ def main():
     router, session = test_the_router_comes_back(port, bridge, router, states)
     arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
     test_another_arm_has_its_namespace(address, port, session)
-    test_an_arm_with_a_token_wants_to_see_it(port)
+    test_an_arm_with_a_token_requires_it(port)
     for one in [bridge, arm, router]:
         one.end()
     say(f"all is well after {time.monotonic() - began:.0f} s")

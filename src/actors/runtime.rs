@@ -22,7 +22,7 @@ use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
-use crate::actors::arm::sim::{AddBarrier, ArmSim, Consult};
+use crate::actors::arm::sim::{AddBarrier, ArmSim, SetLimitPredictor};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
@@ -37,7 +37,7 @@ use crate::actors::panics::contain;
 #[cfg(feature = "record")]
 use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
-use crate::actors::resources::priority::give_way;
+use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosapi::RosapiNode;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::ros::tf_web::TfRepublisher;
@@ -52,7 +52,7 @@ use crate::{
 };
 
 /// Most threads for long work of the gateway.
-const THREADS_ASIDE: usize = 4;
+const LONG_WORK_THREADS: usize = 4;
 /// A time longer than any run of the program.
 const FOR_EVER: Duration = Duration::from_secs(100 * 365 * 24 * 60 * 60);
 /// The reason for waiting calls when the runtime ends.
@@ -85,31 +85,31 @@ pub enum RunError {
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until a signal ends it. If an orderly end takes too long, `last_resort` is called on another thread,
+/// Serves clients until a signal ends it. If an orderly end takes too long, `force_exit` is called on another thread,
 /// and should not return. It is boxed, because a generic runtime would be compiled again, with all its actors, in
 /// every crate that runs one.
 ///
 /// # Errors
 /// If the port cannot be bound, or the operating system refuses a thread or a signal handler.
-pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
-    let mut signals = Signals::hear(last_resort)?;
+pub fn run(options: &Options, force_exit: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
+    let mut signals = Signals::listen(force_exit)?;
     let tokio = Builder::new_current_thread()
         .enable_all()
-        .on_thread_start(give_way)
-        .max_blocking_threads(THREADS_ASIDE)
+        .on_thread_start(lower_priority)
+        .max_blocking_threads(LONG_WORK_THREADS)
         .thread_keep_alive(FOR_EVER)
         .build()?;
-    start_threads_aside(&tokio)?;
+    start_long_work_threads(&tokio)?;
     // Remaining answers are dropped here, as part of the end.
     System::with_tokio_rt(move || tokio).block_on(serve(options, &mut signals))
 }
 
 /// Starts all threads for long work of the gateway at once. None of them ends. If the system refuses one, work uses
 /// the threads that exist.
-fn start_threads_aside(tokio: &Runtime) -> std::io::Result<()> {
+fn start_long_work_threads(tokio: &Runtime) -> std::io::Result<()> {
     let all_are_busy = Arc::new(Mutex::new(()));
     let _until_all_are_there = all_are_busy.lock();
-    for _ in 0..THREADS_ASIDE {
+    for _ in 0..LONG_WORK_THREADS {
         let wait = Arc::clone(&all_are_busy);
         contain(|| drop(tokio.spawn_blocking(move || drop(wait.lock()))))
             .map_err(|panic| std::io::Error::other(panic.to_string()))?;
@@ -271,7 +271,7 @@ where
 
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
-    arm.do_send(Consult(study.recipient()));
+    arm.do_send(SetLimitPredictor(study.recipient()));
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();

@@ -3,7 +3,7 @@
 //! An orderly end answers waiting calls, and needs every thread. If a busy thread does not respond in time, the last
 //! resort ends the process.
 //!
-//! **Invariant:** after a signal the process lives for at most [`LAST_RESORT`].
+//! **Invariant:** after a signal the process lives for at most [`MAX_SHUTDOWN_TIME`].
 
 use std::future::poll_fn;
 use std::io;
@@ -22,7 +22,7 @@ use tokio::signal::windows;
 use tokio::sync::oneshot;
 
 /// Longest time of an orderly end: one second, minus the time for the log and the end of the process.
-pub const LAST_RESORT: Duration = Duration::from_millis(850);
+pub const MAX_SHUTDOWN_TIME: Duration = Duration::from_millis(850);
 
 /// The name of the request that has arrived; otherwise the task is woken when one arrives.
 type Arrivals = Box<dyn FnMut(&mut Context<'_>) -> Poll<&'static str> + Send>;
@@ -122,11 +122,11 @@ pub(super) struct Signals {
 }
 
 impl Signals {
-    /// Handles signals from now on. `last_resort` is called if an orderly end takes too long, and should not return.
+    /// Handles signals from now on. `force_exit` is called if an orderly end takes too long, and should not return.
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.
-    pub(super) fn hear(last_resort: Box<dyn FnOnce() + Send>) -> io::Result<Self> {
+    pub(super) fn listen(force_exit: Box<dyn FnOnce() + Send>) -> io::Result<Self> {
         let runtime = runtime()?;
         let mut arrivals = {
             let _entered = runtime.enter();
@@ -142,8 +142,9 @@ impl Signals {
             // There is no receiver if the runtime has already ended.
             let _ = come.send(());
             tracing::info!("{name}: shutting down");
-            if let Err(mpsc::RecvTimeoutError::Timeout) = has_ended.recv_timeout(LAST_RESORT) {
-                last_resort();
+            if let Err(mpsc::RecvTimeoutError::Timeout) = has_ended.recv_timeout(MAX_SHUTDOWN_TIME)
+            {
+                force_exit();
             }
         };
         thread::Builder::new().name("signals".into()).spawn(wait)?;
@@ -166,18 +167,18 @@ mod tests {
 
     /// This is one test, because a signal is for the whole process. A shell may have started it with SIGHUP ignored.
     #[test]
-    fn who_does_not_end_in_time_is_ended_and_nobody_else() {
+    fn only_a_client_that_misses_the_deadline_is_ended() {
         for (name, one) in REQUESTS.into_iter().chain(further().next()) {
             let (ended, end) = mpsc::channel();
-            let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
+            let signals = Signals::listen(Box::new(move || ended.send(()).unwrap())).unwrap();
             let before = Instant::now();
             signal_this_process(one);
             assert_eq!(signals.came.blocking_recv(), Ok(()), "{name}");
             end.recv().expect("the last resort");
-            assert!(before.elapsed() >= LAST_RESORT);
+            assert!(before.elapsed() >= MAX_SHUTDOWN_TIME);
         }
         let (ended, end) = mpsc::channel::<()>();
-        let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
+        let signals = Signals::listen(Box::new(move || ended.send(()).unwrap())).unwrap();
         signal_this_process(Signal::TERM);
         drop(signals);
         assert!(end.recv().is_err(), "an orderly end has no last resort");

@@ -13,7 +13,7 @@ use super::arguments::TypedValue;
 use super::graph::{self, GraphVerb};
 use super::output::{CommandError, raw};
 use super::session::{RuntimeOptions, Session};
-use crate::output::complain;
+use crate::output::print_error;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::names::absolute;
 
@@ -43,7 +43,7 @@ Examples:
   pendularm service call /arm_sim/set_integrator '{method: rk4, timestep: 0.002}'
   pendularm service call --json /study/stability | jq .timestep_limit_held
 
-The fields are given by name, or all in their order.")]
+Give the fields by name, or all of them in order.")]
     Call {
         /// Its name, with or without the leading slash
         service: String,
@@ -63,12 +63,12 @@ pub enum ActionVerb {
         visible_alias = "send",
         after_help = "\
 Examples:
-  pendularm service call /pid_controller/enable '{data: true}'   # it moves the arm
+  pendularm service call /pid_controller/enable '{data: true}'   # the controller moves the arm
   pendularm action send_goal /ik_action '{x: 1.2, y: 0.5}' --feedback
   pendularm action send_goal --json /ik_action pendularm_interfaces/action/MoveTo '{\"x\": 1.2, \"y\": 0.5}'
 
-It prints `result` and `status`, and before them each `feedback` if that is wanted. SIGINT cancels the goal and waits
-for its end; the second ends at once. Status 0 is SUCCEEDED; CANCELED and ABORTED are 1."
+It prints `result` and `status`, and before them each `feedback` with --feedback. The first SIGINT cancels the goal and
+waits for its end. The second one ends the command. Exit status: 0 for SUCCEEDED, 1 for CANCELED and ABORTED."
     )]
     SendGoal {
         /// Its name, with or without the leading slash
@@ -200,7 +200,7 @@ impl Session {
                     .is_ok_and(|values: Value| values.get("data") == Some(&Value::Bool(false))),
             };
             if is_off {
-                complain(&format_args!(
+                print_error(&format_args!(
                     "the controller is off, so the arm does not move there; to switch it on: pendularm service call \
                      {enable} '{{data: true}}'"
                 ));

@@ -13,13 +13,13 @@ use crate::protocol::names::are_same;
 /// The verbs for topics, services, actions and nodes.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum GraphVerb {
-    /// List all
+    /// List their names
     List {
         /// Show the types (nodes have none)
         #[arg(short = 't', long)]
         show_types: bool,
     },
-    /// Print the type of a topic, service or action and its nodes, or the topics and services of a node
+    /// Describe one: the type and the nodes of a topic, service or action; the topics and services of a node
     Info {
         /// Its name, with or without the leading slash
         name: String,

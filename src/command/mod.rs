@@ -26,8 +26,8 @@ use self::topic::TopicVerb;
 
 /// The end of each subject's help.
 const STATUS: &str = "\
-Exit status: 0 if it was done, 1 if the runtime refused (it says why) or did not succeed, 2 for bad usage, 3 without an
-answer: no connection, one that ended, or nothing within --timeout.";
+Exit status: 0 for success, 1 for a refusal (with its reason) or a failure, 2 for bad usage, 3 for no connection, a
+connection that ended, or no answer within --timeout.";
 
 /// The subjects of the commands, each with its verbs.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
@@ -45,10 +45,10 @@ pub enum CommandSubject {
     /// Show the state, warnings, energy, timestep and limits of a running pendularm
     #[command(after_help = "\
 Example:
-  pendularm diagnostics || echo 'all is not well'
+  pendularm diagnostics || echo 'a part is not OK'
 
-It waits for one message of /diagnostics, a second at most while the arm runs. The status is 1 if some part is not OK.
-With --json the message is one line.")]
+It waits for one message of /diagnostics. A running arm sends one every second. The exit status is 1 if a part is not
+OK. With --json the message is one line.")]
     Diagnostics(RuntimeOptions),
 }
 

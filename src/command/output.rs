@@ -20,7 +20,9 @@ pub enum CommandError {
     #[error("{0}")]
     Usage(String),
     /// No runtime listens at the address.
-    #[error("cannot connect to {0}: {1}")]
+    #[error(
+        "cannot connect to {0}: {1}; start pendularm there, or name its address with --connect"
+    )]
     NoConnection(String, io::Error),
     /// The connection ended.
     #[error("the connection ended: {0}")]

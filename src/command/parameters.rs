@@ -42,7 +42,7 @@ Examples:
   pendularm param set /arm_sim masses '[1, 0.5]'
   pendularm param set /arm_sim integrator verlet
 
-Nothing is printed if it was set.")]
+It prints nothing after a success.")]
     Set {
         #[command(flatten)]
         parameter: ParameterName,

@@ -20,7 +20,7 @@ use tokio::time::{Instant, timeout_at};
 use super::output::{CommandError, plain, print};
 use super::yaml::{json_line, write_yaml};
 use crate::address;
-use crate::output::complain;
+use crate::output::print_error;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::{are_same, same_type};
 use crate::protocol::op::token::Token;
@@ -209,7 +209,7 @@ impl Session {
             let text: String = read_as(received.msg.as_deref()).unwrap_or_default();
             match received.level.as_str() {
                 "error" => return Err(CommandError::refused(&text)),
-                "warning" => complain(&text),
+                "warning" => print_error(&text),
                 _ => {}
             }
         }

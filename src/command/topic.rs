@@ -33,8 +33,8 @@ Examples:
   pendularm topic echo /joint_states --field position -n 3
   pendularm topic echo --json /clock | head -n 3
 
-Each message is a YAML document that ends with ---, or with --json a line. A reader that goes away
-ends it with status 0.")]
+Each message is a YAML document that ends with ---, or with --json a line. If the reader closes
+the pipe, the command ends with status 0.")]
     Echo {
         #[command(flatten)]
         source: SubscribedTopic,

@@ -7,7 +7,7 @@ use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
 
 /// An event of the arm, for a record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ArmNews<const N: usize> {
+pub struct StepEvent<const N: usize> {
     /// Steps taken so far. A reset does not restart the count.
     pub step: u64,
     /// The content.
@@ -33,7 +33,7 @@ pub enum ArmEvent<const N: usize> {
 }
 
 /// Receives the arm's events, on the arm's thread, without blocking. Returns whether it has accepted the event.
-pub type ArmListener<const N: usize> = Box<dyn FnMut(ArmNews<N>) -> bool + Send>;
+pub type ArmListener<const N: usize> = Box<dyn FnMut(StepEvent<N>) -> bool + Send>;
 
 /// The listener, and the last event for it.
 pub struct Journal<const N: usize> {
@@ -101,6 +101,6 @@ impl<const N: usize> Journal<N> {
 
     fn say(&mut self, steps: u64, event: ArmEvent<N>) -> bool {
         let step = self.before_reset + steps;
-        (self.listener)(ArmNews { step, event })
+        (self.listener)(StepEvent { step, event })
     }
 }

@@ -35,7 +35,7 @@ use crate::services::study::Present;
 use crate::study::control_loop::ControlLoop;
 
 pub use self::goals::{GoalOrder, GoalProgress, Obstacle, Pose, Tracking};
-pub use self::journal::{ArmEvent, ArmListener, ArmNews, Journal};
+pub use self::journal::{ArmEvent, ArmListener, Journal, StepEvent};
 pub use self::limit::LEAST_PAUSE;
 pub use self::requests::{ArmRequest, ControllerOn};
 pub use self::steps::StepsAsked;
@@ -46,7 +46,7 @@ pub const PUBLISH_RATE: u32 = 60;
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
 /// Pause between two wake-ups while steps are due. So the arm can use most of its core, independent of the
 /// publishing rate. With a timestep that is too short for the machine, other threads still get part of the core.
-pub const BREATHER: Duration = Duration::from_millis(1);
+pub const STEP_PAUSE: Duration = Duration::from_millis(1);
 /// Steps between two checks of the clock: about 10 microseconds of work.
 const STEPS_BETWEEN_LOOKS: u64 = 64;
 
@@ -82,7 +82,7 @@ pub struct LiveArm<const N: usize, W> {
     pub(crate) paused: bool,
     /// Simulation time at the latest pause or reset \[s\].
     pub(crate) paused_at: f64,
-    /// Whether steps are due that a wake-up after a [`BREATHER`] will take.
+    /// Whether steps are due that a wake-up after a [`STEP_PAUSE`] will take.
     catching_up: bool,
     pub(crate) telemetry: Telemetry,
     pub(crate) goals: Goals<N>,
@@ -145,12 +145,12 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     }
 
     /// Takes due steps within one wake-up's budget. Returns `true` if steps remain: the caller then calls
-    /// [`LiveArm::catch_up`] after a [`BREATHER`].
+    /// [`LiveArm::catch_up`] after a [`STEP_PAUSE`].
     pub fn advance_to_now(&mut self) -> bool {
         if self.paused || self.simulation.divergence().is_some() {
             return false;
         }
-        // There is one budget until the breather is over. With one per message, a client with many messages could block
+        // There is one budget until the pause is over. With one per message, a client with many messages could block
         // the arm for all others.
         if self.catching_up {
             return false;
@@ -171,7 +171,7 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
         self.catching_up
     }
 
-    /// Takes the remaining steps after the breather. Returns the same as [`LiveArm::advance_to_now`].
+    /// Takes the remaining steps after the pause. Returns the same as [`LiveArm::advance_to_now`].
     pub fn catch_up(&mut self) -> bool {
         self.catching_up = false;
         self.advance_to_now()

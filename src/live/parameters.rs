@@ -1,6 +1,6 @@
 //! The arm's parameters: their present values, and the effect of setting one.
 //!
-//! **Invariant:** a parameter has no separate value. It is set as the service sets it that has it as a field.
+//! **Invariant:** a parameter has no separate value. Setting it has the effect of the service with that field.
 
 use super::{ArmRequest, LiveArm, World};
 use crate::protocol::op::fields::Rejections;
@@ -32,15 +32,15 @@ impl<const N: usize> ArmRequest<N> for AskParameters<N> {
 
 impl<const N: usize, W: World<N>> LiveArm<N, W> {
     fn value_of(&self, parameter: Parameter) -> ParameterValue<N> {
-        use ParameterValue::{Number, Numbers, Text};
+        use ParameterValue::{Number, PerJoint, Text};
         let (arm, gains) = (self.simulation.arm(), self.simulation.pid().gains());
         match parameter {
             Parameter::Gravity => Number(arm.gravity()),
-            Parameter::Masses => Numbers(*arm.masses()),
-            Parameter::Lengths => Numbers(*arm.lengths()),
-            Parameter::Kp => Numbers(gains.kp),
-            Parameter::Ki => Numbers(gains.ki),
-            Parameter::Kd => Numbers(gains.kd),
+            Parameter::Masses => PerJoint(*arm.masses()),
+            Parameter::Lengths => PerJoint(*arm.lengths()),
+            Parameter::Kp => PerJoint(gains.kp),
+            Parameter::Ki => PerJoint(gains.ki),
+            Parameter::Kd => PerJoint(gains.kd),
             Parameter::Integrator => Text(self.simulation.method().name().to_owned()),
             Parameter::Timestep => Number(self.simulation.timestep()),
             Parameter::ControlPeriod => Number(self.simulation.control_period().period),

@@ -51,7 +51,7 @@ static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
 
 /// Also sends warnings and errors to `listener` from now on, at every level of the log. `None` ends that. If the
 /// channel is full, the warning is dropped.
-pub fn hear_warnings(listener: Option<Sender<Warning>>) {
+pub fn listen_for_warnings(listener: Option<Sender<Warning>>) {
     *LISTENER.lock().unwrap_or_else(PoisonError::into_inner) = listener;
 }
 

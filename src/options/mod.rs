@@ -53,7 +53,7 @@ const BUILD: &str = if cfg!(feature = "web") {
 const AFTER_HELP: &str = "\
 The port speaks rosbridge JSON over TCP. With the web feature, which --version shows, it also speaks WebSocket and
 serves a page over HTTP.
-An option wins over its environment variable; an empty variable counts as unset.
+An option overrides its environment variable. An empty variable counts as unset.
 Exit status: 0 after a signal that asks it to end (SIGINT, SIGTERM, SIGHUP), 2 for a bad option or variable, 1 for any
 other failure.";
 
@@ -108,7 +108,7 @@ pub struct Options {
 #[cfg(feature = "record")]
 #[derive(Debug, Clone, PartialEq, Eq, Args)]
 pub struct RecordOptions {
-    /// Records the run as MCAP into this file, which must not exist
+    /// Record the run as MCAP into this file, which must not exist
     #[arg(long = "record", env = "ARM_SIM_RECORD", value_name = "FILE")]
     pub file: Option<PathBuf>,
     /// Existing folder for records that clients start by /recorder/start
@@ -129,7 +129,7 @@ pub struct WebOptions {
     #[arg(value_name = "ORIGINS")]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
     pub origins: Vec<Box<str>>,
-    /// Allows a WebSocket only to the runtime's own page and to --allow-origin, as with a token
+    /// Allow a WebSocket only to the runtime's own page and to --allow-origin, as with a token
     #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "SWITCH")]
     #[arg(default_value = "false")]
     #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
@@ -255,8 +255,8 @@ impl Options {
             return Ok(self);
         }
         Err(format!(
-            "--bind (ARM_SIM_BIND) must be a loopback address, such as {DEFAULT_BIND}, unless --token gives something \
-             to ask for, got \"{bind}\""
+            "--bind (ARM_SIM_BIND) must be a loopback address, such as {DEFAULT_BIND}, unless --token is set, \
+             got \"{bind}\""
         ))
     }
 }

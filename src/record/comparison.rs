@@ -18,7 +18,7 @@ use crate::protocol::wire::text::excerpt;
 
 /// Most steps between two messages of a record. On the fastest machine a tick has a tenth of that, so a record with a
 /// slow file is not refused.
-pub const MAX_LEAP: u64 = 10_000_000;
+pub const MAX_STEPS_BETWEEN_MESSAGES: u64 = 10_000_000;
 /// Lower bound on the time of a step, in nanoseconds. On every measured machine a step takes at least three times that.
 const SHORTEST_STEP: u64 = 10;
 /// Steps that are always allowed, so a coarse clock has no effect.
@@ -309,7 +309,7 @@ impl<const N: usize> Replay<N> {
         let due = due.ok_or(ReplayError::Order { step, after: *at })?;
         let since = passage.log_time.saturating_sub(self.began);
         let by_time = (since / SHORTEST_STEP).saturating_add(AT_ONCE);
-        let most = MAX_LEAP.min(by_time.saturating_sub(self.taken));
+        let most = MAX_STEPS_BETWEEN_MESSAGES.min(by_time.saturating_sub(self.taken));
         if due > most {
             return Err(ReplayError::Leap {
                 topic: passage.topic.clone(),

@@ -14,7 +14,9 @@ mod writer;
 
 use bytes::Bytes;
 
-pub use self::comparison::{AT_ONCE, Difference, MAX_LEAP, ReplayError, ReplayVerdict, replay};
+pub use self::comparison::{
+    AT_ONCE, Difference, MAX_STEPS_BETWEEN_MESSAGES, ReplayError, ReplayVerdict, replay,
+};
 pub use self::journal::{Note, NoteError, links, read_note, write_note};
 pub use self::reader::{ReadError, RecordEnding, RecordedMessage, Recording};
 pub use self::schema::{CALLS, INPUTS, STATES};

@@ -94,7 +94,7 @@ impl LiveScene {
             number(&params["gravity"], standard.gravity()),
         );
         let arm = arm.map_err(|error| error.to_string())?;
-        let control = if settings["servo"] == true {
+        let control = if settings["controller"] == true {
             let (gains, standard) = (&settings["gains"], Gains::default());
             let gains = Gains {
                 kp: list(&gains["kp"], standard.kp),
@@ -163,7 +163,7 @@ fn fragment<const N: usize>(control: &ControlLoop<N>, start: &State<N>) -> Strin
         format!("&kp={kp}&ki={ki}&kd={kd}&setpoint={setpoint}")
     };
     format!(
-        "links={N}&method={}&timestep={:?}&gravity={:?}&masses={}&lengths={}{law}&period={:?}&delay={}&servo={}\
+        "links={N}&method={}&timestep={:?}&gravity={:?}&masses={}&lengths={}{law}&period={:?}&delay={}&controller={}\
          &position={}&velocity={}",
         control.method,
         control.timestep,

@@ -54,7 +54,7 @@ pub(super) fn media_type(name: &str) -> Option<&'static str> {
 
 impl FileName {
     /// The file at `rest`, the path after [`PREFIX`]: letters, digits, `-`, `_` and `.` between slashes, no name that
-    /// begins with a dot, and a known extension. A folder stands for its index.
+    /// begins with a dot, and a known extension. The path of a folder gives its index.
     #[must_use]
     pub fn parse(rest: &str) -> Option<Self> {
         let mut whole = decode(rest)?;

@@ -41,10 +41,11 @@ async fn weightless() -> Stage<2> {
     Stage::with_a_floating_arm().await.0
 }
 
-/// With a timestep that no machine can follow every wake-up works for its 5 ms. The 12 ticks of 0.2 s would make that
-/// 0.06 s in all; a wake-up after every breather of a millisecond (two, by the timer's grain) 0.5 s or more.
+/// With a timestep that is too short for every machine, each wake-up works for its 5 ms. Alone, the 12 ticks of 0.2 s
+/// would make 0.06 s. With a wake-up after every pause of a millisecond (two, by the timer's grain) it is at least 0.5
+/// s.
 #[test]
-fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
+fn steps_left_by_a_wake_up_are_taken_before_the_next_tick() {
     in_virtual_time(async {
         let stage = weightless().await;
         asked(&stage.arm, of_timestep(1e-12)).await;
@@ -59,7 +60,7 @@ fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
 
 /// The arm's own messages, before the registry could drop them.
 #[test]
-fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
+fn nothing_is_encoded_for_a_topic_without_subscribers() {
     in_virtual_time(async {
         let (sender, mut published) = unbounded_channel();
         let publish = Published(sender).start().recipient();

@@ -1,4 +1,4 @@
-//! A paused arm that clients step by hand: every answer is that of the offline stepper, in every bit.
+//! A paused arm that clients step: every answer is bit-identical to the offline stepper's.
 
 use crate::stage::{Client, Stage};
 use crate::system::in_virtual_time;
@@ -109,7 +109,7 @@ async fn change(client: &mut Client, offline: &mut Simulation<2>, random: &mut f
 }
 
 #[test]
-fn steps_by_hand_are_those_of_the_offline_stepper_whatever_is_set_between_them() {
+fn steps_of_a_client_equal_the_offline_steppers_for_all_settings_between_them() {
     in_virtual_time(async {
         for seed in 0..8 {
             let (_stage, mut client, mut offline) = paused().await;
@@ -122,9 +122,9 @@ fn steps_by_hand_are_those_of_the_offline_stepper_whatever_is_set_between_them()
     });
 }
 
-/// Steps are taken in slices. Later requests of the same client wait all the same.
+/// Steps are taken in slices. Later requests of the same client still wait.
 #[test]
-fn what_a_client_sends_behind_its_steps_takes_effect_behind_them() {
+fn requests_after_a_clients_steps_take_effect_after_them() {
     in_virtual_time(async {
         let (_stage, mut client, mut offline) = paused().await;
         for length in [1.1, 1.2, 1.3, 1.4] {

@@ -12,11 +12,11 @@ use pendularm::actors::gateway::messages::TakeCensus;
 use serde_json::{Value, json};
 
 const CLIENTS: usize = 16;
-/// Calls, goals, or registrations of a kind, of each.
+/// The number of calls, goals, or registrations of a kind, of each client.
 const EACH: usize = 100;
 
-/// Each of the clients sends `frame` [`EACH`] times; then `end` ends all of that. Others have turns meanwhile, and in the
-/// end everybody has heard of each once.
+/// Each client sends `frame` [`EACH`] times. Then `end` ends all of them. Other tasks have turns meanwhile, and in the
+/// end each client has one notice per frame.
 fn assert_ends_in_turns(
     frame: impl Fn(usize) -> Value,
     end: impl AsyncFnOnce(Peer),
@@ -89,7 +89,7 @@ fn calls_whose_time_is_over() {
 }
 
 #[test]
-fn goals_whose_action_server_goes() {
+fn goals_of_a_disconnected_action_server() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(goal, async |provider| drop(provider), aborted);
@@ -97,7 +97,7 @@ fn goals_whose_action_server_goes() {
 
 /// Registrations of every kind, with both spellings of a topic.
 #[test]
-fn registrations_of_those_who_leave() {
+fn registrations_of_disconnected_clients() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut clients: Vec<Peer> = (0..2).map(|_| gateway.connect(WIDE)).collect();
@@ -118,7 +118,7 @@ fn registrations_of_those_who_leave() {
             let census = gateway.registry.send(TakeCensus).await.unwrap();
             let registered = census.topics.len() + census.services.len() + census.actions.len();
             assert_eq!(registered, left, "{census:?}");
-            // The last one has taken over service and action, so it goes last.
+            // The last client has taken over the service and the action, so it disconnects last.
             clients.drain(..clients.len().min(1));
             settle().await;
         }

@@ -27,7 +27,7 @@ impl Handler<ArmPose<2>> for Gone {
 }
 
 #[test]
-fn without_an_arm_the_caller_is_told_so() {
+fn without_an_arm_the_caller_gets_the_reason() {
     in_virtual_time(async {
         let gone = Gone.start();
         while gone.connected() {

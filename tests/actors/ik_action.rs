@@ -1,4 +1,4 @@
-//! Goals between their node and the arm: messages that cross on their way. `exchanges/goals.txt` has what clients see.
+//! Goals between their node and the arm: messages that cross. `exchanges/goals.txt` has the clients' frames.
 
 use crate::stage::{Published, SilentArm, Stage, asked, ms, pass};
 use crate::system::in_virtual_time;
@@ -14,7 +14,7 @@ use pendularm::math::kinematics::Target;
 use pendularm::protocol::catalog::Topic;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 
-/// A goal that an arm at its starting pose is not near.
+/// A goal far from the starting pose.
 pub fn elsewhere() -> SendGoal<2> {
     SendGoal {
         target: Target {
@@ -66,7 +66,7 @@ impl Handler<TrackGoal<2>> for Noting {
     }
 }
 
-/// Else subscribers would see the old goal's trajectory as the new goal's.
+/// Otherwise subscribers would see the old goal's trajectory as the new goal's.
 #[test]
 fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
     in_virtual_time(async {
@@ -96,7 +96,7 @@ fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
 
 /// The node's own messages, before the registry could drop them.
 #[test]
-fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
+fn nothing_is_encoded_for_a_topic_without_subscribers() {
     in_virtual_time(async {
         let arm = SilentArm.start();
         let ik = Ik::<2>::new(arm.clone().recipient()).start();
@@ -130,7 +130,7 @@ fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
     });
 }
 
-/// Hears of a goal in a goal's owner's place.
+/// Receives the progress of a goal in place of its owner.
 struct Owner(UnboundedSender<GoalProgress<2>>);
 
 impl Actor for Owner {

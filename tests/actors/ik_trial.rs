@@ -1,5 +1,5 @@
-//! A trial between an arm and an `ik_action` that do what a test needs, so that messages cross; and no work without
-//! subscribers. `exchanges/trials.txt` has what clients see.
+//! A trial with substitutes for the arm and `ik_action`, so messages can cross. Without subscribers it does no work.
+//! `exchanges/trials.txt` has the clients' frames.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,7 +11,7 @@ use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik::{Ik, SolveError};
 use pendularm::actors::arm::ik_action::{
-    CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, IkAction, SendGoal,
+    CancelGoal, CancelRejected, GoalOwner, GoalRejected, GoalReport, IkAction, SendGoal,
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, TrialRequest};
 use pendularm::actors::arm::sim::{ArmPose, Pose};
@@ -42,26 +42,26 @@ fn start_with(changes: Changes) -> TrialRequest {
     TrialRequest::Start { changes, rejected }
 }
 
-/// Starts a trial that must start.
+/// Starts a trial, which must succeed.
 async fn begin(trial: &Addr<IkTrial<2>>, question: TrialRequest) {
     assert_eq!(asked(trial, question).await.outcome, Ok(()));
 }
 
-/// The latest status, once all that is under way has arrived.
+/// The latest status, after all sent messages have arrived.
 async fn status(client: &mut Client) -> Value {
     client.messages_for(ms(101), STATUS).await.pop().unwrap()
 }
 
-/// The part of the stand-ins, shared with the test.
+/// The state of the substitutes, shared with the test.
 #[derive(Default)]
 struct Script {
     lengths: [f64; 2],
     /// Goals to be refused before one is accepted.
     refusals: usize,
     sent: Vec<Target>,
-    /// Sent to the latest goal's owner only when the trial asks for news.
-    news: Vec<GoalNews<2>>,
-    owner: Option<Recipient<GoalNews<2>>>,
+    /// Sent to the latest goal's owner only when the trial requests the progress.
+    news: Vec<GoalReport<2>>,
+    owner: Option<Recipient<GoalReport<2>>>,
 }
 
 struct StandIn {
@@ -133,9 +133,9 @@ impl Handler<Barrier> for StandIn {
     }
 }
 
-/// The news that the first goal was reached at this time.
-fn reached_at(time: f64) -> GoalNews<2> {
-    GoalNews {
+/// The report that the first goal was reached at this time.
+fn reached_at(time: f64) -> GoalReport<2> {
+    GoalReport {
         goal_id: "goal-1".to_owned(),
         distance: 0.0,
         positions: [0.0, 0.0],
@@ -151,7 +151,7 @@ fn reached_at(time: f64) -> GoalNews<2> {
     }
 }
 
-/// A trial between stand-ins, and a client that watches it.
+/// A trial with substitutes, and a client that subscribes to its status.
 async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, Client, Instant) {
     let gauges = std::sync::Arc::default();
     let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
@@ -177,10 +177,10 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
     (trial, client, born)
 }
 
-/// The arm says that the goal was reached at 0.101 s, then that it is 0.11 s. The message about the goal goes
-/// through `ik_action` and may be slower; it still counts.
+/// The arm reports that the goal was reached at 0.101 s, then that the time is 0.11 s. The message about the goal
+/// passes through `ik_action` and may be slower. It still counts.
 #[test]
-fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
+fn earlier_messages_of_the_arm_arrive_before_its_time() {
     in_virtual_time(async {
         let script = Rc::new(RefCell::new(Script {
             lengths: [1.0, 1.0],
@@ -226,7 +226,7 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
 
 /// The node's own messages, before the registry could drop them.
 #[test]
-fn no_status_is_encoded_while_nobody_wants_it() {
+fn no_status_is_encoded_without_a_subscriber() {
     in_virtual_time(async {
         let arm = SilentArm.start();
         let (sender, mut published) = unbounded_channel();
@@ -256,9 +256,9 @@ fn no_status_is_encoded_while_nobody_wants_it() {
     });
 }
 
-/// In an hour the machinery of virtual time itself wakes the thread a few times; a status at 10 Hz wakes it 36,000 times.
+/// In an hour virtual time itself wakes the thread a few times. A status at 10 Hz would wake it 36,000 times.
 #[test]
-fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
+fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
     counting_wake_ups(|sleeps| async move {
         let gauges = std::sync::Arc::default();
         let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();

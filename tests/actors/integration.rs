@@ -40,12 +40,12 @@ fn heavy() -> IntegrationStep {
 }
 
 #[test]
-fn a_call_whose_caller_has_gone_ends_early_and_once() {
+fn a_call_of_a_disconnected_caller_ends_early_and_once() {
     in_real_time(async {
         let mut bench = integration();
         let call = bench.ask_as(1, heavy());
         call.gone.store(true, Ordering::Relaxed);
-        // The registry drops the answer; that there is one is how every call ends.
+        // The registry drops the answer. Every call ends with one.
         assert_eq!(bench.next().await, 1);
         assert!(matches!(call.answer.await, Ok(Err(Unserved::CallerGone))));
         assert!(timeout(PATIENCE, call.ended).await.is_ok());
@@ -54,7 +54,7 @@ fn a_call_whose_caller_has_gone_ends_early_and_once() {
 }
 
 #[test]
-fn a_caller_that_leaves_at_any_moment_is_answered_once() {
+fn a_caller_that_disconnects_at_any_moment_gets_one_answer() {
     in_real_time(async {
         let mut bench = integration();
         for microseconds in (0..2000).step_by(40) {
@@ -69,7 +69,7 @@ fn a_caller_that_leaves_at_any_moment_is_answered_once() {
 }
 
 #[test]
-fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
+fn the_end_of_the_pool_refuses_running_waiting_and_new_tasks() {
     in_real_time(async {
         let mut bench = integration();
         let mut calls: Vec<_> = (1..=5).map(|n| bench.ask_as(n, heavy())).collect();
@@ -89,7 +89,7 @@ fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
 }
 
 #[test]
-fn what_is_refused_does_not_take_a_turn_away() {
+fn a_refused_call_takes_no_turn() {
     in_real_time(async {
         let mut bench = integration();
         let calls = [

@@ -41,7 +41,8 @@ where
     Gains<N>: Default,
 {
     async fn start() -> Self {
-        // A busy machine defers no step: the kernel's budget follows the virtual clock, and the runtime's counts looks.
+        // A busy machine defers no step. The kernel's budget follows the virtual clock, and the runtime's budget counts
+        // queries of the clock.
         work_clock::count(Duration::from_micros(1));
         let stage = Stage::<N>::with_seed(SEED).await;
         work_in_this_thread(stage.pool.clone());
@@ -78,7 +79,7 @@ where
         self.send(json!({"op": "subscribe", "topic": topic})).await;
     }
 
-    /// Lets time pass, with the ticks in it.
+    /// Lets time pass, with its ticks.
     async fn pass(&mut self, time: Duration) {
         let (end, tick) = (clock() + time, Duration::from_secs(1) / 60);
         loop {
@@ -124,7 +125,7 @@ where
         ours.as_array().unwrap().last().unwrap().clone()
     }
 
-    /// Both have published the same on a topic.
+    /// Asserts that both have published the same on a topic.
     fn agree_on(&self, topic: &str) -> usize {
         let theirs = self.client.messages(topic);
         let is_on = |frame: &&Value| frame["topic"] == topic;
@@ -139,7 +140,7 @@ where
     }
 }
 
-/// The frame without what depends on how fast the machine is.
+/// The frame without values that depend on the machine's speed.
 fn without_times(mut frame: Value) -> Value {
     if let Some(values) = frame["values"].as_object_mut() {
         values.remove("wall_time");
@@ -180,13 +181,14 @@ fn arguments(links: usize) -> Vec<Value> {
         json!({"duration": 0.5, "samples": 7, "reference": true, "timestep": 0.01}),
         json!({"duration": 1e300, "samples": 1_000_000_000}),
         json!({"settling_time": 1e-9, "margin": 0.5}),
-        json!({"error": 0.01, "servo": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
+        json!({"error": 0.01, "controller": true, "duration": 0.5, "setpoint": per_joint(0.2)}),
         json!({"params": {"masses": per_joint(3.0)}, "gains": {"kp": per_joint(200.0)}, "duration": 0.3}),
         json!({"params": {"masses": 3}, "gains": {"kp": "stiff"}}),
     ]
 }
 
-/// Whether the arguments are worth a computation: unknown fields are ignored, and without a known one it is the same again.
+/// Whether the arguments need their own computation. Unknown fields are ignored, so without a known one the result is
+/// the same.
 fn is_of_the_study(service: &str, args: &Value) -> bool {
     let Some(fields) = args.as_object() else {
         return !args.is_null() && *args != json!([]);

@@ -53,10 +53,10 @@ fn accepted_clients_outlive_the_listening() {
     });
 }
 
-/// The kernel has set a timer to ask whether a silent client is there.
+/// The kernel has set a timer to probe a silent client.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_silent_client_is_asked_after_a_while_whether_it_is_there() {
+fn a_silent_client_gets_a_ping_after_a_while() {
     in_real_time(async {
         let socket = bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let address = socket.local_addr().unwrap();

@@ -1,4 +1,4 @@
-//! Memory that clients may make the program hold: long answers of computations wait for room that all share.
+//! Bounded memory for clients: long answers of computations wait for a share of the common memory.
 //! `exchanges/memory.txt` has long frames.
 
 use std::time::Duration;
@@ -17,7 +17,7 @@ use tokio::time::sleep;
 const MIB: usize = 1024 * 1024;
 const STEP: &str = "/arm_sim/integration_step";
 
-/// That all of it fits into the limit is asserted where the limits are.
+/// `limits.rs` asserts that the sum is within the limit.
 #[test]
 fn places_and_pools_have_the_documented_sizes() {
     const { assert!(CLIENT_BYTES == 1728 * 1024 && MAX_MEMORY == 752 * MIB) };
@@ -43,7 +43,7 @@ async fn ask_steps(client: &mut Peer, steps: usize) {
 fn computations_that_fit_only_after_one_another_wait_for_one_another() {
     in_real_time(async {
         let workers = WorkerPool::start(2).unwrap();
-        // Room for one answer of 10,000 steps at a time, and for a short one in addition.
+        // Memory for one answer of 10,000 steps at a time, and for a short one in addition.
         let gateway = computing(MIB, &workers).await;
         let mut clients: Vec<Peer> = (0..12).map(|_| gateway.connect(WIDE)).collect();
         for client in &mut clients {

@@ -1,8 +1,8 @@
 //! Backpressure on a publisher: its next frame is handled once its last message has been offered to every subscriber.
 //!
-//! On real sockets, since only those are written to in turns; in one thread, so that nothing depends on time.
+//! It uses real sockets, because only those are written to in turns, and one thread, so nothing depends on time.
 //!
-//! **Invariant:** what is counted is what had arrived when the publisher's next frame was handled.
+//! **Invariant:** the test counts the messages that had arrived when the publisher's next frame was handled.
 
 use std::cell::Cell;
 use std::io::{BufRead, BufReader, Write};
@@ -17,10 +17,10 @@ use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
 use serde_json::json;
 
-/// Subscribers: many more than are written to where the message is heard, and than have their turn at once.
+/// Number of subscribers: many more than are written to in one turn.
 const SUBSCRIBERS: usize = 100;
 
-/// Subscribes over a socket; gives the client's end.
+/// Subscribes over a socket. Returns the client's end.
 async fn subscriber(gateway: &Gateway, listener: &TcpListener, topic: &str) -> TcpStream {
     let mut client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
     let (stream, _) = listener.accept().unwrap();
@@ -49,7 +49,7 @@ async fn subscriber(gateway: &Gateway, listener: &TcpListener, topic: &str) -> T
 }
 
 #[test]
-fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
+fn a_publisher_continues_when_all_its_subscribers_have_been_written_to() {
     let msg = json!({"data": "x".repeat(40_000)});
     // Forwarded unchanged, and read.
     let spelled = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");

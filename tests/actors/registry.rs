@@ -19,7 +19,7 @@ use serde_json::json;
 type Log<T> = Rc<RefCell<Vec<T>>>;
 
 #[test]
-fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
+fn a_node_is_notified_of_the_first_subscriber_and_of_the_end_of_the_last() {
     in_virtual_time(async {
         let received: Log<(Topic, bool)> = Rc::default();
         let log = Rc::clone(&received);
@@ -57,8 +57,7 @@ fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
 }
 
 #[test]
-fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_and_not_the_listener()
-{
+fn a_nodes_message_on_a_topic_of_the_runtime_reaches_clients_but_not_the_listener() {
     in_virtual_time(async {
         let received: Log<String> = Rc::default();
         let log = Rc::clone(&received);
@@ -85,7 +84,7 @@ fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_an
     });
 }
 
-/// The sender's next frame waits until the node is done with its message.
+/// The sender's next frame waits until the node has handled its message.
 #[test]
 fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
     in_virtual_time(async {
@@ -102,7 +101,7 @@ fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
         client.publish("/joint_trajectory", 1).await;
         client.publish("/joint_trajectory", 2).await;
         client.call("/none", 1).await;
-        assert!(client.hears_nothing_for(Duration::from_secs(60)).await);
+        assert!(client.receives_nothing_for(Duration::from_secs(60)).await);
         assert_eq!(held.borrow().len(), 1);
         other.call("/none", 2).await;
         assert_eq!(other.receive().await["id"], 2, "nobody else waits");

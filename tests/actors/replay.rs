@@ -1,7 +1,9 @@
-//! Recorded steps taken again from a record that lies.
+//! Replays of false records.
 
 use crate::system::in_virtual_time;
-use pendularm::record::{AT_ONCE, Content, MAX_LEAP, RecordEntry, ReplayError, replay};
+use pendularm::record::{
+    AT_ONCE, Content, MAX_STEPS_BETWEEN_MESSAGES, RecordEntry, ReplayError, replay,
+};
 use serde_json::json;
 use tokio::time::sleep;
 
@@ -42,10 +44,10 @@ fn a_step_that_no_arm_has_come_to_is_refused_with_the_message() {
         entries[last].log_time = 1 << 60;
         entries
     };
-    for more in [MAX_LEAP, 1 << 60] {
+    for more in [MAX_STEPS_BETWEEN_MESSAGES, 1 << 60] {
         let why = refused(&with_steps(more));
         assert!(
-            matches!(&why, ReplayError::Leap { due, most, .. } if *due > *most && *most == MAX_LEAP),
+            matches!(&why, ReplayError::Leap { due, most, .. } if *due > *most && *most == MAX_STEPS_BETWEEN_MESSAGES),
             "{why}"
         );
         let why = why.to_string();
@@ -66,7 +68,7 @@ fn a_step_that_no_arm_has_come_to_is_refused_with_the_message() {
     assert!(why.starts_with("/recorder/inputs, message "), "{why}");
 }
 
-/// Each of the leaps might be, by itself.
+/// Each leap alone would be allowed.
 #[test]
 fn a_record_has_no_more_steps_than_its_time_has_room_for() {
     let entries = in_virtual_time(short_run());

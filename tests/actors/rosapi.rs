@@ -5,7 +5,7 @@ use actix::prelude::*;
 use pendularm::actors::compute::workers::WorkerPool;
 #[cfg(feature = "record")]
 use pendularm::actors::recorder::Recorder;
-use pendularm::actors::resources::aside::{PLACES, WorkKind, aside};
+use pendularm::actors::resources::long_work::{PLACES, WorkKind, run_long_work};
 use pendularm::actors::wire::Nodes;
 use pendularm::protocol::catalog::{self, Service};
 use serde_json::json;
@@ -33,8 +33,7 @@ fn every_service_that_is_listed_is_served() {
     });
 }
 
-/// A list of thousands is made only for a client that is about to write it: one that waits holds
-/// none.
+/// A list of thousands is made only when the client can write it. A waiting client holds no list.
 #[test]
 fn the_list_is_made_once_there_is_a_place_to_write_it() {
     in_virtual_time(async {
@@ -50,7 +49,7 @@ fn the_list_is_made_once_there_is_a_place_to_write_it() {
         let held = std::sync::Arc::new(std::sync::Mutex::new(held));
         for _ in 0..PLACES {
             let held = std::sync::Arc::clone(&held);
-            actix_rt::spawn(aside(WorkKind::Listing, move || {
+            actix_rt::spawn(run_long_work(WorkKind::Listing, move || {
                 held.lock().unwrap().recv()
             }));
         }
@@ -68,7 +67,7 @@ fn the_list_is_made_once_there_is_a_place_to_write_it() {
     });
 }
 
-/// Runs every task that only waits for its turn. The clock stands still while another thread works.
+/// Runs every task that only waits for its turn. The clock does not move while another thread works.
 async fn turns() {
     for _ in 0..100 {
         tokio::task::yield_now().await;

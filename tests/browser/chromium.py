@@ -100,7 +100,7 @@ class Browser:
         try:
             self.process.wait(10)
         except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)  # its own process group: the browser and its children, nobody else
+            os.killpg(self.process.pid, signal.SIGKILL)  # its own process group: only the browser and its children
             self.process.wait()
         shutil.rmtree(self.profile, ignore_errors=True)
 

@@ -31,5 +31,5 @@ if __name__ == "__main__":
             results.append(result)
             if result[1] > 0:
                 print(result[0], flush=True)
-    # No test at all is no success either.
+    # A run without a test is no success.
     sys.exit(not (all(passed for _, _, passed in results) and any(ran for _, ran, _ in results)))

@@ -11,7 +11,7 @@ import socket
 import subprocess
 
 BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
-# Far longer than anything takes [s]; a longer wait is a failure.
+# Far longer than every expected wait [s]. A longer wait is a failure.
 PATIENCE = 30
 
 

@@ -17,9 +17,10 @@ from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
 ARTEFACTS.mkdir(parents=True, exist_ok=True)
-# Which page is tried: that of a server, or the one in a file.
+# The tested page: that of a server, or the one in a file.
 IS_FILE = os.environ.get("FORM") == "file"
-# A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
+# A host name of this machine in this browser only. A page from it is foreign, because its origin is no loopback
+# address.
 FOREIGN = "elsewhere.example"
 
 NUMBER = "input[type=number]"

@@ -6,7 +6,7 @@ from stage import PageTest, needs_server
 
 @needs_server("no server, no connection that others could have or lose")
 class Reconnecting(PageTest):
-    def test_it_comes_back_after_a_restart_of_the_runtime(self):
+    def test_it_reconnects_after_a_restart_of_the_runtime(self):
         self.runtime.call("/arm_sim/set_params", gravity=4)
         self.page.until("document.querySelector('#gravity-field input[type=number]').value === '4'")
         self.page.expect_network_errors = True  # the browser itself reports refused connections
@@ -20,14 +20,14 @@ class Reconnecting(PageTest):
         self.page.click("#controller")
         self.wait(lambda: self.runtime.call("/pid_controller/enable")["values"]["data"], "the controller")
 
-    def test_what_was_refused_for_want_of_a_connection_is_said_no_longer_than_that(self):
+    def test_a_refusal_without_a_connection_ends_with_the_reconnection(self):
         self.tab("compare")
         self.page.expect_network_errors = True
         self.runtime.stop()
         self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
         self.page.click("#compare-form button[type=submit]")
         self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('not connected')")
-        # It tries again and again meanwhile, and fails: the message stays.
+        # It retries meanwhile and fails, so the message stays.
         tries = "own('store.js').then(({ watch }) => { window.tries = 0; watch('connection', () => { window.tries += 1; }); })"
         self.page.run(tries)
         self.page.until("window.tries >= 2", why="two more changes")
@@ -36,7 +36,7 @@ class Reconnecting(PageTest):
         self.connected()
         self.page.until("document.querySelector('#compare-form .refusal').textContent === ''")
 
-    def test_without_a_connection_nothing_is_said_of_the_timestep_and_no_setpoint_is_lost_in_silence(self):
+    def test_without_a_connection_the_timestep_has_no_verdict_and_a_lost_setpoint_is_reported(self):
         setpoint = "#setpoint-fields input[type=number]"
         self.page.until("!document.querySelector('#verdict-pill').hidden")
         self.page.expect_network_errors = True

@@ -25,7 +25,7 @@ class Controls(PageTest):
     def choose_drag(self, mode):
         self.page.run(f"document.querySelector('input[name=drag][value={mode}]').click()")
 
-    def test_the_arm_is_lifted_held_and_let_go(self):
+    def test_the_arm_is_lifted_held_and_released(self):
         self.choose_drag("arm")
         start, end = self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2))
         self.page.mouse("mousePressed", *start)
@@ -144,7 +144,7 @@ class Controls(PageTest):
         self.page.fill(self.field("timestep-field"), "1")
         self.page.until("document.querySelector('#timestep-field .refusal').textContent === ''", why="it is in force already")
         self.runtime.call("/arm_sim/set_params", gravity=3)
-        self.page.until("document.querySelector('#gravity-field .refusal').textContent === ''", why="somebody else has changed it")
+        self.page.until("document.querySelector('#gravity-field .refusal').textContent === ''", why="another client has changed it")
         self.page.click("#defaults")
         self.page.until("[...document.querySelectorAll('#controls .refusal')].every((one) => one.textContent === '')")
 
@@ -245,7 +245,7 @@ class Controls(PageTest):
         self.page.key("d")
         self.wait(lambda: self.runtime.next("/joint_states")["velocity"][0] < -0.1, "pushed clockwise")
 
-    def test_keys_are_not_taken_from_who_types_and_can_be_switched_off(self):
+    def test_keys_do_not_act_in_text_fields_and_can_be_switched_off(self):
         self.page.run("document.querySelector('#masses-fields input[type=number]').focus()")
         self.page.key("c")
         self.page.run("document.activeElement.blur()")
@@ -272,7 +272,7 @@ class Controls(PageTest):
     # Links to share
 
     def test_a_link_changes_nothing_until_it_is_applied(self):
-        page = self.open("#method=verlet&timestep=0.002&gravity=1.62&masses=1,2&servo=on")
+        page = self.open("#method=verlet&timestep=0.002&gravity=1.62&masses=1,2&controller=on")
         page.until("!document.querySelector('#offer').hidden")
         page.run("new Promise((done) => setTimeout(done, 500))")
         self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 9.81)

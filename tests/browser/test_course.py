@@ -142,7 +142,7 @@ class Tasks(CourseTest):
         self.page.until("document.querySelector('#course-number').textContent === 'Step 9 of 10'")
         self.page.until("!document.querySelector('#scene-S01').disabled")
 
-    def test_the_sheet_says_what_the_study_says_and_leaves_the_arm_alone(self):
+    def test_the_sheet_agrees_with_the_study_and_does_not_change_the_arm(self):
         self.step(10)
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the scene")
         gains = self.values("/pid_controller/set_gains")

@@ -47,7 +47,7 @@ TRIES = """
 
 
 def serve(html, port=0):
-    """Serves one page of somebody else's until the value that is returned second is called; gives its port first."""
+    """Serves a foreign page until the second returned value is called. The first one is its port."""
 
     class Handler(http.server.BaseHTTPRequestHandler):
         timeout = 0.2  # a browser keeps a connection in reserve, which must not outlive the server
@@ -101,7 +101,7 @@ class Hostile(PageTest):
         self.assertEqual((told["socket"], told["read"], set(told["methods"].values()), set(told["loads"].values())), ("closed", "failed", {"failed"}, {"failed"}), told)
         self.unmoved()
 
-    def test_these_tests_can_fail_a_page_of_this_machine_is_let_in(self):
+    def test_these_tests_can_fail_because_a_local_page_is_accepted(self):
         self.assertEqual(self.tried(self.foreign(host="127.0.0.1"))["socket"], "open")
         self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 0, "a loopback origin may")
 

@@ -156,7 +156,7 @@ class Phone(Free, Steady, Access, PageTest):
         self.page.click("#controls details:last-child summary")
         self.assertEqual(marks(), ["▾", "▾", "▾"])
 
-    def test_what_is_touched_is_44_pixels_high(self):
+    def test_touch_targets_are_44_pixels_high(self):
         small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"
                               ".filter((one) => one.checkVisibility()).map((one) => [one.id || one.outerHTML.slice(0, 80), one.getBoundingClientRect().height])"
                               ".filter(([, height]) => height < 44)")

@@ -120,7 +120,7 @@ class Right(PageTest):
     def shows_setpoint(self, wanted, page=None, why="setpoint"):
         self.wait(lambda: self.setpoint_fields(page) == wanted, f"{why}: {wanted}")
 
-    def test_with_the_controller_off_the_limit_is_that_of_the_arm_left_to_itself(self):
+    def test_with_the_controller_off_the_limit_is_that_of_the_free_arm(self):
         self.runtime.call("/arm_sim/set_integrator", timestep=0.01)
 
         def limit():
@@ -138,11 +138,11 @@ class Right(PageTest):
     def test_eulers_free_swing_is_stable_at_no_timestep(self):
         self.page.click("input[value=euler]")
         self.page.until("document.querySelector('#out-limit').textContent === 'no timestep'")
-        # The arm moves on meanwhile, and with it the loop that the page asks about.
+        # The arm moves meanwhile, so the loop of the page's request changes.
         self.page.until("document.querySelector('#verdict-pill').textContent === 'never stable'"
                         r" && /doubles every [\d.]+ s/.test(document.querySelector('#verdict').textContent)")
 
-    def test_each_integrators_button_says_what_it_bears_in_the_loop_in_force(self):
+    def test_each_integrators_button_has_its_limit_in_the_active_loop(self):
         def served(method):
             values = self.values("/study/stability", integrator=method, **self.asked)
             held, motion = values["timestep_limit_held"], values["timestep_limit_motion"]
@@ -174,7 +174,7 @@ class Right(PageTest):
         self.page.until(other)
         self.assertEqual(self.page.run("window.hidings"), 0)
 
-    def test_one_button_says_why_the_gains_bear_that(self):
+    def test_one_button_explains_the_limit_of_the_gains(self):
         self.page.click("#controller")
         self.page.until("document.querySelector('#why').checkVisibility()")
         self.page.click("#why")
@@ -245,7 +245,7 @@ class Right(PageTest):
         self.page.until("document.querySelector('#legend-drift-name').textContent === 'drift'")
 
         def pushed():
-            # A push is short: a page that was busy meanwhile sees nothing of it.
+            # A push is short, so a busy page may miss it.
             self.page.key("a")
             return self.page.text("#legend-drift-name") == "pushed in"
 

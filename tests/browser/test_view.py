@@ -26,8 +26,8 @@ class View:
             self.assertTrue(close(picture[x, y], self.color(f"joint{i + 1}")), f"link {i + 1} at {x}, {y}: {picture[x, y]}")
 
     def test_every_plot_shows_every_joint(self):
-        # Free swing moves all joints, so that no line covers another.
-        # Drawing begins when the page has connected, which may be late: so two seconds from then on.
+        # A free swing moves all joints, so no line covers another. Drawing begins when the page has connected, which
+        # may be late: so two seconds from then on.
         shown = "Number(document.querySelector('#sim-time').textContent)"
         self.page.until(f"{shown} > 0")
         self.page.until(f"{shown} > {self.page.run(shown) + 2}")
@@ -90,7 +90,7 @@ class TwoLinks(View, Sums, PageTest):
     def test_the_real_time_factor_is_that_of_the_runtime(self):
         self.page.until("Math.abs(parseFloat(document.querySelector('#out-rtf').textContent) - 1) < 0.1")
 
-    def test_the_arm_is_told_in_a_sentence(self):
+    def test_the_arm_is_described_in_a_sentence(self):
         self.settle([0.5, 0.5])
         self.page.until("document.querySelector('#arm-text').textContent.includes('paused, controller on. Joints at 29, 29 degrees')")
 

@@ -22,7 +22,7 @@ class Ways(PageTest):
         self.page.click("#defaults")
         self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 9.81, "masses": [1, 1], "lengths": [1, 1]}, "defaults")
 
-    def test_what_was_refused_and_a_pause_are_nothing_to_undo(self):
+    def test_a_refusal_and_a_pause_cannot_be_undone(self):
         self.page.until("own('store.js').then(({ state }) => state.setpointKnown)")
         self.page.click("#pause")
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
@@ -74,7 +74,8 @@ class DefaultsThreeLinks(Defaults):
 class Suggestion(PageTest):
     def test_gains_are_suggested_where_no_timestep_is_stable(self):
         before = self.values("/pid_controller/set_gains")
-        # Springs that are far too weak for gravity: where the arm is, no timestep is stable, and the notice has the way out.
+        # Springs that are far too weak for gravity: no timestep is stable at this pose, and the notice has a button for
+        # it.
         self.runtime.call("/pid_controller/set_gains", kp=[1, 1], ki=[3000, 3000], kd=[0, 0])
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.until("[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Suggest gains')")
@@ -92,7 +93,7 @@ class Still(PageTest):
         self.wait(lambda: self.drawn(2) == 0, "it comes to rest")
 
     @needs_server("it counts frames of a WebSocket")
-    def test_a_paused_page_is_told_little(self):
+    def test_a_paused_page_receives_few_messages(self):
         def hears():
             """Messages in three seconds, and how long these took."""
             began, before = time.monotonic(), self.page.told

@@ -1,4 +1,4 @@
-//! Panics. They have a process of their own, since a panic hook is the whole process's.
+//! Panics. These tests have their own process, because the panic hook belongs to the process.
 
 #![allow(
     dead_code,

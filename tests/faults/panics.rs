@@ -84,7 +84,7 @@ impl AsyncWrite for Trap {
 
 /// The client is disconnected, its registrations are withdrawn, and the others are served.
 #[test]
-fn a_panic_in_what_reads_or_writes_for_a_client_ends_that_client_alone() {
+fn a_panic_in_a_reader_or_writer_ends_that_client_alone() {
     ends();
     in_virtual_time(async {
         for in_reading in [true, false] {
@@ -115,7 +115,7 @@ fn a_panic_in_what_reads_or_writes_for_a_client_ends_that_client_alone() {
     assert!(!has_ended_by("in reading") && !has_ended_by("in writing"));
 }
 
-/// Bytes whose end is a panic: they are dropped where an outbox is full.
+/// Bytes that panic when they are dropped, which happens if an outbox is full.
 struct Explosive(Vec<u8>, &'static str);
 
 impl AsRef<[u8]> for Explosive {
@@ -139,7 +139,7 @@ fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
         deaf.subscribe("/joint_states").await;
         other.subscribe("/clock").await;
         for n in 0..4 {
-            // The second is the first that has to make room.
+            // The second message is the first one to be dropped.
             let bytes = vec![b' '; 1_000_000];
             let frame = if n == 1 {
                 Bytes::from_owner(Explosive(bytes, "in the actor"))
@@ -151,7 +151,7 @@ fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
                 frame: frame.into(),
             });
             settle().await;
-            // One is in writing and one waits; the third pushes that out.
+            // One message is being written and one waits. The third replaces the waiting one.
             let connections = if n < 2 { 2 } else { 1 };
             assert_eq!(gateway.gauges.connections(), connections, "after {n}");
         }
@@ -249,7 +249,7 @@ fn a_panic_in_the_registry_ends_the_process() {
 }
 
 #[test]
-fn what_contains_a_panic_says_where_it_was() {
+fn a_caught_panic_names_its_place() {
     ends();
     let outer = contain(|| {
         let inner = contain(|| panic!("within"));

@@ -125,7 +125,7 @@ fn every_limit_of_the_paper_is_a_constant_of_that_value() {
 fn every_limit_of_the_paper_has_a_test_that_names_it() {
     let mut tests: Vec<(PathBuf, String)> = Vec::new();
     for path in rust_files("tests") {
-        // This file reads names from the table alone.
+        // This file reads names only from the table.
         tests.push((path.clone(), fs::read_to_string(&path).unwrap()));
     }
     for path in rust_files("src") {

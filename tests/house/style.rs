@@ -1,4 +1,4 @@
-//! How the source is cut: short files, short lines, short paths.
+//! The form of the source: short files, short lines, short paths.
 //!
 //! **Invariant:** every exception to a rule is listed here with its reason.
 
@@ -9,7 +9,7 @@ use crate::tree::{files_in, rust_files};
 
 /// Longest file, in lines.
 const MAX_LINES: usize = 800;
-/// Folders of what is kept as source, tests and tools too, and the extensions of its languages.
+/// Folders of source, tests and tools, and the extensions of their languages.
 const FOLDERS: [&str; 10] = [
     "src", "tests", "benches", "fuzz", "client", "python", "ros2", "page", "wasm", "scripts",
 ];
@@ -59,7 +59,7 @@ fn no_line_is_longer_than_a_screen_is_wide() {
 }
 
 #[test]
-fn nobody_reaches_three_floors_up() {
+fn no_file_imports_from_three_layers_above() {
     for (path, text) in source() {
         assert!(!text.contains("super::super::super"), "{path}");
     }

@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files that are made by tools or by somebody else, by their names anywhere in the tree.
+/// Names of files that are made by tools or by other projects, anywhere in the tree.
 const NOT_OURS: [&str; 7] = [
     ".git",
     "target",
@@ -21,12 +21,12 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every file below `folder` that is ours.
+/// Every file below `folder` that belongs to the project.
 pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        // `make report` writes there; `src/report` is ours. The seeds of the fuzz targets are any bytes.
+        // `make report` writes to `report/`, but `src/report` is source. The seeds of the fuzz targets are any bytes.
         let made = [root().join("report"), root().join("fuzz/seeds")].contains(&path);
         if made
             || NOT_OURS
@@ -44,7 +44,7 @@ pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Our files below `folder` whose names have one of these extensions.
+/// The project's files below `folder` with one of these extensions.
 pub(crate) fn files_in(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
     let mut files = files(&root().join(folder));
     files.retain(|path| {
@@ -60,7 +60,7 @@ pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_source_file_opens_by_saying_what_it_is_for_and_what_stays_true() {
+fn every_source_file_begins_with_its_purpose_and_its_invariant() {
     for path in rust_files("src") {
         let text = fs::read_to_string(&path).unwrap();
         let shown = path.display();
@@ -69,7 +69,7 @@ fn every_source_file_opens_by_saying_what_it_is_for_and_what_stays_true() {
             first.starts_with("//! ") && first.len() > 20,
             "{shown} opens with {first:?}"
         );
-        // The crate's own page is the map, and says what holds layer by layer.
+        // The crate's first page is the map, with the invariant of each layer.
         if !path.ends_with("src/lib.rs") {
             let head = text.lines().take_while(|line| line.starts_with("//!"));
             let invariants = head
@@ -81,16 +81,17 @@ fn every_source_file_opens_by_saying_what_it_is_for_and_what_stays_true() {
 }
 
 #[test]
-fn every_test_file_and_fuzz_target_opens_by_saying_what_it_is_for() {
+fn every_test_file_and_fuzz_target_begins_with_its_purpose() {
     for path in [rust_files("tests"), rust_files("fuzz")].concat() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("//! "), "{} does not", path.display());
     }
 }
 
-/// Crates and parts of the standard library that the pure layers may not use, comments apart. `imports/floors.rs` has our own layers.
+/// Crates and parts of the standard library that the pure layers may not use. Comments do not count.
+/// `imports/layers.rs` has the layers of the project.
 #[test]
-fn pure_layers_know_only_what_they_may() {
+fn pure_layers_import_only_allowed_crates() {
     let world = [
         "actix",
         "tokio",
@@ -108,7 +109,7 @@ fn pure_layers_know_only_what_they_may() {
         ("src/live", Some("serde_json")),
         ("src/report/experiments", Some("serde")),
     ] {
-        // Unit tests at the end of a file, or in one of their own, may use what they like.
+        // Unit tests may use anything.
         let is_code = |path: &PathBuf| !path.ends_with("tests.rs");
         for path in rust_files(folder).into_iter().filter(is_code) {
             let text = fs::read_to_string(&path).unwrap();
@@ -125,7 +126,7 @@ fn pure_layers_know_only_what_they_may() {
     }
 }
 
-/// Nobody may write `unsafe`. Where a tool can't do without, the package denies it, and its source says where and why.
+/// `unsafe` is forbidden. If a tool needs it, its package denies it, and its source allows each place with a reason.
 #[test]
 fn every_package_forbids_unsafe_code() {
     let all = files(root());
@@ -151,14 +152,14 @@ fn every_package_forbids_unsafe_code() {
 /// A path on the author's machine is useless to other people.
 #[test]
 fn no_file_names_a_folder_of_a_build_machine() {
-    // Put together here, so that this file does not hold them itself.
+    // Joined here, so that this file does not contain them.
     let homes = ["/root", "/home", "/Users", "/work", "/tmp"].map(|home| format!("{home}/"));
     for path in files(root()) {
         let Ok(text) = fs::read_to_string(&path) else {
             continue;
         };
         for home in &homes {
-            // A longer path that goes through such a name, as in `/a/home/b`, begins elsewhere.
+            // A longer path that contains such a name, for example `/a/home/b`, does not count.
             let named = text.match_indices(home.as_str()).any(|(at, _)| {
                 !text[..at]
                     .ends_with(|before: char| before.is_alphanumeric() || "._-}~*".contains(before))

@@ -78,7 +78,7 @@ fn paragraphs(text: &str, extension: &str) -> Vec<Paragraph> {
     found
 }
 
-/// The same with `x` for each piece of code and each address.
+/// The same with `x` in place of each piece of code and each address.
 fn without_code(paragraph: &str) -> String {
     let mut plain = String::new();
     for (place, piece) in paragraph.split('`').enumerate() {

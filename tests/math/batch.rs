@@ -17,7 +17,7 @@ fn between(rng: &mut Rng, least: f64, most: f64) -> f64 {
     least + (most - least) * rng.f64()
 }
 
-/// Evenly spread over the powers of ten between the two.
+/// Evenly distributed over the powers of ten between the two.
 fn of_any_size(rng: &mut Rng, least: f64, most: f64) -> f64 {
     10_f64.powf(between(rng, least.log10(), most.log10()))
 }
@@ -41,7 +41,8 @@ fn any_state<const N: usize>(rng: &mut Rng) -> State<N> {
     state
 }
 
-/// An arm of any kind, anywhere in its life: weightless, wound up, pushed, off, commanded, driven, sampled, about to diverge, or diverged.
+/// An arm in any state: weightless, turned many times, pushed, off, commanded, driven, sampled, about to diverge, or
+/// diverged.
 fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     let gravity = if rng.u32(..3) == 0 { 0.0 } else { 9.81 };
     let arm = Arm::new(
@@ -56,7 +57,7 @@ fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
     };
     let mut simulation = Simulation::new(arm.unwrap(), gains);
     simulation.set_method(*rng.choice(Method::ALL.iter()).unwrap());
-    // The larger of them leave the finite numbers within some steps.
+    // The larger ones diverge within some steps.
     simulation.set_timestep(of_any_size(rng, 1e-5, 0.5));
     simulation.set_state(any_state(rng));
     simulation.enable(rng.bool());
@@ -149,7 +150,7 @@ fn a_lane_ends_where_time_ends_too() {
     }
 }
 
-/// Accelerations in columns, with a number behind the last state that is to stay.
+/// Accelerations in columns, with a number after the last state that must stay unchanged.
 fn accelerations<const N: usize>(registers: Registers, count: usize, rng: &mut Rng) {
     let arm = Arm::new(
         each(|| of_any_size(rng, 0.1, 10.0)),
@@ -192,7 +193,7 @@ fn accelerations<const N: usize>(registers: Registers, count: usize, rng: &mut R
 }
 
 #[test]
-fn the_acceleration_of_a_state_has_the_same_bits_whichever_stand_beside_it() {
+fn the_acceleration_of_a_state_has_the_same_bits_in_every_lane() {
     let mut rng = Rng::with_seed(4);
     for registers in Registers::all() {
         for count in (0..40).chain([64, 100, 129, 300]) {

@@ -1,4 +1,4 @@
-//! The control law: its terms, its integral, what it keeps and forgets, and the discrete loop in 50 digits.
+//! The control law: its terms, its integral, its state, and the discrete loop in 50 digits.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
@@ -82,7 +82,7 @@ fn check_loop<const N: usize>(case: &Case) {
     for (k, &sample) in case.samples.iter().enumerate() {
         simulation.advance(sample - simulation.steps());
         assert_eq!(simulation.steps(), sample);
-        // The oracle's guide: a hundred times what a plain float64 run of the same loop is off, at least 1e-12.
+        // The oracle's tolerance: a hundred times the error of a plain float64 run of the same loop, at least 1e-12.
         let tolerance = (100.0 * case.float64_diff[k]).max(1e-12);
         // An error of the state becomes an effort by way of the gains.
         let gain = (0..N).map(|i| case.kp[i] + case.ki[i] + case.kd[i]);

@@ -1,4 +1,4 @@
-//! The control period: when the law runs, what is held meanwhile, and what begins a period.
+//! The control period: the runs of the law, the held effort, and the events that begin a period.
 
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
@@ -155,7 +155,7 @@ fn a_reset_a_switch_a_timestep_another_period_and_the_end_of_driving_begin_a_per
         simulation.step();
         assert_ne!(*simulation.effort(), control.effort, "{what}");
     }
-    // A value that is in force already begins nothing.
+    // A value that is already active does not begin a period.
     let mut simulation = reaching(1e-3, every(0.01));
     simulation.advance(14);
     let before = simulation.clone();
@@ -210,7 +210,7 @@ fn commands_are_applied_while_the_controller_is_off_and_end_with_a_switch_or_a_r
 }
 
 #[test]
-fn driven_by_hand_the_controller_stands_still() {
+fn the_controller_does_not_run_while_a_client_drives_the_arm() {
     for enabled in [false, true] {
         let mut simulation = reaching(1e-3, every(0.01));
         simulation.advance(5);
@@ -228,7 +228,7 @@ fn driven_by_hand_the_controller_stands_still() {
     }
 }
 
-/// A step that is not taken leaves nothing behind, also where the law ran for it.
+/// A step that is not taken changes nothing, even if the law ran for it.
 #[test]
 fn a_step_that_is_not_taken_holds_nothing() {
     for steps in [1, 2, 10] {

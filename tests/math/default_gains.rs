@@ -9,11 +9,11 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
-/// How close a joint \[rad\] and the end effector \[m\] must come.
+/// Largest remaining error of a joint \[rad\] and of the end effector \[m\].
 const TOLERANCE: f64 = 0.02;
 /// Time to get there \[s\].
 const SETTLING: f64 = 4.0;
-/// Time during which it must then stay \[s\].
+/// Time for which it must stay there \[s\].
 const STAYING: f64 = 4.0;
 
 /// Position of the end effector, with links of 1 m.
@@ -33,7 +33,7 @@ fn arrived<const N: usize>(q: &[f64; N], setpoint: &[f64; N]) -> bool {
         && (got.0 - want.0).hypot(got.1 - want.1) <= TOLERANCE
 }
 
-/// When the arm was last away from the setpoint that it is given now \[s after now\].
+/// The last time at which the arm is away from a new setpoint \[s after the change\].
 fn settling_time<const N: usize>(simulation: &mut Simulation<N>, setpoint: [f64; N]) -> f64 {
     simulation.set_setpoint(Setpoint {
         position: setpoint,
@@ -64,7 +64,7 @@ fn setpoints<const N: usize>(random: usize) -> Vec<[f64; N]> {
         .collect()
 }
 
-/// Up to two turns at every joint, on which a 3-link arm comes to speeds that 3 ms can only just follow.
+/// Up to two turns at every joint, in which a 3-link arm reaches speeds near the limit of 3 ms.
 #[test]
 fn from_any_setpoint_within_a_turn_any_other_is_reached_in_four_seconds() {
     fn check<const N: usize>(gains: Gains<N>, method: Method, timestep: f64) {
@@ -123,8 +123,8 @@ fn ringing(arm: Arm<3>, free: u64, setpoint: [f64; 3]) -> f64 {
     worst
 }
 
-/// Three links ring, and more so with heavy ones. Of the gains before, half of the moves were over 2 % and the worst
-/// was 25 % off.
+/// The 3-link arm oscillates, and more so with heavy links. With too weak damping half of the moves exceed 2 %, and the
+/// worst is 25 % off.
 #[test]
 fn the_effort_of_three_links_is_near_the_load_once_they_are_slow() {
     let heavy = Arm::new([1.0; 3], [2.0; 3], 9.81).expect("an arm");

@@ -1,4 +1,4 @@
-//! The end of the finite numbers: the first step that is not finite is not taken, and nothing is after it.
+//! Divergence: the first step that is not finite is not taken, and no step follows it.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
@@ -25,7 +25,7 @@ fn check_divergence<const N: usize>(gains: Gains<N>, method: Method) {
     assert!(taken < 1_000_000, "{method} is stable");
     let divergence = simulation.divergence().unwrap();
 
-    // All that a step changes is as the last step taken left it.
+    // All values that a step changes are those of the last taken step.
     let mut before = start.clone();
     assert_eq!(before.advance(taken), taken);
     assert_eq!(before.divergence(), None);
@@ -43,7 +43,7 @@ fn check_divergence<const N: usize>(gains: Gains<N>, method: Method) {
         }
     );
 
-    // Only a reset or a new state lets it move again.
+    // Only a reset or a new state ends the divergence.
     let held = simulation.clone();
     assert!(!simulation.step());
     assert_eq!(simulation.advance(1000), 0);
@@ -126,7 +126,7 @@ fn a_step_beyond_the_last_finite_time_is_not_taken() {
     assert_eq!(simulation.advance(1000), 1000);
 }
 
-/// The clock stands, as `base + k timestep` rounded does; the state moves on.
+/// The clock does not advance, because `base + k timestep` is rounded. The state changes.
 #[test]
 fn a_timestep_that_rounding_loses_is_stepped_all_the_same() {
     let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());

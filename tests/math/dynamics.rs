@@ -48,8 +48,8 @@ impl<const N: usize> Case<N> {
         forward_dynamics(&self.arm, &self.q, &self.qd, &self.tau)
     }
 
-    /// Element by element: `sensitivity` is by how much the exact value changes, to first order, when every input is off by
-    /// one rounding; `units` of that are allowed.
+    /// Element by element: `sensitivity` is the change of the exact value, to first order, if every input has an error
+    /// of one rounding. `units` of it are allowed.
     fn check(&self, units: f64, got: &[f64], name: &str, sensitivity: &str) {
         let want = list(&self.stored[name]);
         let sensitivity = list(&self.stored[sensitivity]);
@@ -139,7 +139,7 @@ fn digits_lost<const N: usize>(case: &Case<N>) -> f64 {
     (error / largest / ROUND_OFF).log10()
 }
 
-/// Measured: 0.95. The exact answer itself moves by one to two digits when an angle is off by half its last bit. Sums of wound
+/// Measured: 0.95. An error of half the last bit of an angle costs the exact answer one to two digits. Sums of wound
 /// angles would lose 8 (1e8 rad).
 #[test]
 fn forward_dynamics_lose_at_most_a_digit_and_a_half_on_any_stored_arm() {
@@ -218,8 +218,9 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m: f64, value| m.max(value.abs()))
 }
 
-/// Kinetic and potential energy the long way: two-point Gauss quadrature along each rod, exact since the squared speed is
-/// quadratic and the height linear along it. Angles are summed, velocities differentiated by hand, nothing is shared with the library.
+/// Kinetic and potential energy by another derivation: two-point Gauss quadrature along each rod, exact since the
+/// squared speed is quadratic and the height linear along it. Angles are summed, velocities differentiated by hand,
+/// nothing is shared with the library.
 fn quadrature<const N: usize>(arm: &Arm<N>, q: &[f64; N], qd: &[f64; N]) -> (f64, f64) {
     let (mut x, mut y, mut vx, mut vy, mut angle, mut rate) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut kinetic, mut potential) = (0.0, 0.0);
@@ -302,7 +303,7 @@ fn the_terms_are_those_of_the_lagrangian() {
     check::<3>();
 }
 
-/// Both ways to the accelerations belong to the same effort; apart they may be by what an ill-conditioned M hides.
+/// Both accelerations belong to the same effort. They may differ as far as M is ill-conditioned.
 #[test]
 fn the_line_of_the_book_and_the_recursion_agree() {
     fn check<const N: usize>() {

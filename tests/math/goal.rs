@@ -22,7 +22,7 @@ fn goal(success_hold: f64) -> Goal {
     )
 }
 
-/// The first step (counted from 1) after which the goal is reached, the hand being where `path` says.
+/// The first step (counted from 1) after which the goal is reached, for an end effector on `path`.
 fn reached_at(goal: &mut Goal, h: f64, steps: u32, path: impl Fn(u32) -> DVec2) -> Option<u32> {
     (1..=steps).find(|&k| goal.judge(f64::from(k) * h, path(k)))
 }
@@ -41,7 +41,8 @@ fn the_defaults_are_the_documented_ones() {
     assert_eq!(Outcome::Preempted.to_string(), "preempted");
 }
 
-/// The step (counted from 1) after which a goal is reached, by `success_hold`, timestep and the steps at which the hand is there.
+/// The step (counted from 1) after which a goal is reached, by `success_hold`, timestep and the steps at which the end
+/// effector is within epsilon.
 #[test]
 fn a_goal_is_reached_after_staying_within_epsilon_for_success_hold() {
     type Row = (&'static str, f64, f64, fn(u32) -> bool, Option<u32>);
@@ -59,7 +60,7 @@ fn a_goal_is_reached_after_staying_within_epsilon_for_success_hold() {
         ("no hold: the first entry", 0.0, H, |k| k >= 5, Some(5)),
         ("no hold: there at once", 0.0, H, |_| true, Some(1)),
         ("never there", 0.0, H, |_| false, None),
-        // Two steps in a row within epsilon, two seconds apart, are all that there is to know.
+        // The only known states are two consecutive steps within epsilon, two seconds apart.
         ("steps longer than the hold", 0.5, 2.0, |k| k >= 2, Some(3)),
     ];
     for (name, hold, h, is_there, expected) in rows {
@@ -89,7 +90,8 @@ fn the_edge_of_epsilon_is_within() {
 
 #[test]
 fn a_pause_neither_helps_nor_harms_the_dwell() {
-    // While paused no step is made, and nothing is judged; asked again at the same time, the answer is the same.
+    // While paused the arm takes no step, and the goal is not judged. A second query at the same time has the same
+    // answer.
     let mut paused = goal(0.5);
     for k in 1..=4u32 {
         assert!(!paused.judge(f64::from(k) * H, THERE));
@@ -197,7 +199,7 @@ fn feedback_comes_once_per_step_where_steps_are_longer() {
 }
 
 #[test]
-fn progress_that_was_not_asked_about_is_not_made_up() {
+fn progress_without_a_request_is_not_invented() {
     let mut cadence = Cadence::default();
     assert!(cadence.due(0.0));
     assert!(cadence.due(10.0));

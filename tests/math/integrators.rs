@@ -1,4 +1,4 @@
-//! The one-step methods: their evaluations, and how exact they are, against 50-digit values.
+//! The one-step methods: their evaluations and their accuracy, against 50-digit values.
 
 use pendularm::math::integrator::{Method, increment, two_sum};
 use serde::Deserialize;
@@ -155,7 +155,7 @@ fn check_order(label: &str, method: Method, values: &[f64], orders: &[Option<f64
 
 /// The time is right at every stage, for a step that starts anywhere and any number of joints.
 #[test]
-fn every_method_evaluates_as_often_as_it_says_and_at_the_times_its_stages_stand_for() {
+fn every_method_evaluates_at_the_times_of_its_stages_and_no_more() {
     let (t, h) = (3.0, 0.25);
     for (method, times) in [
         (Method::Euler, &[3.0][..]),

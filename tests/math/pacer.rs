@@ -19,7 +19,7 @@ fn seconds(nanoseconds: u64) -> f64 {
     format!("{nanoseconds}e-9").parse().unwrap()
 }
 
-/// Polls every `gap` up to `end`, takes all that is due, and answers the sum.
+/// Polls every `gap` up to `end`, takes all due steps, and returns their sum.
 fn paced(timestep: f64, gap: u64, end: u64) -> u64 {
     let mut pacer = Pacer::new(Duration::ZERO, timestep);
     let mut total = 0;
@@ -73,7 +73,7 @@ fn a_stall_at_a_timestep_of_seconds_makes_one_step() {
 }
 
 #[test]
-fn a_restart_discards_the_unfinished_fraction_and_what_is_owed() {
+fn a_restart_discards_the_unfinished_fraction_and_the_due_steps() {
     let mut pacer = Pacer::new(Duration::ZERO, 0.01);
     assert_eq!(pacer.due(ns(109_000_000)), 10);
     pacer.restart(ns(109_000_000), 0.01);
@@ -85,7 +85,7 @@ fn a_restart_discards_the_unfinished_fraction_and_what_is_owed() {
 }
 
 #[test]
-fn a_clock_that_runs_backwards_owes_nothing() {
+fn a_clock_that_runs_backwards_makes_no_step_due() {
     let mut pacer = Pacer::new(ns(5 * SECOND), 0.001);
     assert_eq!(pacer.due(ns(4 * SECOND)), 0);
     let due = pacer.due(ns(5 * SECOND + 100_000_000));
@@ -152,7 +152,7 @@ proptest! {
         prop_assert_eq!(pacer.due(ns(count * step)), 1);
     }
 
-    /// The number of whole steps is checked in integers, which know no rounding.
+    /// The number of whole steps is checked in integers, without rounding.
     #[test]
     fn polls_less_than_a_quarter_of_a_second_apart_lose_nothing(
         step in timestep(),
@@ -184,7 +184,7 @@ proptest! {
             now += gap;
             let due = pacer.due(ns(now));
             prop_assert!(due <= bound);
-            // Asking again at the same moment answers the same.
+            // A second query at the same time has the same answer.
             prop_assert_eq!(pacer.due(ns(now)), due);
             let taken = (due as f64 * share) as u64;
             pacer.took(taken);

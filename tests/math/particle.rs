@@ -1,4 +1,4 @@
-//! The computation behind `/arm_sim/integration_step`: a unit mass pushed by `f(t)`.
+//! The computation behind `/arm_sim/integration_step`: a unit mass under the force `f(t)`.
 //!
 //! **Invariant:** every expected number comes from the 50-digit oracle, a closed form, or the formula that the
 //! specification gives; none from a run of this program. A tolerance counts roundings; none allows for truncation.
@@ -84,7 +84,7 @@ fn refusal(text: &str, start: (f64, f64), dt: f64, steps: u64) -> String {
 }
 
 #[test]
-fn a_computation_that_cannot_be_made_is_refused_by_name_and_value() {
+fn an_impossible_computation_is_refused_by_name_and_value() {
     for (start, dt, steps, message) in [
         ((0.0, 0.0), 0.0, 10, "dt must be greater than 0, got 0"),
         ((0.0, 0.0), -0.0, 10, "dt must be greater than 0, got 0"),
@@ -193,7 +193,7 @@ fn a_finished_computation_makes_no_further_step() {
 }
 
 #[test]
-fn a_slice_holds_the_steps_that_its_work_pays_for_and_at_least_one() {
+fn a_slice_has_the_steps_that_fit_its_work_and_at_least_one() {
     // Nine nodes, four evaluations: 36 a step.
     let force = expression("t^2 + 3*t - 1");
     let particle = Particle::new(force, 0.0, 0.0, 0.1, 10, Method::Rk4).unwrap();

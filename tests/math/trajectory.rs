@@ -31,7 +31,7 @@ fn near(one: [f64; 2], other: [f64; 2], within: f64) -> bool {
 }
 
 #[test]
-fn a_path_passes_through_its_points_and_stands_before_and_behind_them() {
+fn a_path_passes_through_its_points_and_rests_before_and_after_them() {
     let points = vec![
         curved(1.0, [1.0, 0.0], [0.3, -0.2]),
         curved(1.5, [0.0, 2.0], [0.0, 0.0]),
@@ -60,7 +60,7 @@ fn a_path_passes_through_its_points_and_stands_before_and_behind_them() {
 }
 
 #[test]
-fn velocities_are_what_the_positions_do() {
+fn velocities_are_the_derivatives_of_the_positions() {
     let points = vec![
         curved(0.7, [1.0, 0.0], [0.3, -0.2]),
         curved(1.5, [0.0, 2.0], [-1.0, 4.0]),
@@ -82,7 +82,7 @@ fn velocities_are_what_the_positions_do() {
 }
 
 #[test]
-fn points_without_order_are_no_path() {
+fn points_without_increasing_times_are_no_path() {
     let path = |times: &[f64]| {
         let points = times
             .iter()
@@ -97,9 +97,9 @@ fn points_without_order_are_no_path() {
     assert_eq!(path(&[0.0]), Ok(0.0));
 }
 
-/// Finite numbers whose way from one to the next has infinite velocities, or positions that are no numbers.
+/// Finite points between which velocities are infinite or positions are not numbers.
 #[test]
-fn ways_that_overflow_are_no_path() {
+fn distances_that_overflow_are_no_path() {
     let moving = |time: f64, position: f64, velocity: f64| Waypoint {
         time,
         position: [position, 0.0],
@@ -130,7 +130,7 @@ fn ways_that_overflow_are_no_path() {
 }
 
 #[test]
-fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
+fn a_path_is_judged_by_its_path_tolerances_and_at_the_end_by_its_goal_tolerances() {
     let mut course = Course {
         path: JointPath::new(START, vec![straight(1.0, [0.5, 0.5])]).unwrap(),
         on_the_way: Tolerance {
@@ -169,7 +169,7 @@ fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
         Standing::OffPath(_)
     ));
 
-    // Arrived is a joint that stays: one that passes through is late.
+    // A joint has arrived if it stays. A joint that passes through is late.
     let there = [0.5, 0.505];
     for (time, speed, standing) in [
         (2.0, 0.9, Standing::Moving),

@@ -127,7 +127,7 @@ fn no_angle_is_no_number() {
 
 proptest! {
     #[test]
-    fn an_angle_has_the_same_bits_whatever_stands_beside_it(
+    fn an_angle_has_the_same_bits_in_every_lane(
         near in -TAU..TAU,
         far in -1e6..1e6_f64,
         any in proptest::num::f64::ANY,

@@ -17,7 +17,7 @@ test("ten steps, each with at most 40 words and sentences of at most 25", () => 
   }
 });
 
-test("every question has one right answer among its own, and says why", () => {
+test("every question has one right answer, with the reason", () => {
   for (const { id, question, guess } of STEPS) {
     for (const one of guess ? [question, guess] : [question]) {
       assert.ok(one.right >= 0 && one.right < one.answers.length && one.because.length > 20, id);
@@ -38,13 +38,13 @@ test("every step has a scene for two and for three links", () => {
   for (const { id, scene } of STEPS) for (const links of [2, 3]) assert.equal(scene(links).gains.kp.length, links, id);
 });
 
-test("bars that flip and grow are told from bars that die away", () => {
+test("bars that flip and grow differ from bars that decay", () => {
   assert.equal(shrinks([0.09, -0.16, 0.14, -0.4, 0.39, -0.9, 1.09, -2.06]), false);
   assert.equal(shrinks([0.3, -0.2, 0.1, -0.05, 0.02, -0.01]), true);
   assert.equal(shrinks([]), false);
 });
 
-test("a time stands beside its limit in one unit", () => {
+test("a time and its limit have the same unit", () => {
   assert.equal(ofLimit(5.5, 4.316), "5.5 of 4.3 ms");
   assert.equal(ofLimit(1, NaN), "1 ms");
   assert.equal(ofLimit(5, 0), "5 ms, never stable");

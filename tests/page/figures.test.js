@@ -19,7 +19,7 @@ function run(seconds, slope, energy = 1) {
   };
 }
 
-test("a run that lasted has figures, and no divergence", () => {
+test("a finished run has figures, and no divergence", () => {
   const [one, reference] = [run(2, 1.6), run(2, 1)];
   const away = distances(one, reference);
   assert.ok(Math.abs(away.at(-1) - 1.2) < 1e-9);
@@ -28,7 +28,7 @@ test("a run that lasted has figures, and no divergence", () => {
   assert.equal(describeRun(one, away.map(() => 0.05), 2).outcome, "within 0.1 rad");
 });
 
-test("a run that diverged says when, and claims neither energy nor error", () => {
+test("a run that diverged has its time, but no energy and no error", () => {
   const one = run(0.6, 3);
   one.energy[6] = null;
   const away = distances(one, run(2, 1));
@@ -44,7 +44,7 @@ test("the last sample may lie a step before the end", () => {
   assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
 });
 
-test("a rung without an error is told from one that diverged", () => {
+test("a rung without an error differs from one that diverged", () => {
   const rung = { method: "rk4", timestep: 0.01 };
   const whole = read(rung, { times: [0, 2], error: null, wall_time: 1, evaluations: 8 }, 2);
   assert.deepEqual([whole.error, whole.divergedAt], [null, null]);
@@ -68,7 +68,7 @@ test("place and value of a logarithmic scale are each other's inverse", () => {
   assert.deepEqual(scale.marks.map(([, label]) => label), ["100 µs", "1 ms", "10 ms", "100 ms"]);
 });
 
-test("a place out of reach gives way to the nearest one within", () => {
+test("a position out of reach is replaced by the nearest one within", () => {
   const near = (place, lengths, expected) => {
     const found = nearestInReach(place, lengths);
     assert.ok(Math.hypot(found.x - expected.x, found.y - expected.y) < 1e-12, JSON.stringify(found));
@@ -81,7 +81,7 @@ test("a place out of reach gives way to the nearest one within", () => {
   near({ x: 0, y: 0 }, [1, 1, 1], { x: 0, y: 0 });
 });
 
-test("a file holds its settings, and what is not finite is empty", () => {
+test("a file has its settings, and empty cells for numbers that are not finite", () => {
   record.clear();
   state.links = 2;
   state.params = DEFAULTS[2].params;
@@ -98,7 +98,7 @@ test("a file holds its settings, and what is not finite is empty", () => {
   assert.deepEqual(row.slice(0, 5), ["0.5", "", "0.25", "", ""]);
 });
 
-test("between two states the trail follows the motion, and goes straight where nobody has seen it", () => {
+test("between two states the trail follows the motion, and is straight across a gap", () => {
   record.clear();
   const at = (time, position, velocity) => {
     state.time = time;
@@ -116,7 +116,7 @@ test("between two states the trail follows the motion, and goes straight where n
   assert.ok(Math.abs(q[0] - (0.3 ** 3 + 0.4 ** 3) / 2) < 1e-15);
 });
 
-test("an error is told apart from one that the reference can't resolve, and from one that nobody can follow", () => {
+test("an error, one below the reference's uncertainty, and one of a chaotic motion differ", () => {
   const rung = (error, error_uncertainty, end = 2) => read(
     { method: "rk4", timestep: 0.001 }, { times: [0, end], error, error_uncertainty, wall_time: 1e-3, evaluations: 1 }, 2,
   );
@@ -139,7 +139,7 @@ test("a closed loop has two errors, and a run that diverged has none", () => {
   assert.deepEqual([broken.error, broken.sampling, broken.divergedAt], [null, null, 2]);
 });
 
-test("a measurement says its move and the settings that it is about", () => {
+test("a measurement names its move and its settings", () => {
   const { params, gains, period } = DEFAULTS[2];
   assert.match(stamp({ links: 2, enabled: true, params, gains, period }, 2), /^Move to \(0\.9, −1\.3\) rad, 2 s from rest.*controller at every step, kp 1000, 250.*masses 1, 1 kg/);
   assert.match(stamp({ links: 2, enabled: false, params, gains, period }, 2), /^Free swing, 2 s from rest, stretched out; masses 1, 1 kg/);

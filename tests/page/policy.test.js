@@ -1,4 +1,4 @@
-// The verdict on the timestep: about the loop in force only, and never milder than it is; and the reason for a limit.
+// The verdict on the timestep: only about the active loop, and never too mild. The reason for a limit.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -20,12 +20,12 @@ function arm(changed = {}) {
   return { ...state, limits: { loop: JSON.stringify(question(state)), answers, motions } };
 }
 
-test("the question with the controller off is about the arm left to itself", () => {
+test("with the controller off the question is about the free arm", () => {
   assert.deepEqual(question(arm({ enabled: false })).gains, { kp: [0, 0], ki: [0, 0], kd: [0, 0] });
   assert.deepEqual(question(arm()).gains.kp, [1000, 250]);
 });
 
-test("an answer about another loop counts for nothing, and offers no button", () => {
+test("an answer about another loop is ignored, and gives no button", () => {
   const on = arm({ integrator: { method: "rk4", timestep: 0.01 } });
   const off = { ...on, enabled: false };
   assert.equal(answerInForce(off), null);
@@ -56,7 +56,7 @@ for (const [name, changed, wanted] of VERDICTS) {
   });
 }
 
-test("who shakes beyond the limit, or has diverged, is fast because of that: the pose decides", () => {
+test("beyond the limit, or after divergence, the limit of the pose counts instead of the motion's", () => {
   const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
   for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { integrator: { method: "rk4", timestep: 0.02 }, diagnostics: { state: "diverged" } }]) {
     const found = limitInForce(arm({ stability: thrashing, ...changed }));
@@ -66,7 +66,7 @@ test("who shakes beyond the limit, or has diverged, is fast because of that: the
   }
 });
 
-test("the study is asked again once the motion has another limit", () => {
+test("a new limit of the motion causes a new request to the study", () => {
   const changed = (then, now) => motionHasChanged({ timestep_limit_motion: then }, { timestep_limit_motion: now });
   assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));
   assert.ok(!changed(0.004, 0.0041) && !changed(null, Infinity) && !changed(0.004, NaN) && !changed(undefined, 0.004));
@@ -103,7 +103,7 @@ test("with a delay the limit is not known unless the answer names it", () => {
   assert.equal(verdict(arm({ ...delayed, stability: { ...VALUES, control_period_limit: 0.0008 } })).kind, "beyond");
 });
 
-test("how often the control law runs is said in steps and in time", () => {
+test("the control period is given in steps and in time", () => {
   assert.equal(periodText(arm()), "");
   assert.equal(periodText(sampled(0.0101)), "10 steps, 10 ms");
   const delayed = { period: 0.01, effective_period: 0.01, delay: true };
@@ -123,7 +123,7 @@ const FREE = {
 };
 const swing = (method, timestep, changed = {}) => arm({ enabled: false, integrator: { method, timestep }, stability: FREE, ...changed });
 
-test("after a divergence the motion's limit from before counts, and the advice is never what diverged", () => {
+test("after a divergence the earlier limit of the motion counts, and the advice is never the diverged timestep", () => {
   const wild = { ...FREE, timestep_limit_motion: 1e-150, motion_speed: 1e150 };
   const diverged = { diagnostics: { state: "diverged", message: "" }, stability: wild };
   const known = swing("verlet", 0.1, { ...diverged, motions: { verlet: { limit: 0.0488, speed: 16.4 } } });
@@ -134,7 +134,7 @@ test("after a divergence the motion's limit from before counts, and the advice i
   assert.equal(verdict(unknown).advised, 0.05);
 });
 
-test("the motion's limit is kept as first served, and none of an arm that has run away", () => {
+test("the motion's first limit is kept, and none of an arm that has diverged", () => {
   const state = swing("verlet", 0.1, { answers: {} });
   const { loop } = state.limits;
   keepAnswer(state, loop, "verlet", FREE);
@@ -193,31 +193,31 @@ test("a swing is named by its frequency, and methods with a longer limit by thei
   assert.match(text, /Midpoint, Verlet, Runge–Kutta 4: stable up to 4\.32 ms/);
 });
 
-test("the free arm is damped by nothing, and Euler adds to every swing", () => {
+test("the free arm has no damping, and Euler increases every swing", () => {
   const euler = { enabled: false, integrator: { method: "euler", timestep: 0.001 } };
   assert.match(why(SERVED, { ...ALIKE, euler: 0 }, euler), /Every step of Euler adds a little to each swing/);
 });
 
-test("where the gains themselves are at fault no method is blamed", () => {
+test("gains that are unstable by themselves are not explained by the method", () => {
   const none = { euler: 0, midpoint: 0, verlet: 0, rk4: 0 };
   assert.match(why({ ...SERVED, timestep_limit_continuous: 0 }, none), /any method and any timestep/);
   assert.match(why(SERVED, none), /nothing damps the arm here/);
 });
 
-test("nothing is said of a loop that is not known", () => {
+test("an unknown loop has no verdict", () => {
   assert.equal(why(SERVED, { rk4: 0.004316 }), "", "the other methods are asked about");
   assert.equal(whyText({ ...arm(), gains: null }), "");
 });
 
 // Gains
 
-test("gains that are a multiple of others are told, so that the map stays and the dot moves", () => {
+test("a multiple of the gains is recognised, so the map stays and the dot moves", () => {
   const base = { kp: [1000, 250], ki: [3000, 0], kd: [110, 22] };
   assert.ok(Math.abs(factorOf(scaled(base, 2.5), base) - 2.5) < 1e-12);
   for (const other of [{ ...base, kd: [110, 44] }, { ...base, ki: [3000, 1] }, null]) assert.ok(Number.isNaN(factorOf(other, base)));
 });
 
-test("no gains at all leave the arm to itself", () => {
+test("without gains the arm is free", () => {
   assert.ok(isFree(noGains(3)));
   assert.ok(!isFree({ ...noGains(2), kd: [0, 1] }));
 });

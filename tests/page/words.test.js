@@ -23,7 +23,7 @@ test("a link keeps all digits", () => {
   assert.equal(Number(exact(0.1 + 0.2)), 0.1 + 0.2);
 });
 
-test("what is not finite is a dash", () => {
+test("a number that is not finite is a dash", () => {
   for (const text of [fixed(NaN, 2), significant(Infinity, 3), duration(-Infinity)]) assert.equal(text, "–");
 });
 
@@ -69,22 +69,18 @@ test("settings survive a link", () => {
   }
 });
 
-test("a link from before, which says servo, is understood", () => {
-  assert.equal(fromFragment("#servo=on").controller, true);
-});
-
-test("a link may hold less, and what is none of ours is left out", () => {
+test("a link may have fewer settings, and unknown names are ignored", () => {
   const settings = fromFragment("#kp=1,2&method=leapfrog&__proto__=1");
   assert.deepEqual(settings.gains, { kp: [1, 2] });
   assert.equal(settings.integrator, null);
 });
 
-test("a link may say where the arm is let go", () => {
+test("a link may have the arm's start", () => {
   assert.deepEqual(fromFragment("#position=0.3,-1e-6&velocity=2,0").start, { position: [0.3, -1e-6], velocity: [2, 0] });
   assert.equal(fromFragment("#kp=1,2").start, undefined);
 });
 
-test("settings are present once the runtime has said them all", () => {
+test("settings are present once all have arrived", () => {
   assert.equal(presentSettings({ links: 2, integrator: null }), null);
 });
 
@@ -98,7 +94,7 @@ test("a slider that is dragged is one change to undo", () => {
   assert.equal(undo.take(present), undefined);
 });
 
-test("a change that was refused is none to undo", () => {
+test("a refused change cannot be undone", () => {
   const undo = new Undo();
   const before = { ...DEFAULTS[2], controller: true };
   undo.remember(before, 0);

@@ -1,13 +1,12 @@
 //! The list of topics and services is consistent, and marks the exceptions.
 //!
-//! **Invariant:** that its rows are those of docs/protocol.md is for `tests/house/readme/protocol.rs` to see, which reads
-//! them there.
+//! **Invariant:** `tests/house/readme/protocol.rs` compares its rows with docs/protocol.md.
 
 use std::collections::HashSet;
 
 use pendularm::protocol::catalog::{Service, Topic, types};
 
-/// A topic that changes seldom has to reach those that come late.
+/// A topic that changes seldom must reach late subscribers.
 #[test]
 fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
     let latched: Vec<_> = Topic::ALL
@@ -59,7 +58,7 @@ fn names_and_types_are_given_once_and_in_the_form_that_ros_gives_them() {
     let services = Service::ALL.map(|service| (service.name(), service.type_name(), "srv"));
     let mut seen = HashSet::new();
     for (name, type_name, kind) in topics.into_iter().chain(services) {
-        // Frames that move and frames that do not have one type, and so have all texts.
+        // Moving and fixed frames have the same type, and so have all texts.
         let shares = ["/tf_static", "/robot_description_semantic"].contains(&name);
         assert!(
             seen.insert(name) && (seen.insert(type_name) || shares),

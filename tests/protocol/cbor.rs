@@ -1,6 +1,7 @@
 //! Messages as binary, byte for byte: CBOR (RFC 8949), typed arrays in it (RFC 8746), and CDR within it.
 //!
-//! **Invariant:** the expected bytes are written from the standards, by hand; nothing here is read back by our own code.
+//! **Invariant:** the expected bytes are written by hand from the standards. The runtime's own code does not read them
+//! back.
 
 use pendularm::protocol::ros::cbor;
 use pendularm::protocol::ros::tree::MessageTree;
@@ -16,8 +17,9 @@ fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
     cbor::publish_raw(topic, type_name, &tree, usize::MAX)
 }
 
-/// A row: type, message, and the bytes of the message. They are hexadecimal; `"text"` stands for a CBOR text, `f(1.5)` for a CBOR
-/// double, `l(1.5)` for the 8 bytes of a little-endian double, and `..` for any rest. A type behind `raw ` is sent as `cbor-raw`.
+/// A row: type, message, and the bytes of the message. They are hexadecimal; `"text"` is a CBOR text, `f(1.5)` for a
+/// CBOR double, `l(1.5)` for the 8 bytes of a little-endian double, and `..` for any rest. A type after `raw ` is sent
+/// as `cbor-raw`.
 const ROWS: &str = include_str!("cbor.txt");
 
 /// Text of at most 23 bytes.
@@ -97,7 +99,7 @@ fn a_frame_has_no_spare_room() {
     }
 }
 
-/// In three bytes of JSON, `{},`, there may be a message of eighty: the frame is longer than anybody takes.
+/// Three bytes of JSON, `{},`, may be a message of eighty bytes, so the frame is too long for every subscriber.
 #[test]
 fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
     let transforms = json!({"transforms": vec![json!({}); 100]});
@@ -118,7 +120,7 @@ fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
     }
 }
 
-/// One message in both spellings, of stamps and of durations, at any depth: the same bytes.
+/// One message with both spellings of stamps and durations, at any depth, gives the same bytes.
 #[test]
 fn stamps_and_durations_are_read_under_their_names_of_ros_1_too() {
     let spelled = |sec: &str, nanosec: &str| {
@@ -153,7 +155,7 @@ fn stamps_and_durations_are_read_under_their_names_of_ros_1_too() {
         let cbor = publish("/t", Some(type_name), &ros2);
         assert_eq!(publish("/t", Some(type_name), &ros1), cbor, "{type_name}");
     }
-    // Where both are there, the names of ROS 2 count, and CBOR keeps both.
+    // If both are present, the names of ROS 2 count, and CBOR keeps both.
     let both = json!({"sec": 1, "nanosec": 2, "secs": 3, "nsecs": 4});
     let raw = |msg: &Value| publish_raw("/t", "builtin_interfaces/msg/Time", msg);
     assert_eq!(raw(&both), raw(&json!({"sec": 1, "nanosec": 2})));

@@ -1,7 +1,7 @@
 //! Fields are read one by one, and rejected by name: absent, null, within an object, by position, repeated, refused by another
 //! layer. Bad literals are the rows of `tests/actors/refusals/`.
 //!
-//! **Invariant:** messages are compared in full, because the sender of a request sees nothing else.
+//! **Invariant:** statuses are compared in full, because a client receives only them.
 
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;

@@ -1,6 +1,6 @@
-//! Lenient about numbers coming in, strict about numbers going out.
+//! Input of numbers is lenient, output of numbers is strict.
 //!
-//! **Invariant:** what is not a non-finite number passes byte for byte.
+//! **Invariant:** everything except numbers that are not finite passes unchanged.
 
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
@@ -39,7 +39,7 @@ fn names_inside_strings_are_text() {
     }
 }
 
-/// Each would be valid JSON, of another meaning, if the name in it were replaced blindly, or is malformed anyway.
+/// If the name in it were always replaced, each would be valid JSON with another meaning. The others are malformed.
 #[test]
 fn only_whole_tokens_are_names() {
     for text in [
@@ -111,8 +111,8 @@ fn time_of(text: &str) -> Duration {
     (0..7).map(|_| once()).min().unwrap()
 }
 
-/// Twenty digits astride a halfway point, of which no conversion can be quick: read as fast as any others, to a
-/// factor that a busy machine does not reach. A conversion of each takes a hundred times as long.
+/// Twenty digits near the middle between two doubles, which no conversion reads quickly. They are read as fast as
+/// others, within a factor that a busy machine does not reach. A conversion of each would take a hundred times as long.
 #[test]
 fn a_number_costs_its_bytes_whatever_its_digits_are() {
     let array = |number: &str| format!("[{number}{}]", format!(",{number}").repeat(20_000));

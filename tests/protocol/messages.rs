@@ -93,14 +93,14 @@ fn numbers_that_are_not_finite_are_null() {
     );
 }
 
-/// How much memory a frame holds on to.
+/// The memory that a frame holds.
 fn memory(frame: Bytes) -> usize {
     frame.try_into_mut().expect("nobody else has it").capacity()
 }
 
-/// Messages that wait for slow clients are counted by their length: they may not take more than that.
+/// Messages that wait for slow clients are counted by their length, so they may not use more memory.
 #[test]
-fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_their_text() {
+fn many_or_large_waiting_frames_use_no_more_memory_than_their_text() {
     for length in [2, 40, 1000, 100_000] {
         let msg = raw(&format!("{{\"a\":\"{}\"}}", "x".repeat(length)));
         let frame = publish_raw("/chat", &msg);
@@ -111,7 +111,7 @@ fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_t
     let frame = publish("/large", &large);
     let text = frame.len();
     assert_eq!(memory(frame), text);
-    // Calls and answers that only pass through are exact too.
+    // Forwarded calls and answers are exact too.
     for passed in [raw("{}"), raw(&format!("[\"{}\"]", "x".repeat(10_000)))] {
         for frame in [
             call("/x", "1", &passed),
@@ -161,7 +161,7 @@ fn a_stamp_saturates_and_is_never_negative() {
 }
 
 proptest! {
-    /// A stamp is the nearest nanosecond: off by half of one, and by what a double of that size can't resolve.
+    /// A stamp is the nearest nanosecond: the error is half a nanosecond, plus the spacing of doubles of that size.
     #[test]
     fn a_stamp_is_the_time_to_the_nearest_nanosecond(seconds in 0.0..2e9_f64) {
         let stamp = Stamp::from_seconds(seconds);
@@ -185,7 +185,7 @@ proptest! {
 
 /// A topic is known with and without its slash, and each subscriber reads its own spelling.
 #[test]
-fn a_message_can_be_told_under_another_spelling_of_its_topic() {
+fn a_message_can_be_sent_under_another_spelling_of_its_topic() {
     let frame = publish("/a\"b", &json!({"x": [1, null]}));
     assert_eq!(message_text("/a\"b", &frame), br#"{"x":[1,null]}"#);
     let other = publish("a\"b", &json!({"x": [1, null]}));

@@ -1,6 +1,6 @@
-//! Messages that are passed on as they came in: only what the general reader and writer would have made the same bytes of.
+//! Forwarded series of messages: only messages for which the general reader and writer give the same bytes.
 //!
-//! **Invariant:** every expectation comes from the general way: frame by frame, parsed, and written anew.
+//! **Invariant:** every expectation comes from the general reader and writer, frame by frame.
 
 use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages;
@@ -13,7 +13,7 @@ fn line(topic: &str, msg: &str) -> String {
     format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}\n")
 }
 
-/// The series that a stream begins with, and all that the stream holds behind it.
+/// The series at the beginning of a stream, and the rest of the stream.
 fn series(stream: &[u8]) -> Option<Series> {
     let mut reader = FrameReader::new();
     reader.push(stream);
@@ -58,7 +58,7 @@ fn a_usual_message_is_passed_on_as_it_came() {
 }
 
 #[test]
-fn what_calls_for_a_closer_look_is_left_to_the_general_reader() {
+fn unusual_lines_are_left_to_the_general_reader() {
     for msg in [
         "{\"a\":1e999}",
         "{\"a\":NaN}",
@@ -154,9 +154,9 @@ fn a_series_ends_where_something_else_comes_and_the_stream_goes_on_there() {
     assert_eq!(reader.series().unwrap().frames, x);
 }
 
-/// Its end is not looked for, which would take the gateway milliseconds for each of its subscribers.
+/// The reader does not search its end, which would take milliseconds of the gateway for each subscriber.
 #[test]
-fn what_is_longer_than_a_series_is_one_message() {
+fn a_line_longer_than_a_series_is_one_message() {
     let with_newline = line("/x", &format!("\"\n{}\"", "x".repeat(MAX_SERIES)));
     assert_eq!(first_message(with_newline.as_bytes()), with_newline.len());
     let series = line("/x", "{}").repeat(2);
@@ -183,9 +183,9 @@ fn a_series_is_bounded() {
 }
 
 proptest! {
-    /// A message is in a series only if the general way gives the same bytes.
+    /// A message is in a series only if the general reader and writer give the same bytes.
     #[test]
-    fn nothing_is_taken_for_a_series_that_the_general_way_would_not_give(
+    fn a_series_gives_the_same_result_as_the_general_reader(
         msg in json(),
         count in 1_usize..4,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3),

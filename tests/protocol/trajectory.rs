@@ -38,7 +38,7 @@ fn only_the_last_point_counts() {
 }
 
 #[test]
-fn velocities_that_are_no_good_are_zeros() {
+fn invalid_velocities_are_zeros() {
     for velocities in [
         "null",
         "[]",

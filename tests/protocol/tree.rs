@@ -1,7 +1,7 @@
-//! A message as it is read for its other forms: the same values as `serde_json`'s own, in a few bytes for each byte of
+//! A message as a tree, for other encodings: the same values as `serde_json`'s own, in a few bytes for each byte of
 //! text.
 //!
-//! **Invariant:** the other reading shares no code with ours; it decides the meaning of names that come twice.
+//! **Invariant:** the second reader shares no code with the first one, and defines the meaning of repeated names.
 
 use pendularm::protocol::catalog::types;
 use pendularm::protocol::limits::MAX_FRAME;
@@ -45,7 +45,7 @@ fn allocated(tree: &MessageTree<'_>) -> usize {
     }
 }
 
-/// Names that come twice in most objects of a few members, and fields that our types have.
+/// Names that are repeated in most objects of a few members, and fields of the runtime's types.
 fn name() -> impl Strategy<Value = String> {
     prop_oneof![
         Just("\"\"".to_owned()),
@@ -94,7 +94,7 @@ fn text() -> impl Strategy<Value = String> {
 
 proptest! {
     #[test]
-    fn what_is_read_is_what_another_reader_reads(text in text()) {
+    fn both_readers_give_the_same_frames(text in text()) {
         let expected: Result<Value, _> = serde_json::from_str(&text);
         let read = MessageTree::read(text.as_bytes());
         prop_assert_eq!(read.is_ok(), expected.is_ok(), "{}", text);
@@ -103,7 +103,7 @@ proptest! {
         }
     }
 
-    /// Theirs has each name once and in order before anything is written of it.
+    /// The tree of `serde_json` has each name once and in order before it is written.
     #[test]
     fn a_frame_is_that_of_the_other_reading(text in text(), known in 0..types::all().count()) {
         let Ok(expected) = serde_json::from_str::<Value>(&text) else {
@@ -121,7 +121,7 @@ proptest! {
     }
 }
 
-/// Texts that take most for their bytes, as long as a frame may be: 16 bytes for one.
+/// Texts with the largest trees per byte, as long as a frame may be: 16 bytes for one.
 #[test]
 fn the_longest_message_takes_64_mib_at_worst() {
     let deep = |open: &str, close: &str| open.repeat(50) + &close.repeat(50) + ",";
@@ -153,7 +153,7 @@ fn a_value_is_found_at_the_end_of_its_way() {
     assert_eq!(at("/a/0/0/b/c"), None);
 }
 
-/// As deep as a frame may be nested: nothing that is dropped, copied or written goes deeper than that.
+/// As deep as a frame may be nested. No drop, copy or write recurses deeper.
 #[test]
 fn a_tree_is_as_deep_as_a_message_may_be() {
     let nested = |levels: usize| "[".repeat(levels) + &"]".repeat(levels);

@@ -38,7 +38,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// The state that all parts of a simulation share.
+/// The shared state of a simulation.
 pub struct Court {
     rng: RefCell<fastrand::Rng>,
     began: Instant,
@@ -56,7 +56,7 @@ pub struct Court {
 }
 
 impl Court {
-    /// A court for one seed, in the runtime whose time it logs.
+    /// The shared state for one seed, in the runtime whose time it logs.
     pub fn new(seed: u64, keeps_log: bool) -> Self {
         Self {
             rng: RefCell::new(fastrand::Rng::with_seed(seed)),
@@ -96,7 +96,7 @@ impl Court {
         (self.hash.get(), log.unwrap_or_default())
     }
 
-    /// Counts something that was done.
+    /// Counts an action.
     pub fn count(&self, what: &'static str) {
         *self.tally.borrow_mut().entry(what).or_default() += 1;
     }
@@ -118,7 +118,7 @@ impl Court {
         value
     }
 
-    /// A number below `limit`; 0 where that is 0.
+    /// A number below `limit`, or 0 if that is 0.
     pub fn below(&self, limit: usize) -> usize {
         let value = self.rng.borrow_mut().usize(..limit.max(1));
         self.drew(value)

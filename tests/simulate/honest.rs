@@ -11,7 +11,7 @@ use crate::client::{Client, Door};
 use crate::court::Court;
 use crate::pipe::Fate;
 
-/// The answer that a call must have.
+/// The required answer of a call.
 #[derive(Debug, Clone)]
 pub enum Expect {
     /// Success.
@@ -83,7 +83,7 @@ pub struct Subscription {
     pub newest: BTreeMap<u64, u64>,
 }
 
-/// A client and its book.
+/// A client, and a record of its requests.
 pub struct Honest {
     /// A number that no other client of the seed has.
     pub who: u64,
@@ -98,16 +98,16 @@ pub struct Honest {
     pub advertised: BTreeSet<String>,
     /// Messages that it has published: each with the number of its frame.
     pub published: BTreeMap<u64, u64>,
-    /// Bytes of frames that go out with the next one, in one write.
+    /// Bytes of frames that are sent with the next one, in one write.
     together: Vec<u8>,
-    /// Frames that it has sent, and up to which they are known to have been handled.
+    /// The number of sent frames, and the number of those that have certainly been handled.
     pub frames: u64,
     pub handled: u64,
     /// Answers that it has to give as a provider, each with its time and its frame.
     pub due_answers: Vec<(Instant, u64, String)>,
     /// The turn at which its last computation was answered. The next one starts then.
     pub computed: u64,
-    /// Pieces of messages that have come, by id.
+    /// Received pieces of messages, by id.
     pub pieces: BTreeMap<String, Vec<String>>,
     /// Statuses about its registrations, and how often each is expected.
     pub news: BTreeMap<String, u64>,
@@ -153,7 +153,7 @@ impl Honest {
         honest
     }
 
-    /// Sends a frame; `style` says how it is cut and ended.
+    /// Sends a frame. `style` selects how it is split and ended.
     pub fn send(&mut self, frame: &str, style: u8) {
         self.frames += 1;
         // Without a line end, every later frame would wait for the next one.
@@ -166,13 +166,13 @@ impl Honest {
         self.client.send(frame, style);
     }
 
-    /// Sends a frame in one write with those behind it, once that is over.
+    /// Sends a frame in one write with the frames after it.
     pub fn send_with_next(&mut self, frame: &str) {
         self.frames += 1;
         self.together.extend(self.client.encode(frame, 0));
     }
 
-    /// Nothing comes behind those frames.
+    /// No frame follows these.
     pub fn flush(&mut self) {
         if !self.together.is_empty() {
             self.client.send_bytes(std::mem::take(&mut self.together));
@@ -201,7 +201,7 @@ impl Honest {
         *self.news.entry(of).or_default() += 1;
     }
 
-    /// Takes an expected status; false if none was expected.
+    /// Removes an expected status. Returns false if none was expected.
     pub fn has_news(&mut self, of: &str) -> bool {
         let Some(left) = self.news.get_mut(of) else {
             return false;
@@ -218,7 +218,7 @@ impl Honest {
         !self.is_excused && !self.has_finished && !self.client.has_ended()
     }
 
-    /// Notes a call that has just been sent under `id`, as JSON; empty: without.
+    /// Records a call that has just been sent under `id`, as JSON. An empty `id` means none.
     pub fn note_call(
         &mut self,
         id: &str,

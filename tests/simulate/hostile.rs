@@ -14,7 +14,7 @@ use pendularm_client::websocket::{append, opcode};
 
 /// A decimal that is slow to read exactly: 20 digits near the middle between two doubles.
 const SLOW: &str = "10000000000000001268e281";
-/// Bytes of long things that are sent at a time; some are longer than what every client may send unasked.
+/// Bytes of long frames that are sent at a time. Some exceed the part that needs no permit.
 const LONG: [usize; 5] = [100, 1000, 1000, 8000, 70_000];
 
 pub struct Hostile {

@@ -2,17 +2,17 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | `plan` | what a seed is made of: features, faults and hostile behaviours that are on in it |
+//! | `plan` | the features, faults and hostile behaviours of a seed |
 //! | `court` | the one generator, the log, the first failure |
 //! | `world`, `pipe` | the runtime, its pool and its pipes |
-//! | `workload`, `honest` | what clients ask, and what they wait for |
-//! | `model` | what must come back |
-//! | `hostile` | clients that keep no rule |
-//! | `play` | the course of a seed, and what is checked in it |
+//! | `workload`, `honest` | requests of clients, and their expected answers |
+//! | `model` | the expected frames |
+//! | `hostile` | clients that break the rules |
+//! | `play` | the course of a seed, and its checks |
 //!
-//! Safety holds always: nothing that comes is wrong. Liveness holds once the faults are over: all that is owed comes. `SEED=n` plays one
-//! seed and tells all, `SEEDS=n` many, `MINUTES=n` as many as there is time for, from the seed `FROM` on; `scripts/simulate.sh` takes
-//! that from the commit.
+//! Safety always holds: no received frame is wrong. Liveness holds after the faults: every required answer arrives.
+//! `SEED=n` plays one seed and prints its log. `SEEDS=n` plays n seeds, and `MINUTES=n` plays seeds for that time.
+//! `FROM` is the first seed, which `scripts/simulate.sh` takes from the commit.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -70,8 +70,7 @@ const DEFAULT_SEEDS: u64 = 60;
 const TWICE: u64 = 6;
 /// Interval at which a long run reports its progress.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
-/// Longer than any seed takes: in processor time, which does not depend on load, or by the wall clock, for a seed that
-/// waits for ever.
+/// Longer than any seed takes. Processor time does not depend on load. Wall time finds a seed that waits for ever.
 const PATIENCE: Duration = Duration::from_secs(120);
 const LONG_PATIENCE: Duration = Duration::from_secs(1800);
 
@@ -93,7 +92,7 @@ fn main() {
     std::process::exit(code);
 }
 
-/// A number from the environment; an empty one counts as none.
+/// A number from the environment. An empty variable counts as unset.
 fn number<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = std::env::var(name).ok().filter(|text| !text.is_empty())?;
     Some(
@@ -155,7 +154,7 @@ fn watch(began: Instant) {
     });
 }
 
-/// The last line of a failure: the fault, and the command that shows it again.
+/// The last line of a failure: the fault, and the command that repeats it.
 fn tell(seed: u64, failure: &Failure) {
     println!(
         "{failure}\nmake simulate SEED={seed}: {:.160}",
@@ -163,7 +162,8 @@ fn tell(seed: u64, failure: &Failure) {
     );
 }
 
-/// The kept seeds, and whether each is older than bursts are: it is the seed that once failed without them.
+/// The kept seeds, and whether each is older than the feature of bursts. Such a seed is played without bursts, as when
+/// it failed.
 fn kept() -> impl Iterator<Item = (u64, bool)> {
     let (older, newer) = KEPT.split_once("# with bursts").unwrap_or((KEPT, ""));
     let seeds = |text: &'static str| {

@@ -1,7 +1,7 @@
-//! The plan of a seed: which features, faults and hostile behaviours are on in it, and how often each comes.
+//! The plan of a seed: its features, faults and hostile behaviours, with their probabilities.
 //!
-//! A seed has some of them and not others (swarm testing): a fault that one feature hides shows in seeds without
-//! that feature.
+//! A seed has only some of them (swarm testing). So a fault that one feature hides is visible in seeds without that
+//! feature.
 
 use std::fmt;
 
@@ -51,24 +51,24 @@ pub struct Plan {
     pub honest: usize,
     pub hostile: usize,
     pub steps: usize,
-    /// How likely a client speaks through a WebSocket.
+    /// Probability that a client uses a WebSocket.
     pub socket: f64,
     /// Bytes that a pipe holds.
     pub room: usize,
     /// Bytes that a client writes at a time.
     pub piece: usize,
-    /// Whether all clients together have little room.
+    /// Whether memory is scarce for all clients together.
     pub scarce: bool,
     pub features: Vec<(Feature, f64)>,
     pub faults: Vec<(Fault, f64)>,
     pub hostilities: Vec<(Hostility, f64)>,
-    /// How likely a step is a fault, or a hostile deed.
+    /// Probability that a step is a fault or a hostile action.
     pub fault: f64,
     pub hostility: f64,
     pub bursts: Vec<(Burst, f64)>,
-    /// How likely a step is a burst.
+    /// Probability that a step is a burst.
     pub burst: f64,
-    /// Whether messages that a client publishes one behind the other go out in one write.
+    /// Whether consecutive messages of a client are sent in one write.
     pub together: bool,
 }
 

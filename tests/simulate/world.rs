@@ -1,5 +1,5 @@
-//! The whole runtime in one thread and in virtual time: registry, connections on pipes, every node, and the
-//! pool of computations, which has its turns when the simulation has.
+//! The whole runtime in one thread and in virtual time: registry, connections on pipes, every node, and the pool of
+//! computations. The pool runs in the turns of the simulation.
 
 use std::cell::Cell;
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use actix::prelude::*;
-use pendularm::actors::arm::sim::Consult;
+use pendularm::actors::arm::sim::SetLimitPredictor;
 use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
@@ -23,11 +23,11 @@ use crate::court::Court;
 use crate::nodes::start_nodes;
 use crate::pipe::{Fate, MEANT, Pipe};
 
-/// The cost of a look at the clock of work: a dozen to what the arm may work at a time, three to a slice.
+/// The cost of a query of the work clock. A turn of the arm has room for a dozen of them, and a slice for three.
 const LOOK: Duration = Duration::from_micros(400);
-/// Address that clients connect to: `Host` has to name it.
+/// The server's address, which `Host` must name.
 const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
-/// Most virtual time that passes without a look at what came.
+/// Longest virtual time between two checks of received frames.
 const GLANCE: Duration = Duration::from_millis(20);
 /// Virtual time of one slice of a computation.
 const SLICE: Duration = Duration::from_millis(1);
@@ -80,7 +80,7 @@ impl World {
         }
     }
 
-    /// A connection; gives the client's end, whose pipe holds `room` bytes each way, and its fate.
+    /// Opens a connection. Returns the client's end, whose pipe holds `room` bytes each way, and its fate.
     pub fn connect(&self, room: usize) -> (DuplexStream, Rc<Cell<Fate>>) {
         let (ours, stream) = duplex(room);
         let fate = Rc::new(Cell::new(Fate::Sound));
@@ -104,9 +104,9 @@ impl World {
         }
     }
 
-    /// Turns until nothing has moved in any pipe for a while: all that was sent has been read and answered.
+    /// Runs turns until no byte has moved in any pipe for a while: all sent frames have been read and answered.
     pub async fn until_quiet(&self) {
-        // A flood of a megabyte a client takes some dozens of these; two, in pieces of a hundred bytes, four hundred.
+        // A flood of 1 MB per client takes some dozens of these rounds. One of 2 MB in pieces of 100 bytes takes 400.
         for _ in 0..1000 {
             let before = self.moved.get();
             self.turns(300).await;
@@ -116,7 +116,7 @@ impl World {
         }
     }
 
-    /// Lets time pass, at most until the next check; returns how much.
+    /// Lets time pass, at most until the next check. Returns the passed time.
     pub async fn glance(&self, time: Duration) -> Duration {
         let step = if self.pool.is_idle() { GLANCE } else { SLICE };
         let step = step.min(time);
@@ -158,7 +158,7 @@ impl Computation for Trap {
     fn refuse(&mut self, _: &str) {}
 }
 
-/// All that `actors/runtime.rs` starts, in one thread.
+/// Everything that `actors/runtime.rs` starts, in one thread.
 fn start<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
@@ -169,5 +169,7 @@ fn start<const N: usize>(
     Gains<N>: Default,
 {
     let started = start_nodes::<N>(registry, gauges, pool, seed, nodes);
-    started.arm.do_send(Consult(started.study.recipient()));
+    started
+        .arm
+        .do_send(SetLimitPredictor(started.study.recipient()));
 }

@@ -34,11 +34,11 @@ fn soft<const N: usize>(rng: &mut fastrand::Rng) -> (Gains<N>, Setpoint<N>) {
     (gains, at(position))
 }
 
-/// One of the false alarms: Newton steps ran into a saddle, and every timestep was called unstable. The arm rests, and
-/// its true limit, from an independent code, is 0.456 s.
-/// Without gravity a joint that has damping and no spring stays where it is put: that is no running away.
+/// Newton steps alone would converge to a saddle here, and every timestep would count as unstable. The arm rests, and
+/// its true limit, from an independent code, is 0.456 s. Without gravity a joint that has damping and no spring stays
+/// where it is put: that is no running away.
 #[test]
-fn a_joint_that_nothing_draws_back_is_not_unstable() {
+fn a_joint_without_a_restoring_torque_is_not_unstable() {
     let arm = Arm::<2>::new([0.6, 2.6], [0.3, 0.7], 0.0).unwrap();
     let gains = Gains {
         kp: [0.0, 26_952.0],

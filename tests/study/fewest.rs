@@ -42,13 +42,13 @@ fn a_lucky_stretch_below_is_found() {
 
 /// The last number that may be taken fails, but not one before it.
 #[test]
-fn the_end_of_what_may_be_taken_hides_nothing() {
+fn the_end_of_the_allowed_bytes_hides_no_frame() {
     let (best, _) = found(1, 9000, u64::MAX, |steps| (6900..7800).contains(&steps));
     assert_eq!(best, Some(6900));
 }
 
 #[test]
-fn nothing_is_found_where_nothing_is_enough() {
+fn nothing_is_found_if_no_number_of_steps_is_enough() {
     assert_eq!(found(1, 1000, u64::MAX, |_| false).0, None);
     assert_eq!(found(11, 10, u64::MAX, |_| true), (None, 0));
 }

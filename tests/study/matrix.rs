@@ -98,7 +98,7 @@ fn a_nilpotent_matrix_has_zeros_for_eigenvalues() {
 }
 
 #[test]
-fn what_is_not_finite_comes_out_as_nan() {
+fn a_number_that_is_not_finite_is_returned_as_nan() {
     let matrix = Matrix::from_fn(3, |row, _| if row == 1 { f64::NAN } else { 1.0 });
     assert!(matrix.spectral_radius().is_nan());
 }

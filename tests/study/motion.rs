@@ -37,7 +37,7 @@ fn is_lost<const N: usize>(
 }
 
 #[test]
-fn what_does_not_move_has_no_limit() {
+fn a_loop_at_rest_without_dynamics_has_no_limit() {
     let weightless = Arm::new([1.0; 3], [1.0; 3], 0.0).unwrap();
     let motion = free(&weightless, &State::rest(), Method::Euler);
     assert_eq!((motion.speed, motion.timestep), (0.0, f64::INFINITY));

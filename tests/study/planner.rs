@@ -55,7 +55,7 @@ fn error_within<const N: usize>(
 /// Under control the held effort causes the error, so that the method with the fewest evaluations
 /// wins.
 #[test]
-fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant() {
+fn a_planned_move_under_control_stays_within_its_error_of_the_continuous_law() {
     let (gains, setpoint) = (Gains::default(), Setpoint::at([0.8, -0.6]));
     let task = Task {
         control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),
@@ -122,7 +122,7 @@ fn no_peak_is_overlooked() {
 }
 
 #[test]
-fn what_nobody_can_know_is_not_planned() {
+fn a_chaotic_motion_is_not_planned() {
     let chaos = Task {
         start: State::rest(),
         ..swing(100.0, 1e-3)
@@ -163,7 +163,7 @@ fn a_plan_has_the_fewest_evaluations_of_all_whole_numbers_of_steps() {
 
 /// Without an advised timestep nothing is run, and the error gives the reason.
 #[test]
-fn a_plan_that_ran_nothing_says_why() {
+fn a_plan_without_a_run_gives_the_reason() {
     let gains = Gains {
         kp: [20.0, 5.0],
         ki: [10.0, 2.0],

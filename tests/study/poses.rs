@@ -71,7 +71,7 @@ fn the_default_arms_are_proven_for_every_method() {
 /// With a fastest rate of 1e12/s, rounding makes slow modes seem to grow. Only one joint limits these loops: `kd h <
 /// 2 / max (Kd½ M⁻¹ Kd½)`.
 #[test]
-fn limits_of_a_billionth_of_a_second_are_told() {
+fn limits_of_a_billionth_of_a_second_are_reported() {
     for kd in [1e9, 1e11, 1e13] {
         let gains = Gains {
             kp: [100.0; 2],

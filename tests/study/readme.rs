@@ -133,7 +133,7 @@ fn printed(text: &str, before: &str) -> f64 {
 /// The plans of docs/study.md are run again.
 #[test]
 fn the_plans_of_the_study_are_runs() {
-    let servo = Task {
+    let move_under_control = Task {
         control: ControlLoop::new(
             Arm::<2>::default(),
             Gains::default(),
@@ -144,7 +144,7 @@ fn the_plans_of_the_study_are_runs() {
         error: 0.01,
     };
     for (task, before, method) in [
-        (servo, "the plan is Euler with ", Method::Euler),
+        (move_under_control, "the plan is Euler with ", Method::Euler),
         (
             falling(Arm::default(), 10.0, 1e-6),
             "the plan is RK4 with ",

@@ -85,7 +85,7 @@ fn a_section_made_anew_keeps_the_others() {
 
 /// Made by another version, or cut: the command must refuse it and not leave it out silently.
 #[test]
-fn a_kept_section_that_cannot_be_read_is_told_by_its_file() {
+fn an_unreadable_kept_section_is_reported_with_its_file() {
     let scratch = Scratch::new("unreadable");
     let kept = scratch.0.join("sections/drift.json");
     fs::create_dir_all(kept.parent().unwrap()).unwrap();

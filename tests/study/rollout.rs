@@ -200,7 +200,7 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
 
 /// `tests/actors/refusals/rows.txt` has the other refusals.
 #[test]
-fn what_can_not_be_run_is_refused_by_name() {
+fn an_impossible_run_is_refused_by_name() {
     let with = |change: &dyn Fn(&mut RolloutRequest<2>)| {
         let mut request = swing();
         change(&mut request);
@@ -234,7 +234,7 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
         position: [0.3, 0.7, -0.4],
         velocity: [1.0, -2.0, 0.5],
     };
-    // The arm let go at rest: the error's leading term vanishes for midpoint and Verlet.
+    // The arm is released at rest, so the error's leading term vanishes for midpoint and Verlet.
     for (state, effort) in [(moving, [3.0, -1.0, 0.5]), (State::rest(), [0.0; 3])] {
         for (method, h) in Method::ALL
             .into_iter()

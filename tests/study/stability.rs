@@ -264,7 +264,7 @@ fn the_advised_timestep_is_a_part_of_the_smallest_over_poses() {
 /// Undamped, a free arm is unstable under Euler and midpoint, and limited by its fastest swing under the others; without
 /// gravity nothing is left that could be unstable.
 #[test]
-fn an_arm_left_to_itself_has_the_limits_of_its_swing() {
+fn a_free_arm_has_the_limits_of_its_swing() {
     let swing = |method| limits(&ControlLoop::free(Arm::<3>::default()).with_method(method));
     for method in [Method::Euler, Method::Midpoint] {
         assert_eq!(
@@ -320,8 +320,8 @@ fn no_parameters_make_a_limit_that_is_no_number() {
     }
 }
 
-/// A joint whose integral is too strong for its damping runs away at some 1.3/s. The damping of the other joint makes a rate of
-/// 1e12/s, and rounding at that rate must not hide the slow growth.
+/// A joint with an integral that is too strong for its damping diverges at some 1.3/s. The damping of the other joint
+/// makes a rate of 1e12/s, and rounding at that rate must not hide the slow growth.
 #[test]
 fn slow_growth_beside_a_joint_of_enormous_damping_is_seen() {
     let arm = Arm::<2>::default();
@@ -349,8 +349,9 @@ fn slow_growth_beside_a_joint_of_enormous_damping_is_seen() {
     }
 }
 
-/// A hanging arm with its elbow bent and braked, and `part` of the integral that the shoulder bears; the elbow has the
-/// integral `elbow`. As the elbow does not move, `J s³ + kd s² + (kp + G') s + ki` is stable as far as `kd (kp + G') > J ki`.
+/// A hanging arm with its elbow bent and braked, and `part` of the largest stable integral gain at the shoulder. The
+/// elbow has the integral gain `elbow`. As the elbow does not move, `J s³ + kd s² + (kp + G') s + ki` is stable as far
+/// as `kd (kp + G') > J ki`.
 fn check_braked(
     arm: &Arm<2>,
     (kd, elbow): ([f64; 2], f64),

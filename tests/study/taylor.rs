@@ -76,7 +76,7 @@ fn any<const N: usize>(rng: &mut fastrand::Rng) -> (Arm<N>, State<N>, [f64; N], 
     )
 }
 
-/// How far a change of each coordinate of the start grows at most.
+/// The largest growth of a change of each coordinate of the start.
 fn growth<const N: usize>(
     arm: &Arm<N>,
     start: &State<N>,
@@ -129,9 +129,9 @@ fn check_tolerances<const N: usize>() -> f64 {
     worst
 }
 
-/// A step leaves out at most the tolerance times the way of positions and of velocities in it, which then grows. It goes by
-/// the last term that it keeps, which is several times what it leaves out, and errors do not all add up: 0.07 of the
-/// bound was seen. It is not to be exceeded, nor are three digits more to be made than are asked for.
+/// A step leaves out at most the tolerance times the way of positions and of velocities in it, which then grows. The
+/// step is chosen by the last kept term, which is several times the omitted ones, and errors partly cancel: the largest
+/// measured error is 0.07 of the bound. The test also fails if the result is three digits better than requested.
 #[test]
 fn an_asked_tolerance_is_kept() {
     for worst in [check_tolerances::<2>(), check_tolerances::<3>()] {
@@ -187,10 +187,10 @@ fn hostile_arms_are_followed_as_exactly_as_they_can_be_known() {
     }
 }
 
-/// The arm is let go at rest, stretched along the horizontal. Three coefficients in a row are zero between two that are
-/// not. The series must not end there, and the step must not be chosen by them.
+/// The arm is released at rest, stretched along the horizontal. Three coefficients in a row are zero between two that
+/// are not. The series must not end there, and the step must not be chosen by them.
 #[test]
-fn an_arm_let_go_along_the_horizontal_is_followed_although_its_series_has_gaps() {
+fn an_arm_released_from_the_horizontal_is_followed_although_its_series_has_gaps() {
     for time in [1e-3, 0.01, 0.1, 0.5] {
         let arm = Arm::<3>::default();
         let [off, inherent] = beside_twice_the_digits(&arm, &State::rest(), time);
@@ -205,8 +205,7 @@ fn an_arm_let_go_along_the_horizontal_is_followed_although_its_series_has_gaps()
     }
 }
 
-/// A joint that is wound up by a million turns is followed to the resolution of its angle: a double of 7e6 rad has
-/// digits to 1e-9.
+/// A joint after a million turns is followed to the resolution of its angle: a double of 7e6 rad has digits to 1e-9.
 #[test]
 fn a_wound_up_joint_moves_as_any_other() {
     let arm = Arm::<2>::default();

@@ -23,7 +23,7 @@ pub fn time(stamp: &Value) -> f64 {
     let sec = stamp["sec"].as_f64().expect("sec");
     let nanosec = stamp["nanosec"].as_u64().expect("nanosec");
     assert!(nanosec < 1_000_000_000, "{stamp}");
-    // Divided, which is rounded rightly: the time that was stamped comes back.
+    // A division is rounded correctly, so the stamped time is returned.
     sec + nanosec as f64 / 1e9
 }
 

@@ -1,4 +1,5 @@
-//! Clients that ask a node without registry and connections, by typed messages: their turns on the pool can be told apart.
+//! Clients that call a node by typed messages, without registry and connections. So their turns on the pool can be
+//! distinguished.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,10 +14,10 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
-/// How long anything may take before a test gives up.
+/// Longest wait before a test fails.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Stands in for a client that has asked: says that it has its answer, and hands it on.
+/// Replaces a client with a call: reports its answer, and passes it on.
 struct Asking<T> {
     connection: u64,
     gone: Arc<AtomicBool>,
@@ -26,7 +27,7 @@ struct Asking<T> {
 
 impl<T: Send> Asker<T> for Asking<T> {
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
-        // A caller that looks for the answer once it is said to be there finds it.
+        // The answer is stored before it is reported.
         let _ = self.answer.send(answer);
         let _ = self.answered.send(self.connection);
     }
@@ -40,14 +41,14 @@ impl<T: Send> Asker<T> for Asking<T> {
     }
 }
 
-/// A question on its way: its answer and its end to come, and the flag that its asker has gone.
+/// A pending call: its answer, its end, and a flag that its caller has disconnected.
 pub struct Asked<T> {
     pub answer: oneshot::Receiver<Result<T, Unserved>>,
     pub ended: oneshot::Receiver<()>,
     pub gone: Arc<AtomicBool>,
 }
 
-/// Asks as the client of that connection, and reports when the answer has come.
+/// Calls as the client of that connection, and reports when the answer has arrived.
 pub fn ask_as<A: Ask>(
     node: &Recipient<Call<A>>,
     connection: u64,
@@ -72,7 +73,7 @@ pub fn ask_as<A: Ask>(
     }
 }
 
-/// A node that computes on a pool, and clients that ask it.
+/// A node that computes on a pool, and clients that call it.
 pub struct PoolBench<T: Actor> {
     pub pool: WorkerPool,
     pub node: Addr<T>,
@@ -93,7 +94,7 @@ impl<T: Actor<Context = Context<T>>> PoolBench<T> {
         }
     }
 
-    /// Asks as the client of that connection.
+    /// Calls as the client of that connection.
     pub fn ask_as<A: Ask>(&self, connection: u64, ask: A) -> Asked<A::Answer>
     where
         T: Handler<Call<A>>,
@@ -107,7 +108,7 @@ impl<T: Actor<Context = Context<T>>> PoolBench<T> {
         )
     }
 
-    /// Asks as another node does.
+    /// Calls as another node does.
     pub async fn ask<A: Ask>(&self, question: A) -> A::Answer
     where
         T: Handler<Call<A>>,
@@ -124,7 +125,7 @@ impl<T: Actor<Context = Context<T>>> PoolBench<T> {
         next.expect("an answer in time").expect("the bench lives")
     }
 
-    /// Whether nobody has been answered since the last look.
+    /// Whether no client has been answered since the last query.
     pub fn is_silent(&mut self) -> bool {
         self.order.try_recv().is_err()
     }

@@ -29,7 +29,7 @@ pub const VARIABLES: [&str; 13] = [
     "ARM_SIM_REPORT",
 ];
 
-/// The program, with nothing of the tester's environment that could change what it does.
+/// The program, without variables of the environment that could change its behaviour.
 pub fn program() -> Command {
     without_variables(Command::new(env!("CARGO_BIN_EXE_pendularm")))
 }
@@ -65,7 +65,7 @@ pub fn forwarded(provider: &mut Client) -> Value {
     frame
 }
 
-/// The message to a client that is one too many, before its end.
+/// The message to a client beyond the limit, before its end.
 #[track_caller]
 pub fn refusal_of(client: &mut Client) -> String {
     let status = client.receive();
@@ -74,7 +74,7 @@ pub fn refusal_of(client: &mut Client) -> String {
     status["msg"].as_str().unwrap().to_owned()
 }
 
-/// Whether a new client has a place once the end of another has been noticed.
+/// Whether a new client has a place after the end of another.
 pub fn is_served_at_last(address: SocketAddr) -> bool {
     let began = Instant::now();
     while began.elapsed() < PATIENCE {
@@ -95,7 +95,7 @@ pub fn respond(provider: &mut Client, call: &Value, values: Value) {
     );
 }
 
-/// The exit status of what must end by itself, and how long that took.
+/// The exit status of a process that must end by itself, and the elapsed time.
 #[track_caller]
 pub fn end(child: &mut Child) -> (ExitStatus, Duration) {
     let ended = ending::wait(child, PATIENCE).expect("the child can be asked");
@@ -105,7 +105,7 @@ pub fn end(child: &mut Child) -> (ExitStatus, Duration) {
     ended.expect("it ends")
 }
 
-/// The program, running; ended with the value.
+/// The running program. Dropping it ends the process.
 pub struct Runtime {
     child: Child,
     pub address: SocketAddr,
@@ -144,7 +144,7 @@ impl Runtime {
         Self::spawn(program(), bind, arguments)
     }
 
-    /// The same, started by a shell that has done `prelude` before: sets limits, say.
+    /// The same, started by a shell that first runs `prelude`, for example to set limits.
     pub fn under(prelude: &str) -> Self {
         Self::under_with(prelude, &[])
     }
@@ -157,7 +157,7 @@ impl Runtime {
         Self::spawn(without_variables(shell), "127.0.0.1:0", arguments)
     }
 
-    /// The same with no signal ignored: a shell starts its jobs in the background with some ignored.
+    /// The same without ignored signals, because a shell ignores some for its background jobs.
     pub fn hearing_all(arguments: &[&str]) -> Self {
         let mut env = Command::new("env");
         env.args(["--default-signal", env!("CARGO_BIN_EXE_pendularm")]);
@@ -215,7 +215,7 @@ impl Drop for Runtime {
     }
 }
 
-/// The program with its standard output somewhere else, and its log read to the end.
+/// The program with another standard output, and its log read to the end.
 pub struct Logged {
     child: Child,
     pub address: SocketAddr,
@@ -243,7 +243,7 @@ impl Logged {
         std::thread::spawn(move || {
             for line in stderr.split(b'\n') {
                 let line = String::from_utf8(line.unwrap()).expect("the log is text");
-                // A test that has failed takes no more.
+                // The receiver of a failed test is gone.
                 let _ = line_came.send(line);
             }
         });

@@ -1,4 +1,4 @@
-//! Numbers out of JSON.
+//! Numbers from JSON.
 //!
 //! **Invariant:** any other value fails the test that expects a number, and is shown.
 

@@ -1,4 +1,5 @@
-//! The runtime's nodes on one thread, joined as `actors/runtime.rs` joins them. The recorder, which has a disk, is left out.
+//! The runtime's nodes on one thread, connected as in `actors/runtime.rs`. The recorder is missing, because it needs a
+//! disk.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,7 +21,7 @@ use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 
-/// The nodes that tests ask without a client.
+/// The nodes that tests call without a client.
 pub struct Started<const N: usize> {
     pub arm: Addr<ArmSim<N>>,
     pub study: Addr<Study<N>>,
@@ -105,7 +106,7 @@ pub fn start_goal_nodes<const N: usize>(
     (action, trial)
 }
 
-/// Does the work of a pool without threads in this thread, at every millisecond.
+/// Does the work of a pool without threads in this thread, every millisecond.
 pub fn work_in_this_thread(pool: WorkerPool) {
     actix_rt::spawn(async move {
         loop {

@@ -1,8 +1,8 @@
-//! All nodes on one thread whose clock stands still until every task waits, and a rosbridge client on an in-memory
+//! All nodes on one thread, whose clock does not move until every task waits, and a rosbridge client on an in-memory
 //! pipe. Tests in virtual time share them.
 //!
-//! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and
-//! always in the same way, so that steps, messages and their order can be counted.
+//! A test calls a node as another node does ([`asked`]), and receives the messages of a subscriber. A virtual second
+//! takes almost no real time, and always passes in the same way. So steps, messages and their order can be counted.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -37,7 +37,7 @@ pub const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// All nodes, joined as the runtime joins them.
+/// All nodes, connected as in the runtime.
 pub struct Stage<const N: usize> {
     pub registry: Addr<Registry>,
     pub arm: Addr<ArmSim<N>>,
@@ -76,7 +76,7 @@ where
         *simulation
     }
 
-    /// A client, with the arm weightless and at rest at q = 0: it stays where it is, to the bit.
+    /// A client, with the arm weightless and at rest at q = 0, so its state stays bit-identical.
     pub async fn with_a_floating_arm() -> (Self, Client) {
         let stage = Self::start().await;
         let weightless = SetParams {
@@ -93,7 +93,7 @@ where
         asked(&self.arm, Reset::default()).await;
     }
 
-    /// Has the controller hold `position` from the next step on, as the registry does for a message on
+    /// Makes the controller hold `position` from the next step on, as the registry does for a message on
     /// `/joint_trajectory`.
     pub async fn hold(&self, position: [f64; N]) {
         let setpoint = Setpoint::at(position);
@@ -105,7 +105,7 @@ where
     }
 }
 
-/// Asks a node as another one does, and waits until the question has had all its effects.
+/// Calls a node as another one does, and waits for all effects of the call.
 pub async fn asked<A, T>(node: &Addr<T>, ask: A) -> A::Answer
 where
     A: Ask,
@@ -172,7 +172,7 @@ impl Client {
         self.settle().await;
     }
 
-    /// Commands an effort; where the controller is on, the error status is passed over.
+    /// Commands an effort. The error status is ignored if the controller is on.
     pub async fn command_effort(&mut self, effort: Value) {
         self.send(
             &json!({"op": "publish", "topic": "/effort_controller/commands",
@@ -182,7 +182,7 @@ impl Client {
         self.settle().await;
     }
 
-    /// Lets `time` pass, and gives the messages on `topic` that came in it.
+    /// Lets `time` pass, and returns the messages on `topic` in that time.
     pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
         let before = self.received.len();
         let listen = async {
@@ -213,11 +213,11 @@ pub async fn pass(time: Duration) {
     sleep(time).await;
 }
 
-/// An arm that says nothing unless it is asked, and makes no steps.
+/// An arm that sends only answers, and takes no steps.
 pub struct SilentArm;
 
 impl SilentArm {
-    /// An arm as `ik_action` wants it.
+    /// A substitute for the arm, for `ik_action`.
     pub fn tracker(address: &Addr<Self>) -> GoalTracker<2> {
         GoalTracker {
             track: address.clone().recipient(),

@@ -1,5 +1,5 @@
-//! The actors' system that a test runs in. Nothing that depends on the test's type does more than box it: there are some
-//! 250 of them, and for each the compiler would go through the runtime's loop again.
+//! The actors' system of a test. Generic code only boxes the test. Otherwise the compiler would compile the runtime's
+//! loop again for each of some 250 tests.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -14,12 +14,12 @@ pub fn in_real_time(test: impl Future<Output = ()>) {
     to_the_end(&System::new(), test);
 }
 
-/// Runs a test on one thread, in virtual time: the clock stands still until nobody has anything to do.
+/// Runs a test on one thread, in virtual time: the clock does not move until every task waits.
 pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
     counting_wake_ups(|_| test)
 }
 
-/// The same; the test gets the number of times that the thread went to sleep, and so of its wake-ups.
+/// The same. The test gets the number of times that the thread went to sleep, which is the number of its wake-ups.
 pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
     let sleeps = Arc::default();
     to_the_end(&with_paused_clock(Arc::clone(&sleeps)), test(sleeps))

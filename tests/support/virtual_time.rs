@@ -22,11 +22,11 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep};
 
-/// Longer than anything in here waits.
+/// Longer than any wait of a test.
 const LONG: Duration = Duration::from_secs(7 * 24 * 3600);
 /// The timers' grain.
 pub const GRAIN: Duration = Duration::from_millis(2);
-/// The pipe to a client that takes everything at once.
+/// The pipe to a client that reads everything at once.
 pub const WIDE: usize = 1 << 26;
 
 /// Registry and gauges, with the nodes of a test.
@@ -119,12 +119,12 @@ impl Peer {
     }
 }
 
-/// Runs all work that needs no time, or almost none.
+/// Runs all work that needs no virtual time, or almost none.
 pub async fn settle() {
     sleep(Duration::from_millis(10)).await;
 }
 
-/// A node that keeps the calls that come, unanswered.
+/// A node that keeps received calls unanswered.
 #[derive(Clone, Default)]
 pub struct Held(pub Rc<RefCell<Vec<ServiceCall>>>);
 

@@ -24,7 +24,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Takes an answer apart, which is all that came before the end of the stream.
+    /// Parses an answer, which is everything before the end of the stream.
     pub fn parse(bytes: &[u8]) -> Self {
         let end = bytes
             .windows(4)
@@ -67,7 +67,7 @@ impl Answer {
     }
 }
 
-/// Sends bytes and their end, and gives all that comes up to the end of the stream.
+/// Sends bytes and their end. Returns all bytes up to the end of the stream.
 pub fn exchange(address: SocketAddr, request: &[u8]) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).expect("the program accepts");
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -76,14 +76,14 @@ pub fn exchange(address: SocketAddr, request: &[u8]) -> Vec<u8> {
     rest(&mut stream)
 }
 
-/// All that comes up to the end of the stream.
+/// All bytes up to the end of the stream.
 pub fn rest(stream: &mut TcpStream) -> Vec<u8> {
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).expect("an orderly end");
     bytes
 }
 
-/// Asks for a path with our own host.
+/// Requests a path with the server's own host.
 pub fn get(address: SocketAddr, path: &str) -> Answer {
     let request = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n");
     Answer::parse(&exchange(address, request.as_bytes()))

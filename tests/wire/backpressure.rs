@@ -11,7 +11,7 @@ const MIB: usize = 1024 * 1024;
 const BASE: usize = 40 * MIB;
 
 #[test]
-fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() {
+fn calls_of_a_provider_that_never_reads_are_refused_and_use_bounded_memory() {
     let runtime = Runtime::start();
     let mut provider = runtime.connect();
     provide(&mut provider, "/s");

@@ -6,7 +6,7 @@ use crate::common::Runtime;
 use crate::diagnostics::{arm_status, number, status, text};
 use serde_json::json;
 
-/// The contract's, then ours.
+/// The contract's statuses, then the project's own.
 const KEYS: [&str; 13] = [
     "state",
     "sim_time",

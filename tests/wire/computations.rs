@@ -6,7 +6,7 @@ use crate::arm::{in_one_of_three_tries, stamp};
 use crate::common::{Client, PATIENCE, Runtime};
 use serde_json::json;
 
-/// A call of seconds of work and a small answer: a sum of 2001 terms (4001 nodes), 4 times in each of 100,000 steps.
+/// A call with seconds of work and a small answer: a sum of 2001 terms (4001 nodes), 4 times in each of 100,000 steps.
 /// A test that sends it does not wait for its end.
 fn send_heavy(client: &mut Client) {
     let args = json!({"function": vec!["t"; 2001].join("+"), "x0": 0, "dt": 1e-3, "steps": 100_000,
@@ -16,7 +16,7 @@ fn send_heavy(client: &mut Client) {
 }
 
 #[test]
-fn the_arm_and_its_messages_go_on_while_somebody_computes() {
+fn the_arm_and_its_messages_continue_during_a_computation() {
     in_one_of_three_tries("a third of the time and a sixth of the messages", || {
         let runtime = Runtime::start();
         let mut busy: Vec<Client> = (0..3).map(|_| runtime.connect()).collect();

@@ -28,8 +28,8 @@ const CLIENTS: usize = 1024 - 16;
 
 /// The usual soft limit of 1,024 is not enough for 1,024 clients: it is raised.
 #[test]
-fn a_thousand_clients_are_served_and_the_next_is_told_so() {
-    // This side of the connections needs files too, two for each.
+fn a_thousand_clients_are_served_and_the_next_gets_the_reason() {
+    // The client's side of the connections also needs two files each.
     let ours = rlimit::increase_nofile_limit(4 * CLIENTS as u64).unwrap();
     assert!(ours > 3 * CLIENTS as u64, "the test needs files too");
     let runtime = Runtime::under_with("ulimit -S -n 256", &["--clients", "1024"]);
@@ -46,13 +46,13 @@ fn a_thousand_clients_are_served_and_the_next_is_told_so() {
 }
 
 #[test]
-fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told() {
+fn with_few_open_files_fewer_clients_are_served_and_the_others_get_the_reason() {
     let runtime = Runtime::under("ulimit -n 40");
     let mut served: Vec<Client> = (0..7).map(|_| runtime.connect()).collect();
     for client in &mut served {
         client.settle();
     }
-    // More clients than files: the rest wait in the system's queue until others have got their message.
+    // More clients than files: the rest wait in the system's queue until others have received their message.
     let mut late: Vec<Client> = (0..60).map(|_| runtime.connect()).collect();
     for client in &mut late {
         assert!(refusal_of(client).contains("serves 8 clients"));
@@ -65,7 +65,7 @@ fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told(
 /// Without a file no client can be accepted: the program waits without using the processor, and continues once
 /// a file is free.
 #[test]
-fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for() {
+fn running_out_of_files_affects_no_client_and_uses_no_processor() {
     let runtime = Runtime::under("ulimit -n 40");
     let mut served: Vec<Client> = (0..7).map(|_| runtime.connect()).collect();
     served[0].subscribe("/joint_states");
@@ -82,7 +82,7 @@ fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for()
         served[1].settle();
     }
     let (used, took) = (processor_seconds(&runtime) - before, began.elapsed());
-    // A thread that spins uses all of it; the subscriber and the calls a small part.
+    // A spinning thread uses all of it. The subscriber and the calls use a small part.
     assert!(used < 0.5 * took.as_secs_f64(), "{used} s in {took:?}");
     set_soft_limit(&runtime, 40);
     for client in &mut waiting {

@@ -17,7 +17,7 @@ const STEP: &str = "/arm_sim/integration_step";
 /// once the one before has been read.
 #[test]
 #[ignore = "a minute: make test-slow"]
-fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
+fn fifty_clients_that_read_nothing_of_a_million_steps_use_bounded_memory() {
     const STEPS: usize = 1_000_000;
     let runtime = Runtime::start();
     let mut deaf: Vec<Client> = (0..50).map(|_| runtime.connect()).collect();
@@ -34,7 +34,7 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
             .iter_mut()
             .map(|client| {
                 scope.spawn(|| {
-                    // Deaf for a while, each.
+                    // Each client reads nothing for a while.
                     std::thread::sleep(Duration::from_secs(12));
                     client.set_patience(Duration::from_secs(600));
                     let line = client.receive_text();
@@ -96,7 +96,7 @@ fn a_wall_clock_that_jumps_changes_nothing() {
         let began = Instant::now();
         let before = stamp(&state(&mut client));
         std::fs::write(&file, format!("{jump}\n")).unwrap();
-        // More than the 250 ms that an arm makes up at once: simulation time and messages continue.
+        // More than the 250 ms that an arm catches up at once: simulation time and messages continue.
         let (mut simulated, mut messages) = (0.0, 0);
         while simulated < 0.5 {
             simulated = stamp(&client.message("/joint_states")) - before;

@@ -1,7 +1,7 @@
 //! No more threads can start: the program continues with those that it has, and a program that cannot start prints why.
 //!
-//! **Invariant:** the limits are the process's own. The system holds its first user to none, so that where the tests are
-//! run as that user, the program is run as another.
+//! **Invariant:** the limits are the process's own. They do not apply to the superuser, so tests of the superuser run
+//! the program as another user.
 
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ use crate::common::{Client, Runtime, without_variables};
 use crate::web_client::get;
 use serde_json::json;
 
-/// Continues as a user to whom the system's limits apply.
+/// Switches to a user to whom the system's limits apply.
 const AS_A_USER: &str =
     "[ \"$(id -u)\" = 0 ] && user='setpriv --reuid 54321 --regid 54321 --clear-groups --'";
 
@@ -32,8 +32,8 @@ fn refuse_threads(runtime: &Runtime) {
     assert!(set.expect("prlimit runs").success());
 }
 
-/// Megabytes to read, encode and write, answers to cancelled calls, and the page: all the work outside the gateway's
-/// own thread.
+/// Megabytes to read, encode and write, answers to cancelled calls, and the page: all work outside the gateway's
+/// thread.
 #[test]
 fn with_no_more_threads_everything_is_still_served() {
     let runtime = Runtime::under(&format!(

@@ -1,5 +1,5 @@
 //! Log injection at the level `trace`. For every text of a client, each line of standard error is one record of the
-//! runtime, and nothing on it acts on a terminal. No text becomes a file's name or a format.
+//! runtime, without control characters. No text becomes a file's name or a format.
 //!
 //! **Invariant:** the program logs into a pipe that is read to its end, so no line is missed.
 
@@ -15,7 +15,7 @@ use crate::web_client::folder;
 use pendularm::logging::{LINE_BYTES, QUEUE_LINES};
 use serde_json::{Value, json};
 
-/// Texts that do harm if they are written unescaped, or read as anything but text.
+/// Texts that are harmful if they are written unescaped, or read as anything but text.
 const HOSTILE: [&str; 14] = [
     "a\n2026-01-01T00:00:00Z ERROR forged: b",
     "a\r\n2026-01-01T00:00:00Z ERROR forged: b",
@@ -52,7 +52,7 @@ fn acts(one: char) -> bool {
         || matches!(one, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }
 
-/// Each line is a record: a time, a level, a module of ours, and characters that show themselves only.
+/// Each line is a record: a time, a level, a module of the runtime, and printable characters only.
 fn assert_records(log: &str) {
     assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
     for line in log.split_terminator('\n') {
@@ -77,7 +77,7 @@ fn assert_records(log: &str) {
     }
 }
 
-/// Each line is one JSON object with what every record has.
+/// Each line is one JSON object with the members of every record.
 fn assert_objects(log: &str) {
     assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
     for line in log.split_terminator('\n') {
@@ -176,7 +176,7 @@ fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it
                     "{frame}"
                 );
             }
-            // Text that is no JSON at all, in a line of its own and as a first one.
+            // Text that is no JSON, on its own line and as the first one.
             client.send_bytes(format!("{text}\n").as_bytes());
             client.settle();
             Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
@@ -201,9 +201,9 @@ fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it
     }
 }
 
-/// The pipe takes 64 KiB, and the queue its lines. Each client that comes is a line.
+/// The pipe holds 64 KiB, and the queue its lines. Each new client makes a line.
 #[test]
-fn a_log_that_nobody_reads_blocks_nobody_and_the_lines_that_are_lost_are_counted() {
+fn an_unread_log_blocks_no_client_and_lost_lines_are_counted() {
     const CLIENTS: usize = 2 * QUEUE_LINES + 64 * 1024 / 50;
     for format in ["text", "json"] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
@@ -253,7 +253,7 @@ fn a_log_that_nobody_reads_blocks_nobody_and_the_lines_that_are_lost_are_counted
     }
 }
 
-/// The runtime repeats there what it was asked, so there is something to escape: see that it comes.
+/// The runtime quotes the request there. The test checks that the quoted text arrives.
 #[cfg(feature = "web")]
 #[test]
 fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
@@ -276,7 +276,7 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
             format!("GET / {text}\r\n\r\n"),
             format!("{text} / HTTP/1.1\r\nHost: {text}\r\n\r\n"),
         ] {
-            // A text with a line end of its own may leave the request unfinished.
+            // A text with a line end may leave the request unfinished.
             let answer = exchange(address, (head + "\r\n\r\n").as_bytes());
             assert!(!answer.is_empty());
         }

@@ -63,7 +63,7 @@ fn standard_output_has_the_listening_line_and_nothing_else() {
     client.ask("/arm_sim/set_params", json!({"gravity": 1e308}));
     client.settle();
     signal(child.id(), "TERM");
-    // Standard error has not been read so far: that must not keep it from ending.
+    // Standard error has not been read so far, and the program must still end.
     assert_eq!(common::end(&mut child).0.code(), Some(0));
     let mut rest = String::new();
     stdout.read_to_string(&mut rest).unwrap();
@@ -71,7 +71,7 @@ fn standard_output_has_the_listening_line_and_nothing_else() {
 }
 
 #[test]
-fn it_can_be_served_on_another_loopback_address_only_where_asked() {
+fn it_is_served_on_another_loopback_address_only_on_request() {
     let Ok(probe) = TcpListener::bind("[::1]:0") else {
         return; // This machine has no IPv6.
     };
@@ -79,7 +79,7 @@ fn it_can_be_served_on_another_loopback_address_only_where_asked() {
     let runtime = Runtime::with_bind("[::1]:0", &[]);
     assert!(runtime.address.is_ipv6(), "{}", runtime.address);
     runtime.connect().settle();
-    // Bound to another than the default address it has no twin.
+    // With another address than the default it does not also serve `[::1]`.
     let four = Runtime::start();
     let port = four.address.port();
     assert!(std::net::TcpStream::connect(format!("[::1]:{port}")).is_err());

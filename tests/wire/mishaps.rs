@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use crate::common::{Client, Logged, Runtime, program, signal};
 use serde_json::{Value, json};
 
-/// A file of this test's own that is not there.
+/// The name of a missing file for this test.
 fn file(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mishaps-{name}"));
     let _ = fs::remove_file(&path);
@@ -68,7 +68,7 @@ fn a_signal_that_was_ignored_at_the_start_stays_ignored_but_for_requests_to_end(
 }
 
 #[test]
-fn signals_of_failed_writes_and_those_that_end_nothing_harm_nobody() {
+fn signals_of_failed_writes_and_harmless_signals_affect_no_client() {
     let mut runtime = Runtime::start();
     let mut client = runtime.connect();
     for name in ["PIPE", "XFSZ", "CHLD", "WINCH", "URG", "CONT"] {
@@ -110,7 +110,7 @@ fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_se
 }
 
 #[test]
-fn a_log_beyond_the_limit_of_file_sizes_harms_nobody() {
+fn a_log_beyond_the_limit_of_file_sizes_affects_no_client() {
     let path = file("limited.log");
     let prelude = format!("ulimit -f 1 && exec 2>'{}'", path.display());
     let mut runtime = Runtime::under_with(&prelude, &["--log", "trace"]);
@@ -124,7 +124,7 @@ fn a_log_beyond_the_limit_of_file_sizes_harms_nobody() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn clients_are_served_whatever_becomes_of_standard_output() {
+fn clients_are_served_even_if_standard_output_fails() {
     let full_pipe = || {
         let (reader, mut writer) = std::io::pipe().unwrap();
         rustix::io::ioctl_fionbio(&writer, true).unwrap();
@@ -169,7 +169,7 @@ fn events<'a>(lines: impl Iterator<Item = &'a str>) -> u64 {
 }
 
 #[test]
-fn a_warning_that_a_client_causes_in_a_loop_is_told_once_a_second_with_a_number() {
+fn a_repeated_warning_is_logged_once_a_second_with_a_count() {
     const TIMES: u64 = 3000;
     let runtime = Logged::start(program(), Stdio::null());
     let mut listener = Client::to(runtime.address);

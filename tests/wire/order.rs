@@ -1,6 +1,6 @@
 //! The order of frames where the arm and the gateway run on threads of their own.
 //!
-//! **Invariant:** a race that is possible is given hundreds of chances.
+//! **Invariant:** a possible race has hundreds of chances.
 
 use crate::arm::{stamp, state_where};
 use crate::common::{Client, Runtime};
@@ -41,7 +41,7 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
     for round in 0..30 {
-        // A late arm makes up at most 250 ms: half a second is from before the reset.
+        // A late arm catches up at most 250 ms, so a time of half a second is from before the reset.
         let (paused, least) = if round % 2 == 0 {
             (true, 0.1)
         } else {
@@ -59,7 +59,7 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
     }
 }
 
-/// More than a chunk, and cut at lengths that have nothing to do with those of the messages.
+/// More than a chunk, split at lengths that differ from those of the messages.
 #[test]
 fn a_flood_arrives_whole_and_in_order_in_every_spelling() {
     const AT_ONCE: u64 = 1000;
@@ -73,7 +73,7 @@ fn a_flood_arrives_whole_and_in_order_in_every_spelling() {
     publisher.send(&json!({"op": "advertise", "topic": "/flood"}));
     for first in (0..5000).step_by(AT_ONCE as usize) {
         let line = |n: u64| match n % 100 {
-            // Spelled so that it has to be read.
+            // Spelled so that it must be parsed.
             98 => format!(
                 "{{\"msg\": {{\"n\":{n}}}, \"topic\": \"/flood\", \"op\": \"publish\"}}\r\n"
             ),

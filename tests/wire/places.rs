@@ -44,7 +44,7 @@ fn diagnostics(address: SocketAddr) -> Output {
 
 #[cfg(all(feature = "web", feature = "cli"))]
 #[test]
-fn a_script_that_takes_all_places_leaves_the_kept_one_to_pages_and_commands() {
+fn a_script_that_takes_all_places_leaves_the_reserved_one_to_pages_and_commands() {
     use crate::web_client::get;
 
     let mut runtime = serving("8");
@@ -62,7 +62,7 @@ fn a_script_that_takes_all_places_leaves_the_kept_one_to_pages_and_commands() {
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let mut page = Client::web(address);
     page.settle();
-    // Now the kept place is taken too.
+    // Now the reserved place is taken too.
     let answer = get(address, "/");
     assert_eq!(answer.status, 503);
     assert_eq!(
@@ -125,7 +125,7 @@ fn one_place_and_two_are_served_too() {
 /// A client that has only stopped sending keeps its place for 15 s while its call waits.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_client_that_has_closed_its_socket_waits_for_no_answer() {
+fn a_client_that_has_closed_its_socket_gets_no_answer() {
     let runtime = serving("3");
     let mut provider = Client::to(runtime.address);
     provider.send(&json!({"op": "advertise_service", "service": "/silent", "type": "a/b"}));

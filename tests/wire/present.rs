@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 /// Half of the rate of `/joint_states`.
 const READS_A_SECOND: u32 = 30;
-/// How long it is read: without a bound it would be half as late at the end.
+/// The duration of the test. Without a bound the client would be late by half of it at the end.
 const TIME: Duration = Duration::from_secs(12);
 /// Buffers as small as a script's. Their content counts as read, because the runtime cannot see it.
 const BUFFER: usize = 4096;
@@ -38,7 +38,7 @@ fn frame(input: &mut impl Read) -> Vec<u8> {
     bytes(length)
 }
 
-/// Reads half of the messages, and gives how many milliseconds the last ones were behind at most.
+/// Reads half of the messages, and returns the longest delay of the last ones in milliseconds.
 fn lateness(mut client: Client, is_web: bool, queue_length: u32, newest: &AtomicU64) -> u64 {
     client
         .send(&json!({"op": "subscribe", "topic": "/joint_states", "queue_length": queue_length}));
@@ -93,6 +93,6 @@ fn a_client_that_reads_half_of_the_messages_is_a_second_late_at_most() {
         late.map(Result::unwrap)
     });
     println!("TCP, TCP and queue_length 1, WebSocket, WebSocket and queue_length 1: {late:?} ms");
-    // A second, and what a client's buffer and a busy machine add. Each would be three seconds late.
+    // A second, plus the delay of a client's buffer and of a busy machine. Without the bound it would be three seconds.
     assert!(late.iter().all(|late| *late < 1500), "{late:?} ms");
 }

@@ -1,6 +1,6 @@
 //! With more threads than cores, threads that work for one client have a lower priority than the arm and the gateway.
 //!
-//! **Invariant:** only Linux is asked, which has a priority for each thread.
+//! **Invariant:** it runs only on Linux, which has a priority for each thread.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::common::{PATIENCE, Runtime, stat};
 
-/// How far the program's threads step back behind others, by their names.
+/// The niceness of the program's threads, by their names.
 fn niceness(runtime: &Runtime) -> BTreeMap<String, i32> {
     let tasks = std::fs::read_dir(format!("/proc/{}/task", runtime.pid())).unwrap();
     tasks
@@ -22,10 +22,10 @@ fn niceness(runtime: &Runtime) -> BTreeMap<String, i32> {
 }
 
 #[test]
-fn who_works_for_one_client_gives_way_to_the_arm_and_the_gateway() {
+fn threads_that_work_for_one_client_have_lower_priority() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
-    // So long that it is read aside.
+    // So long that it is read on a worker thread.
     let id = "x".repeat(300_000);
     client.send(&json!({"op": "call_service", "service": "/arm_sim/pause", "args": {"id": id}}));
     assert_eq!(client.receive()["op"], "service_response");
@@ -42,13 +42,13 @@ fn who_works_for_one_client_gives_way_to_the_arm_and_the_gateway() {
     }
 }
 
-/// Whether the threads that work for one client are five steps behind the others, which are equal.
+/// Whether the threads that work for one client have a niceness of five more than the others, which are equal.
 fn is_as_it_must_be(niceness: &BTreeMap<String, i32>) -> bool {
     let for_all = niceness["pendularm"];
     let (for_one, others): (Vec<_>, Vec<_>) = niceness
         .iter()
         .partition(|(name, _)| name.starts_with("worker-") || name.starts_with("tokio-"));
-    // The scale ends there, should the tests step back themselves.
+    // The scale ends there, if the tests themselves have a high niceness.
     let behind = (for_all + 5).min(19);
     for_one.len() >= 2
         && for_one.iter().all(|(_, theirs)| **theirs == behind)

@@ -38,7 +38,7 @@ fn the_readmes_clients_have_six_lines_and_are_on_the_first_screen() {
 /// bring every setpoint to within 0.02 rad per joint.
 fn assert_moves_the_arm(language: &str, program: &str, arguments: &[&str]) {
     if Command::new(program).arg("--version").output().is_err() {
-        // A builder need not have it; the project's own checks install it.
+        // A user may not have it. The project's own checks install it.
         assert!(std::env::var_os("CI").is_none(), "{program} is missing");
         return;
     }

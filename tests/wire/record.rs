@@ -1,4 +1,4 @@
-//! Runs on record, by the built program: files that are whole, files that were left, and what is not written at all.
+//! Records of the built program: complete files, incomplete files, and missing ones.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ fn holds_call(file: &Path, args: &str) -> bool {
     })
 }
 
-/// The program with other arguments than serving: its exit status and what it says.
+/// The program with a command: its exit status and its output.
 pub(super) fn run(arguments: &[&str]) -> (Option<i32>, String) {
     let mut program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
     let output = program.args(arguments).output().unwrap();
@@ -204,7 +204,7 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
 }
 
 #[test]
-fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
+fn a_difference_is_reported_with_its_step_and_by_the_exit_status() {
     let file = folder("differs").join("run.mcap");
     let settings = RunSettings { links: 2, seed: 0 };
     let mut writer = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
@@ -216,7 +216,7 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
         client.message("/joint_states");
     }
     end(runtime);
-    // The same run, with another gravity at its beginning.
+    // The same run, with another gravity at its start.
     let mut write = |content| {
         let log_time = 0;
         writer.write(&RecordEntry { log_time, content }).unwrap();
@@ -252,7 +252,7 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
 }
 
 #[test]
-fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
+fn an_unusable_record_is_refused_with_the_files_name() {
     let folder = folder("refused");
     let there = folder.join("there.mcap");
     fs::write(&there, "precious").unwrap();

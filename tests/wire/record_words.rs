@@ -38,7 +38,7 @@ fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
 
 /// Hostile texts in a file: within a note, as a method, as an input, as a topic, as a file's name.
 #[test]
-fn words_of_a_record_are_escaped_and_cut() {
+fn texts_of_a_record_are_escaped_and_cut() {
     let folder = folder("\u{1b}[31m-\u{202e}crafted");
     let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);

@@ -1,6 +1,6 @@
-//! SIGINT and SIGTERM end the program within a second, and what waits is answered.
+//! SIGINT and SIGTERM end the program within a second, and waiting calls are answered.
 //!
-//! **Invariant:** nothing that a client does keeps the program from ending, with exit status 0.
+//! **Invariant:** the program ends with exit status 0 for any action of a client.
 
 use std::io::Write;
 use std::time::Duration;
@@ -49,7 +49,7 @@ fn a_signal_ends_an_idle_program_and_one_that_is_only_watched() {
 }
 
 #[test]
-fn goals_calls_and_computations_are_told_that_the_program_is_shutting_down() {
+fn goals_calls_and_computations_end_with_the_reason_at_shutdown() {
     let mut runtime = Runtime::start();
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));

@@ -18,7 +18,7 @@ fn lead(client: &mut Client, epoch: Instant) -> f64 {
 }
 
 #[test]
-fn simulation_time_runs_at_wall_time() {
+fn simulation_time_advances_with_wall_time() {
     in_one_of_three_tries("within 0.5 %", || {
         let runtime = Runtime::start();
         let mut client = runtime.connect();
@@ -37,7 +37,7 @@ fn simulation_time_runs_at_wall_time() {
 /// A microsecond is at the edge of what a machine can follow, and beyond it without optimisation: nothing is asserted of the
 /// rate, all of what else holds.
 #[test]
-fn a_step_of_a_microsecond_leaves_the_runtime_answering() {
+fn the_runtime_answers_at_a_timestep_of_a_microsecond() {
     for timestep in [1e-6, 1e-9, 1e-300] {
         let runtime = Runtime::with_links(3);
         let mut client = runtime.connect();
@@ -68,7 +68,7 @@ fn a_step_of_a_microsecond_leaves_the_runtime_answering() {
 /// than 25 s. While only wake-ups step, they take a second or two. There are several callers: on a busy machine a
 /// wake-up then has more than one call to answer.
 #[test]
-fn calls_to_an_arm_that_cannot_keep_up_do_not_each_cost_a_wake_up() {
+fn calls_to_a_slow_arm_share_wake_ups() {
     let runtime = Runtime::start();
     let mut callers: Vec<_> = (0..16).map(|_| runtime.connect()).collect();
     callers[0].ask("/arm_sim/set_integrator", json!({"timestep": 1e-8}));

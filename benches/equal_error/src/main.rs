@@ -19,11 +19,11 @@ use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::taylor::TaylorReference;
 
-/// How long the arm swings \[s\].
+/// Duration of the swing \[s\].
 const DURATION: f64 = 4.0;
 /// Angle \[rad\] and rate \[rad/s\] of every joint at the start.
 const START: (f64, f64) = (0.3, 0.2);
-/// For how long a run is repeated, and how often at least.
+/// Duration of the repetitions of a run, and their least number.
 const REPEATED: Duration = Duration::from_millis(20);
 const REPEATS: u32 = 3;
 /// A setting whose run takes longer ends a sweep \[s\].
@@ -63,7 +63,7 @@ fn reference<const N: usize>() {
     println!("{} {:e}", angles.join(" "), motion.uncertainty(DURATION));
 }
 
-/// A line for a setting: its error, and the shortest time of its runs. False if the sweep has come to its end.
+/// Prints the line of a setting: its error, and the shortest time of its runs. Returns false at the end of the sweep.
 fn line<const N: usize>(
     truth: &[f64],
     system: &str,
@@ -88,7 +88,7 @@ fn line<const N: usize>(
     shortest < LONGEST
 }
 
-/// Numbers of steps, each root two times the one before.
+/// Numbers of steps, each √2 times the previous one.
 fn steps() -> impl Iterator<Item = u64> {
     (10..46).map(|half| 2_f64.powf(f64::from(half) / 2.0).round() as u64)
 }
@@ -158,7 +158,7 @@ impl<const N: usize, const M: usize> System<f64, SVector<f64, M>> for FirstOrder
 fn ode_solvers<const N: usize, const M: usize>(truth: &[f64], arm: &Arm<N>) {
     let first = || SVector::<f64, M>::from_fn(|i, _| if i < N { START.0 } else { START.1 });
     let angles = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
-    // The two have the same functions and no trait in common.
+    // Both have the same functions, but no common trait.
     macro_rules! sweep {
         ($solver:ident, $name:literal) => {
             for tolerance in tolerances() {

@@ -1,4 +1,4 @@
-//! Aimed at the door: tokens, requests, the page and the report.
+//! Attacks on admission: tokens, requests, the page and the report.
 
 use std::time::Duration;
 

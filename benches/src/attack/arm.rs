@@ -1,4 +1,4 @@
-//! Aimed at the arm's thread: steps, settings, goals, trials.
+//! Attacks on the arm's thread: steps, settings, goals, trials.
 
 use super::Attack;
 use super::script::{Client, call, light, publish, subscribe};
@@ -78,7 +78,7 @@ fn long_steps() -> Vec<Client> {
     .concat()
 }
 
-/// Settings, each different from the one before: most ask for a new prediction, and masses for a new description.
+/// Settings, each different from the previous one. Most cause a new prediction, and masses a new description.
 fn commands() -> Vec<Client> {
     let command = |k: usize| {
         let one = 1.0 + k as f64 * 1e-3;
@@ -121,7 +121,7 @@ fn commands() -> Vec<Client> {
     [commander.times(10), watcher.times(200)].concat()
 }
 
-/// A goal at a place that the hand can reach, another each time, or the cancelling of one that there may be.
+/// A goal at a new reachable target each time, or the cancellation of a possible one.
 fn goal(k: usize) -> String {
     let (y, x) = (k as f64 * 0.37).sin_cos();
     let place = format!(

@@ -1,4 +1,4 @@
-//! Aimed at the pool: computations that are long, many, unread, or left behind.
+//! Attacks on the pool: computations that are long, many, unread, or abandoned.
 
 use super::Attack;
 use super::script::{Client, LONG, call};

@@ -1,9 +1,9 @@
-//! Aimed at the gateway's thread by numbers: hundreds of clients who all want a little at one instant.
+//! Attacks on the gateway's thread by numbers: hundreds of clients with light requests at the same time.
 
 use super::Attack;
 use super::script::{Client, MOST, call, each, on_service, publish, subscribe};
 
-/// Subscribers, or callers: with those who attack them, nearly all places.
+/// The number of subscribers or callers. Together with the attackers they take nearly all places.
 const CROWD: usize = 180;
 
 pub const ATTACKS: &[Attack] = &[
@@ -51,7 +51,7 @@ pub const ATTACKS: &[Attack] = &[
     ),
 ];
 
-/// A provider that answers nothing, and callers with timeouts of `patience` seconds. One connects each millisecond.
+/// A provider that does not answer, and callers with timeouts of `patience` seconds. One connects each millisecond.
 fn waiting(provider: Client, patience: impl Fn(usize) -> f64) -> Vec<Client> {
     let provider = provider.says(&on_service("advertise_service", "/crowd"));
     let callers = each(0..CROWD, |n| {

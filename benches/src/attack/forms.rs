@@ -1,5 +1,4 @@
-//! Aimed at the forms in which subscribers want messages: each form is made of the text for itself, and some are made
-//! by reading it.
+//! Attacks on encodings of messages: each requested form is encoded separately, and some need a parsed message.
 
 use std::time::Duration;
 
@@ -106,7 +105,7 @@ fn text(bytes: usize) -> String {
     format!(r#"{{"data":"{}"}}"#, filler(bytes))
 }
 
-/// 3 MB of one entry, which ends with a comma, behind the other.
+/// 3 MB of the same entry, which ends with a comma.
 fn many(field: &str, entry: &str) -> String {
     let entries = entry.repeat(3 * MIB / entry.len());
     format!(r#"{{"{field}":[{}]}}"#, entries.trim_end_matches(','))

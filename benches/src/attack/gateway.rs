@@ -1,11 +1,11 @@
-//! Aimed at the gateway's thread: work per connection, per short message, per complaint.
+//! Attacks on the gateway's thread: work per connection, per short message, per error.
 
 use std::time::Duration;
 
 use super::Attack;
 use super::script::{Client, light, subscribe};
 
-/// A light call that goes to the arm.
+/// A light call to the arm.
 const PAUSE: &str = "/arm_sim/pause";
 
 pub const ATTACKS: &[Attack] = &[
@@ -73,7 +73,7 @@ pub const ATTACKS: &[Attack] = &[
             [asks.deaf().times(200), returns].concat()
         },
     )
-    // Each holds its place for 15 s after it has stopped.
+    // Each keeps its place for 15 s after it has stopped sending.
     .fills(),
     Attack::new(
         "byte-per-second",

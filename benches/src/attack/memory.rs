@@ -1,5 +1,4 @@
-//! Aimed at memory: messages that wait for a client that does not read, messages held back, and messages
-//! that are begun and not ended.
+//! Attacks on memory: messages for clients that do not read, throttled messages, and unfinished messages.
 
 use super::Attack;
 use super::script::{Client, LONG, MIB, call, each, filler, light, publish, subscribe};
@@ -159,7 +158,7 @@ fn deaf_topics() -> Vec<Client> {
     deaf_publishers(MIB, Client::repeats)
 }
 
-/// Clients who read nothing of what they publish to themselves in this way.
+/// Clients that publish to themselves in this way and read nothing.
 fn deaf_publishers(bytes: usize, publishes: fn(Client, &str) -> Client) -> Vec<Client> {
     let msg = format!(r#"{{"data":"{}"}}"#, filler(bytes));
     each(0..200, |k| {

@@ -1,9 +1,9 @@
 //! Attacks of hostile clients, each for a few seconds, at one address of loopback.
 //!
-//! An attack is a list of [clients](script::Client) and a sentence that says what they do; [`stage`] plays it. So
-//! `make attack` measures what a healthy client has of it, and `make soak` lets them come among all others.
+//! An attack is a list of [clients](script::Client) and a description. [`stage`] plays it. So `make attack` measures
+//! its effect on a healthy client, and `make soak` mixes attacks.
 //!
-//! **Invariant:** no attack needs anything but sockets, and each is bounded in connections, bytes at once, and time.
+//! **Invariant:** an attack needs only sockets, and is bounded in connections, bytes at once, and time.
 
 pub mod admission;
 pub mod arm;
@@ -20,7 +20,7 @@ pub mod websocket;
 
 use script::Client;
 
-/// The token that every client has to show where one is asked for.
+/// The token that every client sends if the server requires one.
 pub const TOKEN: &str = "a-token-that-nobody-guesses-0123456789";
 
 /// An attack.
@@ -34,16 +34,16 @@ pub struct Attack {
     pub cast: fn() -> Vec<Client>,
     /// The arguments that the program is started with.
     pub options: &'static [&'static str],
-    /// Asks for the token, and starts the program with it.
+    /// Whether the program is started with the token.
     pub locked: bool,
-    /// All places are taken, as the limits allow: newcomers may be turned away.
+    /// All places are taken, as the limits allow, so new clients may be refused.
     pub fills: bool,
     /// Moves the arm or changes its settings.
     pub moves: bool,
 }
 
 impl Attack {
-    /// An attack on a program as it is by default.
+    /// An attack on a program with default options.
     pub const fn new(name: &'static str, what: &'static str, cast: fn() -> Vec<Client>) -> Self {
         Self {
             name,
@@ -61,7 +61,7 @@ impl Attack {
         Self { options, ..self }
     }
 
-    /// On a program that asks for the token.
+    /// An attack on a program that requires the token.
     pub const fn locked(self) -> Self {
         Self {
             locked: true,
@@ -86,12 +86,12 @@ impl Attack {
     }
 }
 
-/// Whether a name is picked by `words`: it contains one of them, or there are none.
+/// Whether `words` select a name: it contains one of them, or there are none.
 pub fn picks(words: &str, name: &str) -> bool {
     words.is_empty() || words.split(',').any(|word| name.contains(word))
 }
 
-/// All attacks, by what they are aimed at.
+/// All attacks, by their target.
 pub fn groups() -> [(&'static str, &'static [Attack]); 10] {
     [
         ("gateway", gateway::ATTACKS),

@@ -1,4 +1,4 @@
-//! Aimed at the registry: names, providers, calls that wait, lists of what there is.
+//! Attacks on the registry: names, providers, waiting calls, lists of names.
 
 use super::Attack;
 use super::script::{

@@ -1,4 +1,4 @@
-//! Aimed at how frames are read: names, numbers and pieces that take long for what they are, and much of it at once.
+//! Attacks on the reading of frames: names, numbers and pieces that are expensive to read, and many of them at once.
 
 use std::time::Duration;
 
@@ -134,7 +134,7 @@ pub const ATTACKS: &[Attack] = &[
         "10 clients send fragments of fragments of fragments",
         || {
             let mut piece = light("/arm_sim/pause");
-            // Each layer doubles the escapes; six come to some 20 KB.
+            // Each layer doubles the escapes. Six layers make some 20 KB.
             for _ in 0..6 {
                 let data = piece.replace('\\', r"\\").replace('"', "\\\"");
                 piece =
@@ -147,7 +147,7 @@ pub const ATTACKS: &[Attack] = &[
         "last-pieces",
         "40 clients send messages of 4 MB in pieces of 64 KB",
         || {
-            // The pieces make a text that is no frame, read to its end.
+            // The joined pieces are no frame, but are read to the end.
             let piece = |num: usize| {
                 let begin = if num == 0 { r#"{\"x\":\""# } else { "" };
                 let data = filler(64_000);

@@ -10,20 +10,19 @@ use pendularm_client::websocket::{LAST, append, opcode};
 
 pub const KIB: usize = 1024;
 pub const MIB: usize = 1024 * KIB;
-/// A frame of almost the length that is taken.
+/// A frame of almost the longest accepted length.
 pub const LONG: usize = 4 * MIB - KIB;
-/// Registrations, or waiting calls, with names of up to 13 bytes that one client may have; a few less than there is
-/// room for.
+/// Almost the largest number of registrations, or waiting calls, of one client with names of up to 13 bytes.
 pub const MOST: usize = 180;
 
 /// The first bytes of a client.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Door {
-    /// Nothing: lines, or whatever it says.
+    /// Nothing: lines, or any bytes of the script.
     Tcp,
     /// The handshake of a WebSocket; its later texts follow as messages.
     Web,
-    /// A request line; the stage adds the line `Host:`, and the client says the rest.
+    /// A request line. The stage adds the line `Host:`, and the client sends the rest.
     Http(String),
 }
 
@@ -32,11 +31,11 @@ pub enum Door {
 pub enum Ear {
     /// Nothing, ever.
     Deaf,
-    /// All that comes, thrown away.
+    /// All bytes, and discards them.
     Reads,
     /// This many bytes every 100 ms.
     Sips(usize),
-    /// Lines; the function's result for each goes back.
+    /// Lines, and sends the function's result for each.
     Replies(fn(&str) -> Option<Vec<u8>>),
 }
 
@@ -53,7 +52,7 @@ pub enum Exit {
     Halves,
 }
 
-/// One client. Built by chained methods, so that an attack reads as a list of what its clients do.
+/// One client. It is built by chained methods, so an attack is a list of its clients' actions.
 #[derive(Clone)]
 pub struct Client {
     pub(super) door: Door,
@@ -68,12 +67,12 @@ pub struct Client {
     pub(super) after: Duration,
     /// How it goes once `first` is sent, and how long after that.
     pub(super) exit: (Exit, Duration),
-    /// Comes back whenever its connection has ended.
+    /// Reconnects whenever its connection has ended.
     pub(super) returns: bool,
 }
 
 impl Client {
-    /// A client that connects, is silent, and reads what comes.
+    /// A client that connects, sends nothing, and reads everything.
     fn through(door: Door) -> Self {
         Self {
             door,
@@ -97,18 +96,18 @@ impl Client {
         Self::through(Door::Web)
     }
 
-    /// With an HTTP request of that method and target; the end of its head has to be said.
+    /// With an HTTP request of that method and target. The script must send the end of the head.
     pub fn http(request: &str) -> Self {
         Self::through(Door::Http(format!("{request} HTTP/1.1\r\n")))
     }
 
-    /// Says a frame once.
+    /// Sends a frame once.
     pub fn says(self, frame: &str) -> Self {
         let bytes = self.framed(frame);
         self.says_bytes(&bytes)
     }
 
-    /// Says a frame once for each number.
+    /// Sends a frame once for each number.
     pub fn says_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
         let bytes: Vec<u8> = numbers
             .flat_map(|number| self.framed(&frame(number)))
@@ -116,7 +115,7 @@ impl Client {
         self.says_bytes(&bytes)
     }
 
-    /// Says bytes once, as they are.
+    /// Sends bytes once, unchanged.
     pub fn says_bytes(mut self, bytes: &[u8]) -> Self {
         Arc::make_mut(&mut self.first).extend(bytes);
         self
@@ -127,13 +126,13 @@ impl Client {
         self.says(&on_topic("advertise", topic))
     }
 
-    /// Says a frame over and over, behind whatever is repeated already.
+    /// Sends a frame repeatedly, after the frames that are already repeated.
     pub fn repeats(self, frame: &str) -> Self {
         let bytes = self.framed(frame);
         self.repeats_bytes(&bytes)
     }
 
-    /// Says a frame for each number, and begins again.
+    /// Sends a frame for each number, and begins again.
     pub fn repeats_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
         let bytes: Vec<u8> = numbers
             .flat_map(|number| self.framed(&frame(number)))
@@ -141,7 +140,7 @@ impl Client {
         self.repeats_bytes(&bytes)
     }
 
-    /// Says bytes over and over.
+    /// Sends bytes repeatedly.
     pub fn repeats_bytes(mut self, bytes: &[u8]) -> Self {
         self.again = [&self.again, bytes].concat().into();
         self
@@ -172,7 +171,7 @@ impl Client {
         self
     }
 
-    /// Answers lines; for a client that repeats nothing, lest an answer comes in the middle of a frame.
+    /// Answers lines. Only for a client that repeats nothing, so no answer interrupts a frame.
     pub fn replies(mut self, reply: fn(&str) -> Option<Vec<u8>>) -> Self {
         self.ear = Ear::Replies(reply);
         self
@@ -196,13 +195,13 @@ impl Client {
         self
     }
 
-    /// Stops sending when it has said all, and stays.
+    /// Stops sending after its last bytes, and stays connected.
     pub fn half_closes(mut self) -> Self {
         self.exit = (Exit::Halves, Duration::ZERO);
         self
     }
 
-    /// Comes back whenever its connection has ended.
+    /// Reconnects whenever its connection has ended.
     pub fn returns(mut self) -> Self {
         self.returns = true;
         self
@@ -264,7 +263,7 @@ pub fn on_service(op: &str, service: &str) -> String {
     format!(r#"{{"op":"{op}","service":"{service}"}}"#)
 }
 
-/// Two numbers that are slow to convert: twenty digits astride a halfway point.
+/// Two numbers that are slow to convert: twenty digits near the middle between two doubles.
 pub const SLOW: &str = "10000000000000001268e281,10000000000000001268e281";
 
 /// A string of `bytes` bytes, without its quotes.

@@ -16,7 +16,7 @@ use pendularm_client::websocket;
 
 /// Bytes that one client may send or read before it is another's turn.
 const TURN: usize = 256 * 1024;
-/// How often drips, sips and times to connect are looked at.
+/// Interval of the checks for slow sending, slow reading and due connections.
 const SWEEP: Duration = Duration::from_millis(5);
 /// Bytes of replies that wait to be sent before more is read.
 const REPLIES: usize = 8 * 1024 * 1024;
@@ -44,9 +44,9 @@ struct Player<'a> {
     opening: Vec<u8>,
     /// Bytes sent of the opening and of the part that is sent once.
     said: usize,
-    /// Position in the bytes that are said over and over.
+    /// Position in the repeated bytes.
     at: usize,
-    /// Bytes that it may still send until the next drip.
+    /// Bytes that it may still send in this interval.
     allowance: usize,
     replies: VecDeque<u8>,
     /// Input that is not replied to.
@@ -61,7 +61,7 @@ struct Player<'a> {
     due: Option<Instant>,
 }
 
-/// Plays the clients until `over`; connections end then.
+/// Plays the clients until `over`. Then the connections end.
 pub fn play(cast: &[Client], address: SocketAddr, deeds: &Deeds, over: impl Fn() -> bool) {
     let began = Instant::now();
     let (Ok(mut poll), mut events) = (Poll::new(), Events::with_capacity(1024)) else {
@@ -213,13 +213,13 @@ impl<'a> Player<'a> {
         more && self.stream.is_some()
     }
 
-    /// Closes; a client that returns is due again.
+    /// Closes. A client that reconnects is due again.
     fn end(&mut self, now: Instant) {
         self.stream = None;
         self.due = self.client.returns.then_some(now + RETURN);
     }
 
-    /// Reads and sends a while; whether it can go on at once.
+    /// Reads and sends for a while. Returns whether it can continue at once.
     fn turn(&mut self, chunk: &mut [u8], deeds: &Deeds) -> bool {
         if self.stream.is_none() {
             return false;
@@ -238,7 +238,7 @@ impl<'a> Player<'a> {
         self.stream.is_some() && (read_more || self.writable && budget == 0)
     }
 
-    /// Reads as its ear has it; whether there may be more.
+    /// Reads by its script. Returns whether there may be more.
     fn read(&mut self, chunk: &mut [u8], deeds: &Deeds) -> bool {
         let (awake, most) = match self.client.ear {
             Ear::Deaf => (false, 0),
@@ -267,7 +267,7 @@ impl<'a> Player<'a> {
         false
     }
 
-    /// Replies to lines that have come, as long as not too many replies wait; whether lines are left.
+    /// Replies to received lines, unless too many replies wait. Returns whether lines are left.
     fn reply(&mut self, reply: fn(&str) -> Option<Vec<u8>>) -> bool {
         while let Some(end) = self.unread.iter().position(|byte| *byte == b'\n') {
             if self.replies.len() > REPLIES {

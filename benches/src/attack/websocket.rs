@@ -1,4 +1,4 @@
-//! Aimed at what WebSocket adds: pings, fragments of messages, masks, closes.
+//! Attacks on WebSocket: pings, fragments of messages, masks, closes.
 
 use super::Attack;
 use super::script::{Client, LONG, light, publish, web_frame};

@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release --bin estimate -- LINKS COUNT`
 //!
-//! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. A program of its own:
-//! where estimates are compiled beside steps, the compiler shares code between them and a step takes up to 3 % more.
+//! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. It is its own
+//! program. Compiled together with steps, estimates would share code with them, and a step would take up to 3 % more.
 
 use std::hint::black_box;
 

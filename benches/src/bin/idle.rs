@@ -1,4 +1,4 @@
-//! The cost of the idle runtime, and how well its clock keeps: processor, memory, simulation time against wall time.
+//! The cost of the idle runtime, and the accuracy of its clock: processor, memory, simulation time against wall time.
 //!
 //! `cargo run --release --bin idle -- PATH/TO/pendularm [SECONDS]`
 //!
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use pendularm_benches::program::{Program, processor, resident};
 use pendularm_client::blocking::Client;
 
-/// Simulation time as `/clock` has it now \[s\], and when it came.
+/// Simulation time on `/clock` \[s\], and the time of its arrival.
 fn simulation_time(address: SocketAddr) -> (f64, Instant) {
     let mut client = Client::to(address);
     client.subscribe("/clock");

@@ -1,8 +1,9 @@
-//! A soak: attacks picked at random, several at a time, for minutes, beside healthy clients.
+//! A soak test: random attacks, several at a time, for minutes, with healthy clients.
 //!
-//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (parts of names of attacks, between commas; all) in the environment.
-//! Attacks come in tides. After each tide there is an ebb with the healthy clients alone, at which the program must have let go of
-//! descriptors and threads. Its memory is compared from ebb to ebb. Exit status 1 if a bar is missed. Linux only.
+//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (parts of names of attacks, between commas; all) in
+//! the environment. Attacks alternate with pauses. In each pause there are only the healthy clients, and the program
+//! must have released descriptors and threads. Its memory is compared between pauses. Exit status 1 if a bar is missed.
+//! Linux only.
 //!
 //! Bounded: at most [`AT_ONCE`] attackers at once, so that the default places suffice for healthy clients.
 
@@ -21,16 +22,17 @@ const TIDE: Duration = Duration::from_secs(40);
 const AT_ONCE: usize = 112;
 /// Longest time until a call or a newcomer counts as not answered. It is far beyond any answer's own limit.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// How long the program has to let go: half-open clients get their answers for up to 15 s, and computations go on.
+/// Longest time until the program has released its resources. Half-open clients get their answers for up to 15 s, and
+/// computations continue.
 const LET_GO: Duration = Duration::from_secs(60);
-/// How long the ebb lasts before memory is read.
+/// Length of a pause before memory is read.
 const QUIET: Duration = Duration::from_secs(13);
-/// Descriptors that the first subscriber has the program open for good, to ask Linux how much a client has not read.
+/// Descriptors that the program opens for its first subscriber and keeps, to query the unread bytes of clients.
 const OPENED_ONCE: usize = 1;
 /// Bound of the memory at any time, as in `make attack` \[MB\].
 const PEAK: f64 = 700.0;
-/// Growth of the memory from the ebb after the first third to the last \[MB\]. Before that the heap grows to the size of the busiest
-/// moment.
+/// Growth of the memory from the pause after the first third to the last \[MB\]. Before that the heap grows to the size
+/// of the busiest moment.
 const GROWTH: f64 = 8.0;
 
 fn main() -> ExitCode {
@@ -63,7 +65,7 @@ fn variable<T: std::str::FromStr>(name: &str, default: T) -> Option<T> {
     }
 }
 
-/// Plays the whole soak; whether everything held.
+/// Plays the whole soak test. Returns whether every bar was met.
 fn soak(path: &str, time: Duration, seed: u64) -> Result<bool, String> {
     let attacks = attacks()?;
     let gone = || "the program is gone".to_owned();
@@ -151,7 +153,8 @@ fn soak(path: &str, time: Duration, seed: u64) -> Result<bool, String> {
     Ok(bars.missed == 0)
 }
 
-/// Attacks on a program as it is by default, which leave the arm's clock and settings alone and do not take all places.
+/// Attacks on a program with default options that do not change the arm's clock and settings, and do not take all
+/// places.
 fn attacks() -> Result<Vec<Attack>, String> {
     let only = std::env::var("ONLY").unwrap_or_default();
     let fits = |attack: &&Attack| {
@@ -170,7 +173,7 @@ fn attacks() -> Result<Vec<Attack>, String> {
     Ok(all)
 }
 
-/// Attacks for so long, one to four at a time.
+/// Attacks for this time, one to four at once.
 fn flood(
     attacks: &[Attack],
     address: std::net::SocketAddr,
@@ -185,7 +188,7 @@ fn flood(
         for _ in 0..count {
             let attack = attacks[rng.usize(..attacks.len())];
             let clients = (attack.cast)();
-            // The deaf come first in an attack, those that flood last.
+            // In an attack, clients that do not read come first, and those that flood come last.
             cast.extend_from_slice(&clients[clients.len().saturating_sub(AT_ONCE / count)..]);
         }
         let over = (Instant::now() + Duration::from_millis(rng.u64(500..4000))).min(ends);
@@ -193,7 +196,7 @@ fn flood(
     }
 }
 
-/// The program once descriptors and threads are back to `held`, or after [`LET_GO`]; none once it is gone.
+/// The state of the program when descriptors and threads are back to `held`, or after [`LET_GO`]. None if it has ended.
 fn settled(pid: u32, held: Vitals) -> Option<Vitals> {
     let deadline = Instant::now() + LET_GO;
     loop {

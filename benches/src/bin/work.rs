@@ -15,7 +15,7 @@ use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
 use pendularm_benches::step_scene::{ready, undamped};
 
-// A function of its own, so that the counts of the arm's code are found by its name however much is inlined into it.
+// A separate function, so its name identifies the counts of the arm's code, for any inlining.
 #[inline(never)]
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where

@@ -92,7 +92,7 @@ impl Session {
                 self.player(client).client.send(&frame, 0);
             }
         }
-        // A client's next frame is read after its answer, so they arrive one after the other.
+        // A client's next frame is read after the answer, so the answers arrive in order.
         for _ in 0..2 * CLIENTS {
             self.pass(Duration::from_millis(5)).await;
             for &client in &left {

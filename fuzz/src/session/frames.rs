@@ -1,4 +1,4 @@
-//! Frames that are sent for a deed, noted where an answer is owed.
+//! The frames of an action, recorded if they require an answer.
 
 use super::*;
 
@@ -19,12 +19,12 @@ impl Session {
         }
     }
 
-    /// Anything, up to the end of a line or message: later input is read as ever.
+    /// Any bytes, up to the end of a line or message. Later input is read normally.
     pub(super) fn send_garbage(&mut self, client: u8, bytes: &[u8]) {
         let door = self.door;
         let player = self.player(client);
         let text = String::from_utf8_lossy(bytes);
-        // It may change what statuses, fragments or calls there are; that is not to be told from here.
+        // It may change statuses, fragments or calls in ways that the model does not predict.
         let meddles = ["call", "fragment", "piece", "\\u"]
             .iter()
             .any(|word| text.contains(word));
@@ -41,7 +41,7 @@ impl Session {
         }
     }
 
-    /// The text of a frame, noted if an answer is owed for it.
+    /// The text of a frame, recorded if it requires an answer.
     pub(super) fn frame(&mut self, client: u8, deed: &Deed<'_>) -> Option<String> {
         let place = u64::from(client) % CLIENTS as u64;
         Some(match deed {
@@ -163,7 +163,7 @@ impl Session {
         frame + "}"
     }
 
-    /// A provider's answer to a call, noted.
+    /// A provider's answer to a call, recorded.
     pub(super) fn response(
         &self,
         call: &(String, String, String),

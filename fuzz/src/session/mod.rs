@@ -43,8 +43,8 @@ use text::{TOPICS, VALUES, fitting, put, quoted, service_name, service_of, topic
 /// Most steps of one execution, and its number of clients.
 const MAX_STEPS: usize = 48;
 const CLIENTS: usize = 3;
-/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time. An arm of tiny
-/// timesteps computes for five milliseconds of the processor's in every one.
+/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time. An arm with tiny
+/// timesteps uses five milliseconds of processor time in each.
 const ARM_TIME: u16 = 200;
 const ARM_WAIT: u16 = 48;
 /// Longest timeout of a call. Every call is answered by then.
@@ -98,10 +98,10 @@ struct Session {
     players: Vec<Player>,
     /// Milliseconds left of [`ARM_TIME`].
     left: u16,
-    /// Calls and messages so far: their numbers tell them apart.
+    /// The number of calls and messages so far, which identifies each of them.
     calls: u64,
     messages: u64,
-    /// All that clients say, for all to look up.
+    /// All sent frames, shared by all clients.
     book: Rc<RefCell<Book>>,
     is_scarce: bool,
 }
@@ -111,7 +111,7 @@ struct Player {
     client: Client,
     /// How often each of its calls was answered.
     answered: BTreeMap<String, u32>,
-    /// Calls that came for it as a provider: id, service, and the caller's own id.
+    /// Calls that it received as a provider: id, service, and the caller's own id.
     forwarded: Vec<(String, String, String)>,
     /// The messages that it received in the end, with their senders.
     last: Vec<(u64, u64)>,
@@ -123,7 +123,7 @@ struct Player {
     /// It has broken a rule or disconnected, so nothing is expected for it, and the runtime may end it.
     is_excused: bool,
     has_ended: bool,
-    /// How long it has not been reading, in a row.
+    /// The time since it last read.
     idle: Duration,
 }
 
@@ -155,7 +155,7 @@ impl Session {
             usize::from(piece)
         };
         let client = Client::new(self.door, self.stage.connect(room), piece);
-        // So that nothing that follows opens like another protocol.
+        // So later bytes cannot begin like another protocol.
         client.send("{\"op\":\"set_level\",\"level\":\"info\"}", 0);
         Player::new(client, Rc::clone(&self.book))
     }
@@ -193,7 +193,7 @@ impl Session {
             Step::Noise { client, bytes } => {
                 let door = self.door;
                 let player = self.player(*client);
-                // A line that is not ended would swallow what follows, and a frame may be a close frame.
+                // An unfinished line would contain the next frame, and a frame may be a close frame.
                 player.is_excused = true;
                 player.note_forgery(bytes);
                 player.client.send_bytes(bytes.to_vec());
@@ -262,7 +262,7 @@ impl Session {
                 }
             }
             self.hear();
-            // A client that reads again has taken all there was by now, and given its signs of life: it has not stalled.
+            // A client that reads again has now read everything and answered pings, so it has not stalled.
             for player in &mut self.players {
                 if !player.client.is_paused() {
                     player.idle = Duration::ZERO;
@@ -271,7 +271,7 @@ impl Session {
         }
     }
 
-    /// Looks at all that came.
+    /// Checks all received frames.
     fn hear(&mut self) {
         for player in &mut self.players {
             for received in player.client.take() {

@@ -122,7 +122,7 @@ impl Player {
         }
     }
 
-    /// Notes bytes that may be a message, a call or an answer that is in no book.
+    /// Records that bytes may contain a message, a call or an answer that the model does not know.
     pub(super) fn note_forgery(&self, bytes: &[u8]) {
         let text = String::from_utf8_lossy(bytes);
         let words = ["publish", "service", "fragment", "\\u"];

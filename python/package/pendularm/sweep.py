@@ -134,7 +134,7 @@ def sweep(
     links: int = 2,
     duration: float = 4.0,
     samples: int = 401,
-    servo: bool = True,
+    controller: bool = True,
     executor: Executor | None = None,
     folder: str | os.PathLike[str] | None = None,
     piece: int | None = None,
@@ -146,7 +146,7 @@ def sweep(
     Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
     `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s],
     `method`, `control_period` [s] and `control_delay`. `grid` has a sequence for each setting that varies. Others are
-    keyword arguments, and a missing one has the value of a fresh runtime. Without `servo` the controller is off.
+    keyword arguments, and a missing one has the value of a fresh runtime. Without `controller` the controller is off.
     Every run lasts `duration` [s], rounded to the nearest number of timesteps, at least one. It has `samples`,
     including start and end.
 
@@ -207,7 +207,7 @@ def sweep(
         links=links,
         duration=duration,
         samples=samples,
-        servo=flag("servo", servo),
+        controller=flag("controller", controller),
     )
     question.check()
     kept = None
@@ -261,7 +261,7 @@ class _Question:
     links: int
     duration: float
     samples: int
-    servo: bool
+    controller: bool
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -295,7 +295,7 @@ class _Question:
             "links": self.links,
             "duration": self.duration,
             "samples": self.samples,
-            "servo": self.servo,
+            "controller": self.controller,
         }
 
 
@@ -323,7 +323,7 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
     settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
     batch = begin(settings, arms, question.links)
-    batch.enable(question.servo)
+    batch.enable(question.controller)
     timestep = settings.get("timestep", np.full(arms, TIMESTEP))
     shape = (question.samples, arms, question.links)
     positions, velocities, efforts = np.empty(shape), np.empty(shape), np.empty(shape)

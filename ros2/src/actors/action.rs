@@ -18,7 +18,7 @@ use super::gateway::Gateway;
 use super::goals::{Goal, GoalId, GoalTable, Stamp};
 use super::inlet::{Inlet, Request};
 use super::outlet::Outlet;
-use super::{Cancel, GoalEvent, GoalUpdate, Leave, MAILBOX, Pursue};
+use super::{Cancel, ForwardGoal, GoalEvent, GoalUpdate, Leave, MAILBOX};
 use crate::convention::EndpointKind;
 use crate::convention::hash::type_hash;
 use crate::interfaces::{ActionInterface, ServiceInterface, cancel_goal};
@@ -124,13 +124,13 @@ impl ActionBridge {
             // The id exists already, or there are too many goals.
             return self.tell_acceptance(request, false, Stamp::now());
         }
-        let pursue = Pursue {
+        let forwarded = ForwardGoal {
             action: self.action,
             id: id.text(),
             goal,
             to: ctx.address().recipient(),
         };
-        let sent = self.gateway.send(pursue).into_actor(self);
+        let sent = self.gateway.send(forwarded).into_actor(self);
         let sent = sent.map(move |sent, bridge, _| {
             let why = match sent {
                 Ok(Ok(())) => return,

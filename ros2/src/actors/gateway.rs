@@ -9,10 +9,10 @@ use actix::prelude::*;
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};
 
-use super::link::{self, Came, Ended};
+use super::link::{self, Ended, FrameReceived};
 use super::{
-    Answer, ArmMessage, ArmPresence, CallArm, Cancel, GoalEvent, GoalUpdate, Listen, MAILBOX,
-    PublishToArm, Pursue,
+    Answer, ArmMessage, ArmPresence, CallArm, Cancel, ForwardGoal, GoalEvent, GoalUpdate, Listen,
+    MAILBOX, PublishToArm,
 };
 use crate::report::{self, Repeated};
 
@@ -33,7 +33,7 @@ pub struct Gateway {
     calls: HashMap<u64, oneshot::Sender<Result<Answer, String>>>,
     last_call: u64,
     goals: HashMap<String, Recipient<GoalUpdate>>,
-    complaint: Repeated,
+    warning: Repeated,
 }
 
 impl Gateway {
@@ -50,7 +50,7 @@ impl Gateway {
             calls: HashMap::new(),
             last_call: 0,
             goals: HashMap::new(),
-            complaint: Repeated::default(),
+            warning: Repeated::default(),
         }
     }
 
@@ -68,12 +68,12 @@ impl Gateway {
             .map(|opened, gateway, ctx| match opened {
                 Ok(outgoing) => {
                     gateway.outgoing = Some(outgoing);
-                    gateway.complaint.clear();
+                    gateway.warning.clear();
                     gateway.graph.do_send(ArmPresence::Here);
                 }
                 Err(why) => {
                     let line = format!("no arm at {} yet: {why}", gateway.address);
-                    gateway.complaint.say(line);
+                    gateway.warning.say(line);
                     ctx.run_later(RETRY, Self::connect);
                 }
             });
@@ -135,10 +135,10 @@ impl Actor for Gateway {
     }
 }
 
-impl Handler<Came> for Gateway {
+impl Handler<FrameReceived> for Gateway {
     type Result = ();
 
-    fn handle(&mut self, Came { link, mut frame }: Came, _: &mut Self::Context) {
+    fn handle(&mut self, FrameReceived { link, mut frame }: FrameReceived, _: &mut Self::Context) {
         if link != self.link {
             return;
         }
@@ -210,16 +210,16 @@ impl Handler<PublishToArm> for Gateway {
     }
 }
 
-impl Handler<Pursue> for Gateway {
+impl Handler<ForwardGoal> for Gateway {
     type Result = Result<(), String>;
 
-    fn handle(&mut self, pursue: Pursue, _: &mut Self::Context) -> Self::Result {
-        let Pursue {
+    fn handle(&mut self, forwarded: ForwardGoal, _: &mut Self::Context) -> Self::Result {
+        let ForwardGoal {
             action,
             id,
             goal,
             to,
-        } = pursue;
+        } = forwarded;
         let (name, kind) = (action.name(), action.type_name());
         self.write(
             &json!({"op": "send_action_goal", "id": id, "action": name, "action_type": kind,

@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_goal_is_accepted_once_and_its_end_is_told_to_all_who_wait() {
+    fn a_goal_is_accepted_once_and_its_end_is_sent_to_all_waiting_clients() {
         let mut goals = GoalTable::default();
         goals.begin(id(1), 'a').unwrap();
         assert_eq!(goals.begin(id(1), 'b'), Err('b'), "that id is taken");
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_forgotten_when_the_arm_goes() {
+    fn no_waiting_call_is_lost_when_the_arm_disconnects() {
         let mut goals = running(1);
         goals.begin(id(2), 20).unwrap();
         goals.wait(id(1), 10).unwrap();

@@ -44,13 +44,13 @@ pub struct GraphBridge {
     bridges: Vec<Recipient<Leave>>,
     /// The last used number of an endpoint. No number is reused, because its endpoint may still be closing.
     last_endpoint: usize,
-    complaint: Repeated,
+    warning: Repeated,
 }
 
 /// The router has connected or disconnected.
 #[derive(Message)]
 #[rtype(result = "()")]
-struct RouterNews {
+struct RouterChanged {
     is_here: bool,
 }
 
@@ -83,7 +83,7 @@ impl GraphBridge {
             bridges: Vec::new(),
             // After the numbers of the nodes.
             last_endpoint: Node::ALL.len(),
-            complaint: Repeated::default(),
+            warning: Repeated::default(),
         }
     }
 
@@ -104,7 +104,7 @@ impl GraphBridge {
                 Ok(Ok(session)) => graph.opened(session),
                 Ok(Err(_)) | Err(_) => {
                     let router = &graph.options.router;
-                    graph.complaint.say(format!("no router at {router} yet"));
+                    graph.warning.say(format!("no router at {router} yet"));
                     ctx.run_later(RETRY, Self::open);
                 }
             };
@@ -234,10 +234,10 @@ impl Handler<ArmPresence> for GraphBridge {
     }
 }
 
-impl Handler<RouterNews> for GraphBridge {
+impl Handler<RouterChanged> for GraphBridge {
     type Result = ();
 
-    fn handle(&mut self, RouterNews { is_here }: RouterNews, _: &mut Self::Context) {
+    fn handle(&mut self, RouterChanged { is_here }: RouterChanged, _: &mut Self::Context) {
         let router = &self.options.router;
         // Zenoh reconnects by itself, and declares everything again.
         if is_here {
@@ -250,12 +250,12 @@ impl Handler<RouterNews> for GraphBridge {
 
 /// Opens a session, and reports when the router connects and disconnects. Zenoh blocks here, which is not allowed on a
 /// thread of an asynchronous runtime.
-fn open_session(config: Config, news: Recipient<RouterNews>) -> zenoh::Result<Session> {
+fn open_session(config: Config, news: Recipient<RouterChanged>) -> zenoh::Result<Session> {
     let session = zenoh::open(config).wait()?;
     let info = session.info();
     let listener = info.transport_events_listener().history(true);
     let tell = move |event: TransportEvent| {
-        news.do_send(RouterNews {
+        news.do_send(RouterChanged {
             is_here: event.kind() == SampleKind::Put,
         });
     };

@@ -30,7 +30,7 @@ const GREETING: &str = "pendularm-ros2";
 /// A received frame.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub(super) struct Came {
+pub(super) struct FrameReceived {
     /// Its connection.
     pub(super) link: u64,
     /// The frame.
@@ -47,13 +47,13 @@ pub(super) struct Ended {
     pub(super) why: String,
 }
 
-/// Connects and authenticates. From then on every frame is passed to `came`, and the end to `ended`. Lines in the
+/// Connects and authenticates. From then on every frame is passed to `received`, and the end to `ended`. Lines in the
 /// channel are written.
 pub(super) async fn open(
     link: u64,
     address: String,
     token: Option<String>,
-    came: Recipient<Came>,
+    received: Recipient<FrameReceived>,
     ended: Recipient<Ended>,
 ) -> Result<mpsc::Sender<String>, String> {
     let connecting = async {
@@ -73,7 +73,7 @@ pub(super) async fn open(
     let (sender, receiver) = mpsc::channel(QUEUE);
     actix_rt::spawn(write(writer, receiver));
     actix_rt::spawn(async move {
-        let why = read(link, reader, &came).await;
+        let why = read(link, reader, &received).await;
         ended.do_send(Ended { link, why });
     });
     Ok(sender)
@@ -108,14 +108,18 @@ async fn greet(
 }
 
 /// Passes on frames, and returns the reason for the end.
-async fn read(link: u64, mut reader: BufReader<OwnedReadHalf>, came: &Recipient<Came>) -> String {
+async fn read(
+    link: u64,
+    mut reader: BufReader<OwnedReadHalf>,
+    received: &Recipient<FrameReceived>,
+) -> String {
     loop {
         let frame = match timeout(SILENCE, next(&mut reader)).await {
             Ok(Ok(frame)) => frame,
             Ok(Err(why)) => return why,
             Err(_) => return "it sends nothing more".to_owned(),
         };
-        if came.send(Came { link, frame }).await.is_err() {
+        if received.send(FrameReceived { link, frame }).await.is_err() {
             return "the gateway is busy".to_owned();
         }
     }

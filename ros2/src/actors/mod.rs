@@ -90,7 +90,7 @@ pub struct Answer {
 /// A goal for the arm. For the gateway. The error has the reason why it was not sent.
 #[derive(Message)]
 #[rtype(result = "Result<(), String>")]
-pub struct Pursue {
+pub struct ForwardGoal {
     /// The action, by the arm's name.
     pub action: Action,
     /// The goal's id.
@@ -111,7 +111,7 @@ pub struct Cancel {
     pub id: String,
 }
 
-/// News of a goal from the arm. For the action.
+/// An event of a goal from the arm. For the action.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
 pub struct GoalUpdate {

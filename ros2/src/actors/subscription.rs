@@ -21,7 +21,7 @@ pub struct Subscription {
     topic: Topic,
     one: Type,
     gateway: Addr<Gateway>,
-    complaint: Repeated,
+    warning: Repeated,
     _subscriber: Subscriber<()>,
     _token: LivelinessToken,
 }
@@ -62,7 +62,7 @@ impl Subscription {
             topic,
             one,
             gateway,
-            complaint: Repeated::default(),
+            warning: Repeated::default(),
             _subscriber: subscriber,
             _token: session.liveliness().declare_token(endpoint.token).wait()?,
         }))
@@ -81,7 +81,7 @@ impl Handler<Taken> for Subscription {
         match cdr_reader::decode(self.one, &sample.payload().to_bytes()) {
             Ok(msg) => self.gateway.do_send(PublishToArm { topic, msg }),
             Err(why) => self
-                .complaint
+                .warning
                 .say(format!("{topic}: a message was dropped: {why}")),
         }
     }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 
-use super::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
+use super::ik_action::{CancelGoal, GoalOwner, GoalReport, GoalSelector, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, Unserved, ask};
 use crate::actors::wire::Nodes;
@@ -176,10 +176,10 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
     }
 }
 
-impl<const N: usize> Handler<GoalNews<N>> for IkTrial<N> {
+impl<const N: usize> Handler<GoalReport<N>> for IkTrial<N> {
     type Result = ();
 
-    fn handle(&mut self, news: GoalNews<N>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, news: GoalReport<N>, ctx: &mut Context<Self>) {
         let mut commands = self.hear(&news.pose);
         match news.outcome {
             None => self
@@ -362,13 +362,13 @@ async fn carry_out<const N: usize>(
     commands: Vec<TrialCommand>,
     arm: Recipient<ArmPose<N>>,
     goals: GoalClient<N>,
-    owner: Recipient<GoalNews<N>>,
+    owner: Recipient<GoalReport<N>>,
 ) -> Vec<GoalAnswer<N>> {
     let mut answers = Vec::new();
     for command in commands {
         match command {
             TrialCommand::CancelGoal { goal_id } => {
-                let goal = Meant::Called(goal_id);
+                let goal = GoalSelector::ById(goal_id);
                 // A refusal means that the goal has already ended, as wanted.
                 let _ = ask(&goals.cancel, CancelGoal { goal }).await;
             }

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_files_for_those_without_the_token_too() {
+    fn there_are_files_for_unauthenticated_clients_too() {
         for (files, clients, newcomers) in [
             (usize::MAX, WANTED, MAX_NEWCOMERS),
             (1024, 1024 - OTHER_FILES - MAX_NEWCOMERS, MAX_NEWCOMERS),

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use crate::actors::resources::aside::PLACES;
+use crate::actors::resources::long_work::PLACES;
 use crate::actors::resources::memory::{LONG_ANSWERS, LONG_FRAMES, SHORT};
 use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_FRAME, MEDIUM};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;

@@ -5,7 +5,7 @@
 use bytes::Bytes;
 
 use super::limits::MAX_RECORDED_FRAME;
-use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
+use crate::actors::arm::sim::{ArmEvent, ArmListener, StepEvent};
 use crate::actors::gateway::messages::{Tap, Tapped};
 use crate::record::{Content, Note, write_note};
 
@@ -14,7 +14,7 @@ use crate::record::{Content, Note, write_note};
 pub fn arm<const N: usize>(
     mut put: impl FnMut(Content) -> bool + Send + 'static,
 ) -> ArmListener<N> {
-    Box::new(move |ArmNews { step, event }| {
+    Box::new(move |StepEvent { step, event }| {
         let input = |note: Note<N>| Content::Input {
             step,
             note: write_note(&note),

@@ -21,7 +21,7 @@ pub use self::messages::{
     EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
 };
 use self::tape::{Begun, TapeTarget};
-use crate::actors::arm::sim::Tell;
+use crate::actors::arm::sim::SetListener;
 use crate::actors::gateway::messages::SetTap;
 use crate::actors::node::Call;
 use crate::record::RunSettings;
@@ -30,7 +30,7 @@ use crate::record::RunSettings;
 
 /// The node `recorder` beside an arm of `N` links.
 pub struct Recorder<const N: usize> {
-    arm: Recipient<Tell<N>>,
+    arm: Recipient<SetListener<N>>,
     registry: Recipient<SetTap>,
     /// Folder for clients' records.
     folder: Option<PathBuf>,
@@ -53,7 +53,7 @@ impl<const N: usize> Recorder<N> {
     /// A recorder without a record. Clients may record into `folder`, if there is one.
     #[must_use]
     pub fn new(
-        arm: Recipient<Tell<N>>,
+        arm: Recipient<SetListener<N>>,
         registry: Recipient<SetTap>,
         folder: Option<PathBuf>,
         seed: u64,
@@ -74,7 +74,7 @@ impl<const N: usize> Recorder<N> {
 /// A record has ended by itself. From its thread.
 #[derive(Message)]
 #[rtype(result = "()")]
-struct Over(u64);
+struct RecordEnded(u64);
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
@@ -131,10 +131,10 @@ impl<const N: usize> Handler<EndRecord> for Recorder<N> {
     }
 }
 
-impl<const N: usize> Handler<Over> for Recorder<N> {
+impl<const N: usize> Handler<RecordEnded> for Recorder<N> {
     type Result = ();
 
-    fn handle(&mut self, Over(number): Over, ctx: &mut Context<Self>) {
+    fn handle(&mut self, RecordEnded(number): RecordEnded, ctx: &mut Context<Self>) {
         if self
             .current
             .as_ref()
@@ -161,8 +161,8 @@ impl<const N: usize> Recorder<N> {
         let already = self.current.as_ref().map(|current| current.file.clone());
         let begun = already.is_none().then(|| {
             let address = ctx.address();
-            let over = move || address.do_send(Over(number));
-            tape::begin(target, self.settings.clone(), over)
+            let ended = move || address.do_send(RecordEnded(number));
+            tape::begin(target, self.settings.clone(), ended)
         });
         let (arm, registry) = (self.arm.clone(), self.registry.clone());
         let name = file.clone();
@@ -178,7 +178,7 @@ impl<const N: usize> Recorder<N> {
             // Both exist as long as the program.
             let of_arm = tape.clone();
             let listener = listeners::arm(move |content| of_arm.put(content));
-            let _ = arm.send(Tell(Some(listener))).await;
+            let _ = arm.send(SetListener(Some(listener))).await;
             let tap = listeners::registry(move |content| {
                 // A replay needs none of these messages.
                 let _ = tape.put_or_count(content);
@@ -206,7 +206,7 @@ impl<const N: usize> Recorder<N> {
         let ends = async move {
             let current = current?;
             // Each drops its tape. After the last one the thread ends the file.
-            let _ = arm.send(Tell(None)).await;
+            let _ = arm.send(SetListener(None)).await;
             let _ = registry.send(SetTap(None)).await;
             let recorded = current.end.await.ok()?;
             tracing::info!(

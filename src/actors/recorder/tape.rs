@@ -155,7 +155,7 @@ impl Tape {
         false
     }
 
-    /// The same. `None` stands for an entry that was too long and is dropped.
+    /// The same. `None` means that an entry was too long and is dropped.
     pub(super) fn put_or_count(&self, content: Option<Content>) -> bool {
         if content.is_none() {
             self.counts.dropped.fetch_add(1, Ordering::Relaxed);
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_holds_so_many_records_and_no_more() {
+    fn a_folder_has_a_bounded_number_of_records() {
         let folder = std::env::temp_dir().join(format!("pendularm-tapes-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let target = |name: &str| TapeTarget {

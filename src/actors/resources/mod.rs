@@ -2,8 +2,8 @@
 //!
 //! **Invariant:** nothing here imports a node, so every node can use it.
 
-pub mod aside;
 pub mod gauges;
+pub mod long_work;
 pub mod memory;
 pub mod priority;
 pub mod work_clock;

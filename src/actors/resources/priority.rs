@@ -9,7 +9,7 @@ const STEP_BACK: i32 = 5;
 
 /// Lowers the priority of the present thread below the program's others. It works only on Linux, because
 /// elsewhere it would change the whole process.
-pub fn give_way() {
+pub fn lower_priority() {
     // If this is forbidden, all threads have the same priority.
     #[cfg(target_os = "linux")]
     let _ = rustix::process::nice(STEP_BACK);

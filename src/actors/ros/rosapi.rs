@@ -13,7 +13,7 @@ use tokio::time::sleep;
 use crate::actors::arm::sim::SimulationTime;
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Ask, Call, Unserved};
-use crate::actors::resources::aside::{WorkKind, WorkPermit};
+use crate::actors::resources::long_work::{WorkKind, WorkPermit};
 use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::{Node, Rosapi, Service};
 use crate::protocol::messages::Stamp;

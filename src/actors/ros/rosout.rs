@@ -61,10 +61,10 @@ impl Handler<Interest> for Rosout {
             ctx.cancel_future(listening);
         }
         if !interest.wanted {
-            return logging::hear_warnings(None);
+            return logging::listen_for_warnings(None);
         }
         let (warnings, mut heard) = mpsc::channel(MAX_WAITING);
-        logging::hear_warnings(Some(warnings));
+        logging::listen_for_warnings(Some(warnings));
         let (clock, publish) = (self.clock.clone(), self.publish.clone());
         let report = async move {
             while let Some(warning) = heard.recv().await {
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_names_the_actor_and_not_the_folder_in_which_it_stands() {
+    fn a_warning_names_the_actor_without_its_folder() {
         for (target, node) in [
             ("pendularm::actors::arm::sim::telemetry", "arm_sim"),
             ("pendularm::actors::arm::ik_action", "ik_action"),

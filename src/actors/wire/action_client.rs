@@ -20,7 +20,7 @@ use crate::protocol::wire::json::Payload;
 /// A client's goal or cancellation, forwarded by the registry.
 pub enum ActionRequest {
     /// A goal whose fields are not parsed yet.
-    Goal(Pursue<Arguments>),
+    Goal(ForwardGoal<Arguments>),
     /// A cancellation.
     Cancel(CancelSent),
 }
@@ -40,7 +40,7 @@ pub trait Goal: Sized + Send + 'static {
 /// A goal with its client. From clients, by the action.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Pursue<G> {
+pub struct ForwardGoal<G> {
     /// The goal.
     pub goal: G,
     /// The client that sent it.

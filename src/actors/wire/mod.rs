@@ -21,10 +21,10 @@ use bytes::Bytes;
 use serde::Serialize;
 use tokio::sync::oneshot;
 
-use self::action_client::{ActionRequest, CancelSent, Goal, Pursue};
+use self::action_client::{ActionRequest, CancelSent, ForwardGoal, Goal};
 use crate::actors::ConnectionId;
 use crate::actors::node::{Asker, Call, Done, FrameOut, Interest, Reply, Respond, Unserved, guard};
-use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{ErrorForm, Level};
@@ -34,8 +34,8 @@ pub use crate::services::{Address, Answered, Callable};
 
 // ---- the table of routes: the node of each service, action and topic ------------------------------------------------
 
-/// Arguments longer than this are read aside. Numbers near the middle between two doubles take 5 µs for each 24 bytes,
-/// so these take a fifth of a millisecond. Usual ones are shorter.
+/// Arguments longer than this are read on a worker thread. Numbers near the middle between two doubles take 5 µs for
+/// each 24 bytes, so these take a fifth of a millisecond. Usual ones are shorter.
 const LONG_ARGUMENTS: usize = 1024;
 
 /// Passes a message to its node.
@@ -94,14 +94,14 @@ impl Nodes {
     /// Goals of this kind, and their cancellations, are for this node.
     pub fn carry_out<G: Goal, A>(&mut self, node: Addr<A>)
     where
-        A: Actor<Context = Context<A>> + Handler<Pursue<G>> + Handler<CancelSent>,
+        A: Actor<Context = Context<A>> + Handler<ForwardGoal<G>> + Handler<CancelSent>,
     {
         let take = move |request| match request {
-            ActionRequest::Goal(Pursue { goal, client, done }) => {
+            ActionRequest::Goal(ForwardGoal { goal, client, done }) => {
                 let node = node.clone();
                 let length = goal.payload().get().len();
                 let read = move || match G::read(&goal) {
-                    Ok(goal) => node.do_send(Pursue { goal, client, done }),
+                    Ok(goal) => node.do_send(ForwardGoal { goal, client, done }),
                     Err(rejections) => client.refuse(&rejections.status()),
                 };
                 read_arguments(length, read);
@@ -117,7 +117,7 @@ fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
     if length > LONG_ARGUMENTS {
         // The task is boxed, so only one kind is compiled, and not one for each service.
         let read: Box<dyn FnOnce() + Send> = Box::new(read);
-        actix_rt::spawn(aside(WorkKind::of(length), read));
+        actix_rt::spawn(run_long_work(WorkKind::of(length), read));
     } else {
         read();
     }

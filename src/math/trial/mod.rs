@@ -7,7 +7,7 @@
 //! ```text
 //!                    start                       accepted                    concluded: reached
 //! no pursuit ──────────────────────▶ asked ──────────────────▶ in flight ───────────────────────▶ asked (the next)
-//!     ▲      start, skip               │ refused too often         │ concluded: preempted by somebody else
+//!     ▲      start, skip               │ refused too often         │ concluded: preempted by another client
 //!     └────────────────────────────────┴───────────────────────────┘ stop, or the duration is over
 //! ```
 //!

@@ -5,7 +5,7 @@
 
 use super::entry::{Field, Type, fields, message};
 use super::node::Node;
-use super::parts::{TRANSFORMS, WISH};
+use super::parts::{FRAME_GOAL, TRANSFORMS};
 use super::services::Service;
 use super::table::{named, table};
 use super::topics::Topic;
@@ -27,7 +27,7 @@ table! {
             name: "/tf2_web_republisher",
             type_name: "tf2_web_republisher_interfaces/action/TFSubscription",
             owner: Node::TfRepublisher,
-            goal: message("tf2_web_republisher_interfaces/action/TFSubscription_Goal", WISH),
+            goal: message("tf2_web_republisher_interfaces/action/TFSubscription_Goal", FRAME_GOAL),
             result: message("tf2_web_republisher_interfaces/action/TFSubscription_Result", &[]),
             feedback: message("tf2_web_republisher_interfaces/action/TFSubscription_Feedback", TRANSFORMS),
         },

@@ -19,7 +19,7 @@ pub(super) const GAINS: &[Field] = fields![
 ];
 
 /// A viewer's request: frames relative to another frame.
-pub(super) const WISH: &[Field] = fields![
+pub(super) const FRAME_GOAL: &[Field] = fields![
     "string[] source_frames",
     "string target_frame",
     "float32 angular_thres?",
@@ -63,7 +63,7 @@ pub(super) const TYPES: &[Type] = types! {
         "uint8 status",
         "string text",
     ],
-    "tf2_web_republisher/msg/TFSubscriptionGoal": WISH,
+    "tf2_web_republisher/msg/TFSubscriptionGoal": FRAME_GOAL,
     "tf2_web_republisher/msg/TFSubscriptionFeedback": TRANSFORMS,
     "diagnostic_msgs/msg/DiagnosticStatus": [
         "byte level",

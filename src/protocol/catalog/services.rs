@@ -230,7 +230,7 @@ table! {
             .request(fields![
                 "float64 error  # m",
                 "float64 duration?  # s",
-                "bool servo?",
+                "bool controller?",
                 "float64[] q0?  # rad",
                 "float64[] qdot0?  # rad/s",
                 "pendularm_interfaces/msg/Params params?  # SI",

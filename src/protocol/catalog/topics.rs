@@ -189,7 +189,7 @@ mod tests {
 
     /// A query, a listing or a computation does not change the arm, so waiting messages stay valid.
     #[test]
-    fn the_arms_state_grows_old_by_what_changes_the_arm_and_by_nothing_else() {
+    fn the_arms_state_becomes_outdated_only_by_changes_of_the_arm() {
         let questions = Rosapi::ALL.into_iter().map(Service::Rosapi);
         let changes = Service::ALL
             .into_iter()

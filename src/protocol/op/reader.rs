@@ -19,7 +19,7 @@ use crate::protocol::wire::json::Payload;
 use crate::protocol::wire::{json, text};
 
 /// Longest part of the JSON parser's message in an answer, in characters. It may quote the client.
-const MAX_COMPLAINT: usize = 160;
+const MAX_PARSER_MESSAGE: usize = 160;
 
 /// The members of a frame that the runtime reads.
 const KEYS: [&str; 25] = [
@@ -79,8 +79,8 @@ pub fn read(frame: &str) -> Incoming {
     let read = json::members_into(frame, &KEYS, &mut members);
     let reader = OpReader { op: "", members };
     if let Err(error) = read {
-        let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
-        return reader.refused(Problem::NotJson(complaint));
+        let message = text::shortened(&error.to_string(), MAX_PARSER_MESSAGE);
+        return reader.refused(Problem::NotJson(message));
     }
     let id = reader.get("id").map(Payload::from);
     let op = match reader.known_op() {

@@ -75,7 +75,7 @@ pub enum Reason {
     OutOfBounds {
         /// The bound.
         bound: Bound,
-        /// The number as it came, shortened.
+        /// The client's number, shortened.
         found: String,
     },
     /// Above a limit.
@@ -83,7 +83,7 @@ pub enum Reason {
     TooLarge {
         /// The limit.
         limit: u64,
-        /// The number as it came, shortened.
+        /// The client's number, shortened.
         found: String,
     },
     /// An array of the wrong length.

@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_absent_or_of_another_type_is_zero() {
+    fn an_absent_or_mistyped_member_is_zero() {
         let one = types::find("std_msgs/msg/Header").unwrap();
         let zeros = [0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0];
         assert_eq!(encode(one, &json!({})), zeros);

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_back_bit_for_bit() {
+    fn written_records_are_read_back_bit_for_bit() {
         let (one, msg) = joint_state();
         let bytes = cdr::encode(one, &msg);
         let read = decode(one, &bytes).unwrap();
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_beyond_all_bounds_costs_nothing() {
+    fn a_count_beyond_all_bounds_allocates_nothing() {
         let one = types::find("sensor_msgs/msg/JointState").unwrap();
         let mut bytes = cdr::encode(one, &json!({}));
         // The header's stamp, the empty frame_id with its padding, and the number of names.

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn what_breaks_a_bound_is_refused_and_its_message_forgotten() {
+    fn a_fragment_beyond_a_bound_is_refused_with_its_message() {
         let now = Instant::now();
         let mut fragments = Fragments::default();
         for (bad, why) in [

@@ -392,13 +392,13 @@ struct Inner {
 }
 
 impl Payload {
-    /// The value as it came: numbers that overflow are still there, so that a reader can refuse them by name.
+    /// The unchanged value: numbers that overflow are still there, so that a reader can refuse them by name.
     #[must_use]
     pub fn raw(&self) -> &RawValue {
         &self.0.raw
     }
 
-    /// The text as it came.
+    /// The unchanged text.
     #[must_use]
     pub fn get(&self) -> &str {
         self.0.raw.get()

@@ -63,7 +63,7 @@ pub enum ParameterValue<const N: usize> {
     /// A number.
     Number(f64),
     /// One per joint.
-    Numbers([f64; N]),
+    PerJoint([f64; N]),
     /// A name or a description.
     Text(String),
 }
@@ -72,7 +72,7 @@ impl<const N: usize> From<ParameterValue<N>> for Value {
     fn from(value: ParameterValue<N>) -> Self {
         match value {
             ParameterValue::Number(number) => number.into(),
-            ParameterValue::Numbers(numbers) => numbers.to_vec().into(),
+            ParameterValue::PerJoint(numbers) => numbers.to_vec().into(),
             ParameterValue::Text(text) => text.into(),
         }
     }

@@ -60,7 +60,7 @@ pub struct PlanRun<const N: usize> {
     /// The duration of the run \[s\], greater than 0.
     pub duration: Option<f64>,
     /// Whether the present gains apply if the request has none.
-    pub servo: bool,
+    pub controller: bool,
     /// Initial positions \[rad\].
     pub q0: Option<[f64; N]>,
     /// Initial velocities \[rad/s\].
@@ -138,7 +138,7 @@ impl<const N: usize> Callable for PlanRun<N> {
             // The catalog requires the field: without it the question is rejected.
             error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
             duration: fields.number("duration", Bound::Positive),
-            servo: fields.boolean("servo").unwrap_or(false),
+            controller: fields.boolean("controller").unwrap_or(false),
             q0: fields.array("q0", Bound::Finite),
             qdot0: fields.array("qdot0", Bound::Finite),
             params: fields.object("params", SetParams::of),
@@ -272,8 +272,8 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
 fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N>, ArmError> {
     let Present { control, state } = present;
     let arm = arm_of(ask.params.as_ref(), control.arm)?;
-    // With `servo` the present gains apply. Otherwise the arm is free, as in a rollout.
-    let missing = if ask.servo {
+    // With `controller` the present gains apply. Otherwise the arm is free, as in a rollout.
+    let missing = if ask.controller {
         control.gains
     } else {
         no_control()

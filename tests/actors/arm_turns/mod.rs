@@ -1,7 +1,8 @@
-//! The arm's turns in virtual time: its tick comes however many messages wait, and clients who step it share it.
+//! The arm's turns in virtual time: its tick comes for any number of waiting messages, and clients that step the arm
+//! take turns.
 //!
-//! **Invariant:** work is counted in messages and steps, never timed: the clock moves by a millisecond whenever the arm
-//! lets anybody else have a turn.
+//! **Invariant:** work is counted in messages and steps, never timed. The clock moves by a millisecond whenever the arm
+//! yields.
 
 mod progress;
 mod steps;
@@ -29,7 +30,7 @@ use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::op::fields::Rejections;
 use tokio::time::advance;
 
-/// Turns of everybody else in one publishing tick: the clock moves by a millisecond in each.
+/// Turns of other tasks in one publishing tick. The clock moves by a millisecond in each.
 const TURNS_PER_TICK: usize = 17;
 /// Turns after which a test gives up.
 const MANY_TURNS: usize = 1_000_000;
@@ -52,7 +53,7 @@ enum Answer {
 
 type Log = Arc<Mutex<Vec<Said>>>;
 
-/// Stands in for the registry.
+/// Replaces the registry.
 struct TickEar(Log);
 
 impl Actor for TickEar {
@@ -69,7 +70,7 @@ impl Handler<Publish> for TickEar {
     }
 }
 
-/// Stands in for a client.
+/// Replaces a client.
 struct Client {
     number: u64,
     gone: Arc<AtomicBool>,
@@ -117,7 +118,7 @@ impl TurnsBench {
         Self { arm, said }
     }
 
-    /// One whose arm is paused at time 0.
+    /// The same with the arm paused at time 0.
     async fn paused() -> Self {
         let bench = Self::new().await;
         bench.ask(0, pause(true));
@@ -156,7 +157,7 @@ impl TurnsBench {
         )
     }
 
-    /// Gives the arm turns of a millisecond each until this many answers have come; returns the number of turns.
+    /// Gives the arm turns of a millisecond each until this number of answers has arrived. Returns the number of turns.
     async fn until_answers(&self, count: usize) -> usize {
         for turns in 0..MANY_TURNS {
             if self.answered() >= count {
@@ -187,7 +188,7 @@ impl TurnsBench {
         said.iter().filter(|one| **one == Said::Tick).count()
     }
 
-    /// Asserts that the ticks of this many turns have come; one may still be on its way.
+    /// Asserts that the ticks of this number of turns have arrived. One may still be missing.
     #[track_caller]
     fn assert_ticks(&self, turns: usize, of: &str) {
         let expected = turns / TURNS_PER_TICK;
@@ -204,7 +205,7 @@ impl TurnsBench {
     }
 }
 
-/// All of the steps that were asked for, or fewer.
+/// All requested steps, or fewer.
 fn stepped(answer: &Answer) -> Stepped<3> {
     match answer {
         Answer::Stepped(stepped) => *stepped,

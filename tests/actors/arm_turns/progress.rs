@@ -10,7 +10,7 @@ use pendularm::actors::arm::sim::{AddBarrier, CommandGoal, GoalOrder, GoalProgre
 use pendularm::actors::node::Barrier;
 use pendularm::math::goal::Criteria;
 
-/// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
+/// Replaces the owner of a goal. Records the goal's time at each progress, and whose turn it was.
 struct Owner {
     turns: Rc<Cell<u64>>,
     received: Rc<RefCell<Vec<(f64, u64)>>>,
@@ -51,7 +51,7 @@ impl Handler<Barrier> for Publisher {
 /// Each step of a second is reported separately, also if there are ten thousand. The next step waits until the report has
 /// been published.
 #[test]
-fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
+fn progress_of_a_goal_is_sent_step_by_step_however_many_clients_step_the_arm() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
         let (turns, received) = (Rc::new(Cell::new(0)), Rc::default());
@@ -102,7 +102,7 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
         while bench.answered() < 7 {
             advance(Duration::from_millis(1)).await;
         }
-        // The last are on their way.
+        // The last ones are still in the mailbox.
         advance(Duration::from_millis(1)).await;
         let received = received.borrow();
         assert_eq!(received.len(), 5000);

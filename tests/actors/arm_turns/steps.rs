@@ -1,11 +1,11 @@
-//! Clients who step the arm at once, and what ends their steps.
+//! Clients that step the arm at the same time, and the events that end their steps.
 
 use super::*;
 use pendularm::actors::arm::sim::{STEPS_IN_A_ROW, StepsEnd};
 use pendularm::actors::node::ShutDown;
 
 #[test]
-fn clients_who_step_the_arm_take_turns_and_neither_the_tick_nor_a_light_call_waits_for_them() {
+fn clients_that_step_the_arm_take_turns_and_delay_neither_the_tick_nor_a_light_call() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
         for connection in 1..=9 {
@@ -56,7 +56,7 @@ fn a_resume_ends_the_steps_that_are_left_and_says_so() {
     });
 }
 
-/// As if each step had been asked for alone: requests in between take effect in between.
+/// Requests between the steps take effect between them, as if each step had been requested alone.
 #[test]
 fn a_reset_in_between_takes_effect_in_between() {
     in_virtual_time(async {
@@ -74,10 +74,10 @@ fn a_reset_in_between_takes_effect_in_between() {
     });
 }
 
-/// Euler at one-second steps: the free arm overflows within some hundred steps. A request that waits for a turn then
-/// takes none.
+/// Euler at one-second steps: the free arm overflows within some hundred steps. A request that is waiting for its turn
+/// then takes no step.
 #[test]
-fn a_divergence_ends_everybodys_steps() {
+fn a_divergence_ends_the_steps_of_all_clients() {
     in_virtual_time(async {
         let bench = TurnsBench::paused().await;
         let integrator = |timestep: f64| SetIntegrator {

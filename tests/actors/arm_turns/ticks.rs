@@ -6,7 +6,7 @@ use pendularm::actors::arm::sim::{
 };
 use pendularm::math::pid::Setpoint;
 
-/// Each flood waits in the mailbox as a whole; the clock moves only in the turns that the arm leaves to others.
+/// Each flood waits in the mailbox as a whole. The clock moves only when the arm yields.
 #[test]
 fn the_tick_comes_however_many_messages_wait_for_the_arm() {
     const FLOOD: usize = 100 * TURN_MESSAGES;

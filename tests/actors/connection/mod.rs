@@ -1,7 +1,7 @@
-//! A connection in virtual time: throttling, how far behind a slow client is, and the writes that frames leave in. `exchanges/connections.txt` has
-//! its calls, its stalls and its ends.
+//! A connection in virtual time: throttling, the delay of a slow client, and the writes of frames.
+//! `exchanges/connections.txt` has its calls, its stalls and its ends.
 //!
-//! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
+//! **Invariant:** no test depends on the machine's speed, because times are read from the paused clock.
 
 mod pace;
 mod throttling;

@@ -46,8 +46,8 @@ impl AsyncWrite for Counted {
     }
 }
 
-/// Thirty seconds of 60 messages a second for a client that takes `a_second` of them, and reads `chunk` bytes at a time.
-/// Gives how late it was at most, and how many it has had.
+/// Thirty seconds of 60 messages a second for a client that takes `a_second` of them, and reads `chunk` bytes at a
+/// time. Returns its longest delay, and the number of its messages.
 async fn lateness(queue_length: u64, a_second: u32, chunk: usize) -> (Duration, usize) {
     let gateway = Gateway::bare().await;
     let unread = Rc::new(Cell::new(0));
@@ -129,7 +129,7 @@ fn a_client_that_takes_half_of_the_messages_is_about_a_second_late_at_most() {
 }
 
 #[test]
-fn a_client_that_takes_all_loses_nothing_and_waits_for_nothing() {
+fn a_client_that_reads_everything_loses_nothing_and_has_no_delay() {
     in_virtual_time(async {
         let (late, count) = lateness(1, 100_000, 8192).await;
         assert_eq!(count, 30 * 60 - 1);

@@ -6,7 +6,7 @@ use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
 
 #[test]
-fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
+fn a_response_of_the_arm_discards_throttled_messages_of_its_state() {
     in_virtual_time(async {
         let calls = Held::default();
         let mut nodes = Nodes::default();
@@ -29,7 +29,7 @@ fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
         settle().await;
         calls.answer();
         assert_eq!(client.receive().await["id"], 7);
-        assert!(client.hears_nothing_for(Duration::from_secs(5)).await);
+        assert!(client.receives_nothing_for(Duration::from_secs(5)).await);
         gateway.registry.do_send(publish(2));
         assert_eq!(
             client.receive().await["msg"]["n"],

@@ -1,4 +1,4 @@
-//! The writes that frames leave in.
+//! The writes of frames.
 
 use std::cell::RefCell;
 use std::io::IoSlice;
@@ -11,7 +11,7 @@ use super::*;
 use pendularm::actors::gateway::connection::Connection;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
 
-/// A stream that notes every write as a frame count, and takes all of it.
+/// A stream that records the number of frames in every write, and accepts all bytes.
 struct Noting {
     input: DuplexStream,
     writes: Rc<RefCell<Vec<usize>>>,

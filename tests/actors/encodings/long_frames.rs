@@ -6,7 +6,7 @@ use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::limits::SHORT;
 
-/// Everything about a frame that is read elsewhere comes before everything about the next one.
+/// Every answer to a frame that another thread reads comes before the answers to the next frame.
 #[test]
 fn long_frames_are_answered_in_their_place() {
     in_virtual_time(async {
@@ -19,7 +19,7 @@ fn long_frames_are_answered_in_their_place() {
             );
             client.send_text(&long).await;
             client.call("/none", 100 + id).await;
-            // No JSON, though its braces balance.
+            // Not JSON, although its braces balance.
             client
                 .send_text(&format!("{{\"id\":{id},\"pad\":[{pad}]}}\n"))
                 .await;

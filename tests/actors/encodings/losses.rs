@@ -1,11 +1,11 @@
-//! Messages that are not kept: the newest come, and each of the others is counted.
+//! Dropped messages: the newest ones arrive, and each of the others is counted.
 
 use std::fmt::Write as _;
 
 use super::*;
 
-/// Hears messages, numbered from 0, up to the last: in order, each of the others counted as dropped. Gives how many
-/// came.
+/// Receives messages, numbered from 0, up to the last one. They are in order, and each missing one is counted as
+/// dropped. Returns the number of received messages.
 async fn hear_what_was_kept(gateway: &Gateway, peer: &mut Peer, messages: u64) {
     let (mut came, mut last) = (0, 0);
     while last + 1 < messages {
@@ -20,9 +20,9 @@ async fn hear_what_was_kept(gateway: &Gateway, peer: &mut Peer, messages: u64) {
     assert!(dropped > messages / 4, "{dropped} were too many to be kept");
 }
 
-/// Pieces of 64 bytes have more than as much around them: of 3 MB they are longer than any outbox takes.
+/// Each piece of 64 bytes has a larger envelope, so the pieces of 3 MB do not fit into an outbox.
 #[test]
-fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had_them() {
+fn a_message_that_fits_no_outbox_is_counted_for_each_subscriber() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut publisher = gateway.connect(WIDE);
@@ -44,7 +44,7 @@ fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had
     });
 }
 
-/// A series waits to be cut up as one piece, and goes as one; each message in it counts.
+/// A series waits as one item for its fragmentation, and is dropped as one. Each message in it counts.
 #[test]
 fn each_message_of_a_series_that_had_to_go_is_counted() {
     const MESSAGES: u64 = 2000;

@@ -1,6 +1,6 @@
-//! Messages in the forms that subscribers ask for, and frames that are read on another thread, in virtual time.
+//! Messages in the forms that subscribers request, and frames that are read on another thread, in virtual time.
 //!
-//! **Invariant:** what is made elsewhere comes in its place: order is checked with every message.
+//! **Invariant:** messages that another thread encodes keep their order, which is checked with every message.
 
 mod long_frames;
 mod losses;
@@ -19,7 +19,8 @@ async fn subscribe_in_pieces(peer: &mut Peer, size: usize) -> Value {
     peer.receive().await
 }
 
-/// The next message, put together if it comes in pieces; and the number of its fragments' id, 0 where there are none.
+/// The next message, joined if it comes in pieces, and the number of its fragments' id. The number is 0 without
+/// fragments.
 async fn next_message(peer: &mut Peer) -> (Value, u64) {
     let mut text = String::new();
     loop {

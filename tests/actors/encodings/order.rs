@@ -1,7 +1,7 @@
 //! Messages that are partly cut into fragments on another thread arrive in order and in time.
 
 use super::*;
-use pendularm::actors::resources::aside::{WorkKind, WorkPermit};
+use pendularm::actors::resources::long_work::{WorkKind, WorkPermit};
 use tokio::time::Instant;
 
 #[test]
@@ -26,7 +26,7 @@ fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
     });
 }
 
-/// A long message in pieces holds up its publisher alone, and those who have longer ones to cut up.
+/// A long message in pieces delays only its publisher, and publishers of longer ones.
 #[test]
 fn only_its_publisher_waits_for_a_message_that_is_cut_up() {
     in_virtual_time(async {
@@ -68,7 +68,7 @@ fn only_its_publisher_waits_for_a_message_that_is_cut_up() {
 
 /// They may be held back for hours, but not for a client that has disconnected.
 #[test]
-fn what_a_throttle_holds_back_holds_up_no_other_message_and_no_end() {
+fn a_throttled_message_delays_no_other_message_and_no_end() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));

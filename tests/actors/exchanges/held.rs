@@ -21,7 +21,7 @@ pub(super) struct KeptCalls {
 }
 
 impl KeptCalls {
-    /// A gateway with these nodes, whose clients share this room.
+    /// A gateway with these nodes, whose clients share this memory.
     pub(super) async fn gateway(&self, memory: Memory) -> Gateway {
         let mut nodes = Nodes::default();
         Node::holding(&self.steps).attach(&mut nodes, &[Service::IntegrationStep], &[]);
@@ -29,7 +29,7 @@ impl KeptCalls {
         Gateway::within(memory, nodes).await
     }
 
-    /// Whether the count of this name is as it is said behind ` = `.
+    /// Whether the count of this name equals the number after ` = `.
     pub(super) fn count(&self, gateway: &Gateway, what: &str, wanted: &str) -> Result<(), String> {
         let gauges = Arc::clone(&gateway.gauges);
         let count = match what {

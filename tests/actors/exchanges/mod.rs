@@ -17,9 +17,9 @@
 //! | `a refused service args = text` | the call fails with a status that contains this text |
 //! | `a goal action args = text` | the goal is refused with a reason that contains this text |
 //! | `a error text = part` | the frame is followed by an error status that contains this part |
-//! | `a quiet` | nothing has come |
-//! | `a forget` | all frames that have come are dropped |
-//! | `a count ms pattern = 3` | time passes, and this number of the frames that have come by then match; all of them are dropped |
+//! | `a quiet` | no frame has arrived |
+//! | `a forget` | all received frames are dropped |
+//! | `a count ms pattern = 3` | time passes, and this number of the frames received by then match; all of them are dropped |
 //! | `a leave` | disconnects |
 //! | `options text` | from here on clients are admitted as with these options; as a first step, the arm is neither paused nor reset |
 //! | `request text = 200,404 part` | a new connection sends this request and ends; the answers have these statuses, and contain this part, or with `!` do not |
@@ -28,8 +28,8 @@
 //! | `mark`, `elapsed 1..2` | at `elapsed`, this many ms have passed since `mark` |
 //! | `a room n`, `a take n` | connects by a pipe that holds this many bytes, takes this many out of it |
 //! | `a finish` | stops sending |
-//! | `a read 200 part` | all that comes to the end is an answer over HTTP with this status, and contains this part |
-//! | `held`, `memory frames bytes` | as a first step: in place of all nodes there are two that keep their calls, `steps` of `/arm_sim/integration_step` and `params` of `/arm_sim/set_params`; with `memory`, all clients share this room |
+//! | `a read 200 part` | the bytes up to the end are an answer over HTTP with this status, and contains this part |
+//! | `held`, `memory frames bytes` | as a first step: in place of all nodes there are two that keep their calls, `steps` of `/arm_sim/integration_step` and `params` of `/arm_sim/set_params`; with `memory`, all clients share this memory |
 //! | `steps = 1`, `params = 1` | this many calls are kept |
 //! | `answer steps json` | the oldest of them succeeds with these values, or with none, and ends; `reply` leaves it open until `release`, `refuse steps why` refuses it, `lose steps` drops it, and `gone steps` drops it if its client has left |
 //! | `connections = 1`, `dropped = 1`, `taken = 1` | clients that are served, messages that were dropped, permits for long frames that are taken |
@@ -39,7 +39,7 @@
 //! | `for x in 0..9` | the same for each number, without the last, which may be a limit |
 //! | `for x in` | the same for each row of the lines below it, which begin with `\| ` |
 //!
-//! A file may begin with lines `let name = text`: `@name` stands for that text in each step.
+//! A file may begin with lines `let name = text`: `@name` is that text in each step.
 //!
 //! The text of a request has the escapes of JSON. The first answer to it has the headers that keep a browser
 //! strict.
@@ -80,9 +80,9 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, advance, sleep, timeout};
 
-/// Virtual time that a frame may take to come behind others.
+/// Longest virtual time until a frame arrives after others.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// How much later than at its time something may come \[ms\].
+/// Longest delay of an event after its time \[ms\].
 const GRAIN: usize = 20;
 
 /// Headers that every answer over HTTP has, in lower case.
@@ -518,7 +518,7 @@ fn rosapi_and_parameters() {
 }
 
 #[test]
-fn what_the_arm_publishes_and_refuses() {
+fn messages_and_refusals_of_the_arm() {
     play("arm");
 }
 

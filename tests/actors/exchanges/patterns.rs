@@ -1,4 +1,4 @@
-//! The texts of a step: numbers, repetitions, and patterns that a value matches.
+//! The texts of a step: numbers, repetitions, and patterns of values.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use pendularm::actors::gateway::limits::{
     MAX_COMPUTATIONS_WAITING, MAX_KEPT, MAX_RESPONSES_WAITING, OPENING_TIME, RESPONSES_TIME,
     STALL_LIMIT,
 };
-use pendularm::actors::ros::tf_web::{MAX_FRAMES, MAX_WISHES};
+use pendularm::actors::ros::tf_web::{MAX_FRAME_SUBSCRIPTIONS, MAX_FRAMES};
 use pendularm::options::DEFAULT_CLIENTS;
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NAME, MEDIUM, SHORT};
 use pendularm::protocol::op::trajectory::MAX_POINTS;
@@ -20,7 +20,8 @@ use pendularm::protocol::ros::parameters::MAX_NAMED;
 use pendularm::web::head::{MAX_HEAD, MAX_HEADERS};
 use serde_json::Value;
 
-/// Limits that stand for numbers; times in ms. `KEPT_OF_5` entries with 5 bytes of names are the most that a client may register.
+/// Limits in place of numbers. Times are in ms. `KEPT_OF_5` entries with 5 bytes of names are the most that a client
+/// may register.
 const LIMITS: &[(&str, usize)] = &[
     ("DEFAULT_CLIENTS", DEFAULT_CLIENTS),
     ("DEFAULT_TIMEOUT", ms(DEFAULT_TIMEOUT)),
@@ -44,7 +45,7 @@ const LIMITS: &[(&str, usize)] = &[
     ("MAX_POINTS", MAX_POINTS),
     ("MAX_RESPONSES_WAITING", MAX_RESPONSES_WAITING),
     ("MAX_NEWCOMERS", MAX_NEWCOMERS),
-    ("MAX_WISHES", MAX_WISHES),
+    ("MAX_FRAME_SUBSCRIPTIONS", MAX_FRAME_SUBSCRIPTIONS),
     ("MEDIUM", MEDIUM),
     ("OPENING_TIME", ms(OPENING_TIME)),
     ("RESPONSES_TIME", ms(RESPONSES_TIME)),
@@ -57,7 +58,7 @@ const fn ms(time: Duration) -> usize {
     time.as_millis() as usize
 }
 
-/// The range that `1..2` or a single number says.
+/// The range of `1..2` or of a single number.
 pub(super) fn range(text: &str) -> Option<(usize, usize)> {
     match text.split_once("..") {
         Some((low, high)) => number(low).zip(number(high)),

@@ -11,10 +11,10 @@ use tokio::time::{Instant, timeout, timeout_at};
 
 use super::patterns::{check, is_within, matches};
 
-/// Virtual time that the next frame may take to come: as long as the longest limit of time.
+/// Longest virtual time until the next frame: the longest time limit of the runtime.
 pub(super) const LONG_PATIENCE: Duration = Duration::from_secs(120);
 
-/// Virtual time in which all that is under way arrives.
+/// Virtual time in which all sent frames arrive.
 pub(super) const SHORT_PATIENCE: Duration = Duration::from_millis(10);
 
 /// Topics that are published periodically.
@@ -31,7 +31,7 @@ pub(super) struct Frame(String, Value);
 
 pub(super) struct Peer {
     pub(super) stream: pipe::Client<DuplexStream>,
-    /// Frames that came while another was awaited, oldest first.
+    /// Frames that arrived while another was awaited, oldest first.
     kept: VecDeque<Frame>,
     pub(super) last: String,
 }
@@ -134,7 +134,7 @@ impl Peer {
         Err(format!("{count} came of {}", came.len()))
     }
 
-    /// The frames that have come and were not received, without those of periodic topics.
+    /// The frames that have arrived but were not read, without those of periodic topics.
     pub(super) async fn rest(&mut self) -> Vec<Value> {
         let mut rest = self.take_for(SHORT_PATIENCE).await;
         let is_periodic = |value: &Value| PERIODIC.iter().any(|topic| value["topic"] == *topic);
@@ -143,7 +143,7 @@ impl Peer {
     }
 }
 
-/// Asks something, and checks the answer.
+/// Sends a request, and checks the answer.
 pub(super) async fn ask(
     peer: &mut Peer,
     verb: &str,

@@ -9,7 +9,7 @@ use pendularm::record::{CALLS, INPUTS, STATES};
 use serde_json::Value;
 
 #[test]
-fn every_topic_is_recorded_though_nobody_subscribes_and_none_is_made_afterwards() {
+fn every_topic_is_recorded_without_subscribers_and_none_is_made_afterwards() {
     in_virtual_time(async {
         let stage = Stage::<2>::start().await;
         let mut client = stage.connect();
@@ -130,7 +130,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
         });
     }
     assert_eq!(*counts.lock().unwrap(), (1, 1));
-    // The name that a call goes by is copied too.
+    // The name of a called service is copied too.
     let payload = |text: String| Payload::from(RawValue::from_string(text).unwrap());
     let args = payload("{}".to_owned());
     for length in [MAX_RECORDED_FRAME - 2, MAX_RECORDED_FRAME - 1] {

@@ -1,4 +1,4 @@
-//! Runs on record: the reports of arm and registry, which are enough to take every step again.
+//! Records of runs: the reports of arm and registry suffice to repeat every step.
 
 mod contents;
 mod damage;
@@ -6,7 +6,7 @@ mod replays;
 
 use std::sync::{Arc, Mutex};
 
-use pendularm::actors::arm::sim::Tell;
+use pendularm::actors::arm::sim::SetListener;
 use pendularm::actors::gateway::messages::SetTap;
 use pendularm::actors::recorder::listeners;
 use pendularm::math::integrator::Method;
@@ -53,7 +53,7 @@ impl Notes {
             of_arm.put(content);
             true
         });
-        stage.arm.send(Tell(Some(listener))).await.unwrap();
+        stage.arm.send(SetListener(Some(listener))).await.unwrap();
         let tap = listeners::registry(move |content| {
             if let Some(content) = content {
                 of_registry.put(content);
@@ -93,7 +93,7 @@ pub async fn stop<const N: usize>(stage: &Stage<N>)
 where
     Gains<N>: Default,
 {
-    stage.arm.send(Tell::<N>(None)).await.unwrap();
+    stage.arm.send(SetListener::<N>(None)).await.unwrap();
     stage.registry.send(SetTap(None)).await.unwrap();
 }
 
@@ -112,7 +112,7 @@ async fn follow_path(client: &mut Client, positions: &[f64]) {
         .await;
 }
 
-/// Something that a client may do, out of everything that changes the arm's steps.
+/// One random action of a client that changes the arm's steps.
 async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::Rng) {
     let mut numbers = |low: f64, high: f64| -> Vec<f64> {
         (0..N).map(|_| low + (high - low) * rng.f64()).collect()

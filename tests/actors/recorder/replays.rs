@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
+fn every_recorded_state_is_replayed_bit_for_bit_for_random_requests() {
     let (mut steps, mut states) = (0, 0);
     for seed in 0..6 {
         for entries in [
@@ -107,7 +107,7 @@ fn the_first_state_that_differs_in_its_last_bit_is_named_with_its_step() {
 
 /// After lost reports the whole simulation is recorded once, and no report before it.
 #[test]
-fn a_listener_that_has_lost_an_input_hears_the_whole_again() {
+fn a_listener_that_has_lost_an_input_gets_the_whole_simulation_again() {
     in_virtual_time(async {
         let stage = Stage::<2>::start().await;
         let mut client = stage.connect();
@@ -122,7 +122,7 @@ fn a_listener_that_has_lost_an_input_hears_the_whole_again() {
             }
             takes
         });
-        stage.arm.send(Tell(Some(listener))).await.unwrap();
+        stage.arm.send(SetListener(Some(listener))).await.unwrap();
         client.enable().await;
         for turn in 1..=20 {
             client

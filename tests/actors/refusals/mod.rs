@@ -11,7 +11,7 @@ use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
 
-/// Fields that take any value: unknown parts of other people's types, and the name of a record, which has a disk.
+/// Fields that accept any value: unknown parts of other types, and the name of a record, which needs a disk.
 const TAKE_ANYTHING: [&str; 6] = [
     "depth",
     "source_frames",
@@ -21,7 +21,7 @@ const TAKE_ANYTHING: [&str; 6] = [
     "name",
 ];
 
-/// Services whose fields apply one by one, with valid values that are not the present ones.
+/// Services that apply each field separately, with valid values that differ from the present ones.
 const FIELD_BY_FIELD: [(&str, &str); 7] = [
     (
         "/arm_sim/set_integrator",
@@ -92,7 +92,7 @@ async fn call(client: &mut Peer, service: &str, args: &str) -> Value {
         .await
 }
 
-/// All settings, as the services that have some return them.
+/// All settings, as their services return them.
 async fn settings(client: &mut Peer) -> BTreeMap<&'static str, Value> {
     let mut settings = BTreeMap::new();
     for (service, _) in FIELD_BY_FIELD {

@@ -1,4 +1,4 @@
-//! The node `study`: here what its tests are made of, a client, an arm with settings of its own and the pool's bench.
+//! The node `study`: here a client, an arm with its own settings and the pool of the tests.
 //!
 //! Most tests ask the node as another node does. Tests of how fields are read and how an answer is written send a
 //! client's calls.
@@ -19,7 +19,8 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmSettings, Consult, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetParams, SetPeriod,
+    ArmSettings, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetLimitPredictor, SetParams,
+    SetPeriod,
 };
 use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{
@@ -78,7 +79,7 @@ fn settings<const N: usize>() -> Present<N> {
     }
 }
 
-/// The same as a client would write it.
+/// The same, as a client writes it.
 fn settings_as_args<const N: usize>() -> Value {
     json!({
         "integrator": "midpoint",

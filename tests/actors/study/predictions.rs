@@ -1,9 +1,9 @@
-//! Limits, advice and plans: the study's own, with what is left out taken from the arm; and the refusal of fields.
+//! Limits, advice and plans: the study's own, with missing fields taken from the arm, and the refusal of fields.
 
 use super::*;
 use crate::system::in_real_time;
 
-/// The values that the service gives of these limits and this motion.
+/// The service's values for these limits and this motion.
 fn stability_values<const N: usize>(
     limits: &Limits<N>,
     clocks: &ClockLimits,
@@ -55,7 +55,7 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
 }
 
 #[test]
-fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
+fn predictions_are_the_studys_and_missing_fields_are_the_arms_own() {
     in_real_time(async {
         assert_predictions_are_the_studys::<2>().await;
         assert_predictions_are_the_studys::<3>().await;
@@ -86,7 +86,7 @@ fn members_that_are_left_out_of_an_object_are_the_arms_own() {
     });
 }
 
-/// Without gravity and control nothing limits; Euler on a free swing is stable at no timestep.
+/// Without gravity and control there is no limit. Euler on a free swing is stable at no timestep.
 #[test]
 fn no_limit_is_null_and_no_stable_timestep_is_zero() {
     in_real_time(async {
@@ -106,7 +106,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
         ] {
             assert!(values[limit].is_null(), "{limit} {values}");
         }
-        // The motion alone limits: 0.2 and 0.4 rad/s of the links, all of whose energy one of them might have.
+        // Only the motion limits: the links turn at 0.2 and 0.4 rad/s, and one of them might get all their energy.
         let speed = values["motion_speed"].as_f64().unwrap();
         assert!((0.4..2.0).contains(&speed), "{values}");
         assert_eq!(values["timestep_limit_motion"], 0.3 / speed);
@@ -121,7 +121,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
 /// The search for gains and for a plan are the library's; fields that are left out are the arm's
 /// own.
 #[test]
-fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
+fn advice_is_the_studys_and_missing_fields_are_the_arms_own() {
     in_real_time(async {
         let bench = study::<2>();
         let mut client = caller_of(&bench).await;
@@ -147,16 +147,16 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let run = bench.ask(plan_with(0.05)).await.unwrap();
         assert_eq!(run.planned, planned);
         assert_eq!(run.control_period, Some(run.planned.best.timestep));
-        let args = json!({"error": 0.05, "servo": true});
+        let args = json!({"error": 0.05, "controller": true});
         let values = client.ask(Service::Plan.name(), args).await;
         let best = planned.best;
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
         assert_eq!(
             client
-                .refusal(Service::Plan.name(), json!({"error": -1, "servo": 1}))
+                .refusal(Service::Plan.name(), json!({"error": -1, "controller": 1}))
                 .await,
-            "error must be greater than 0, got -1; servo must be true or false, got 1"
+            "error must be greater than 0, got -1; controller must be true or false, got 1"
         );
         let tiny = SuggestGains {
             timestep: Some(2_f64.powi(-20)),
@@ -205,7 +205,7 @@ fn refused_advice_names_a_field_and_spells_no_number_out() {
     });
 }
 
-/// A controller of 250 Hz is given: holding its efforts is no error of the plan's.
+/// The request has a controller of 250 Hz, so the hold of its efforts is not part of the error.
 #[test]
 fn a_plan_for_a_given_control_period_has_whole_parts_of_it_as_timesteps() {
     in_real_time(async {
@@ -228,7 +228,7 @@ fn plan_with(error: f64) -> PlanRun<2> {
     PlanRun {
         error,
         duration: None,
-        servo: true,
+        controller: true,
         q0: None,
         qdot0: None,
         params: None,

@@ -67,7 +67,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
 }
 
 #[test]
-fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
+fn an_empty_rollout_is_ten_seconds_of_the_present_free_arm() {
     in_real_time(async {
         let bench = study::<3>();
         let run = bench.ask(RunOffline::default()).await.unwrap().run;

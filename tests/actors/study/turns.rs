@@ -27,7 +27,7 @@ fn short<const N: usize>() -> RunOffline<N> {
 }
 
 #[test]
-fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
+fn light_requests_are_answered_between_slices_of_heavy_ones() {
     in_real_time(async {
         let mut bench = study::<2>();
         let heavy = bench.ask_as(1, heavy());
@@ -49,7 +49,7 @@ fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
     });
 }
 
-/// Turns of one worker until a client has its million steps, while so many others have begun heavy rollouts.
+/// Turns of one worker until a client has its million steps, while this number of other clients run heavy rollouts.
 async fn turns_until_integrated(others: u64) -> u32 {
     let (answered, mut order) = mpsc::unbounded_channel();
     let pool = WorkerPool::without_threads();
@@ -60,7 +60,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
     for connection in 1..=others {
         ask_as(&study, connection, &answered, heavy());
     }
-    // The study asks the arm first; a moment of virtual time passes when all wait.
+    // The study first queries the arm. Some virtual time passes when all tasks wait.
     pass(ms(1)).await;
     for _ in 0..10 * others {
         assert!(pool.turn());
@@ -86,7 +86,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
     turns
 }
 
-/// Each look at the clock costs the same here, so that turns can be counted on any machine.
+/// Each query of the clock costs the same here, so turns can be counted on any machine.
 #[test]
 fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
     in_virtual_time(async {

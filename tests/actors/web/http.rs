@@ -1,4 +1,4 @@
-//! Requests of HTTP: heads that do not come, and answers that are not taken.
+//! Requests over HTTP: missing heads, and unread answers.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use tokio::io::{AsyncRead, split};
 
 const HEAD: &str = "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n";
 
-/// All that comes up to the end of the stream.
+/// All bytes up to the end of the stream.
 async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
     let mut text = String::new();
     stream
@@ -21,7 +21,7 @@ async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
     text
 }
 
-/// A report of one file, `a.csv`, that has a length, and no content on the disk: its folder, and the way to it.
+/// A report of one file, `a.csv`, which is sparse on the disk. Returns its folder and its path.
 fn report_of(test: &str, length: u64) -> (PathBuf, Arc<Admission>) {
     let folder = std::env::temp_dir().join(format!("pendularm-{test}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -85,7 +85,7 @@ fn a_file_of_a_report_that_is_too_long_is_refused() {
     });
 }
 
-/// A request behind an answer has a short time to come, also in pieces: each connection takes a place.
+/// The next request must arrive soon after an answer, also in pieces, because each connection takes a place.
 #[test]
 fn a_connection_without_a_next_request_is_closed_after_two_seconds() {
     in_virtual_time(async {

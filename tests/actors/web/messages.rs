@@ -1,7 +1,7 @@
-//! Messages over a WebSocket: the cost of a long one, and the forms in which they come.
+//! Messages over a WebSocket: the cost of a long one, and the forms of messages.
 
 use super::*;
-use pendularm::actors::resources::aside::{PLACES, WorkKind, WorkPermit};
+use pendularm::actors::resources::long_work::{PLACES, WorkKind, WorkPermit};
 use tokio::time::timeout;
 
 const PAUSE: &str = Service::Pause.name();
@@ -12,7 +12,7 @@ async fn pausing_gateway() -> Gateway {
     Gateway::with(nodes).await
 }
 
-/// A message has room while it comes, and once, however it is cut up on its way through.
+/// A message has one permit while it arrives, for any fragmentation.
 #[test]
 fn a_long_message_of_a_websocket_has_room_while_it_is_there() {
     const LONG: usize = 3 << 20;
@@ -38,7 +38,7 @@ fn a_long_message_of_a_websocket_has_room_while_it_is_there() {
             settle().await;
             assert_eq!(memory.taken(), 0);
         }
-        // White space is no frame, and keeps no room.
+        // White space is no frame, and keeps no memory.
         let mut bytes = Vec::new();
         append(
             &mut bytes,
@@ -54,7 +54,7 @@ fn a_long_message_of_a_websocket_has_room_while_it_is_there() {
 
 /// A long message is read on another thread. Here all places of such threads are taken, and another client is served meanwhile.
 #[test]
-fn a_long_message_is_read_aside() {
+fn a_long_message_is_read_on_another_thread() {
     const LONG: usize = 4 << 20;
     in_virtual_time(async {
         let gateway = pausing_gateway().await;
@@ -93,10 +93,10 @@ fn a_long_message_is_read_aside() {
 
 /// Reading continues by itself, because the message is not a call.
 #[test]
-fn what_is_no_message_is_read_in_turns() {
+fn invalid_messages_are_read_in_turns() {
     in_virtual_time(async {
         let gateway = pausing_gateway().await;
-        // With the most frames of a turn: a ping is answered with a write of its own, however short it is.
+        // With the most frames of a turn, a ping is answered in its own write, even if it is short.
         for (kind, payload, frames, most) in [
             (opcode::PONG, &[b'p'; 125][..], 30_000, 32),
             (opcode::PING, &[b'p'; 125], 30_000, 32),

@@ -1,5 +1,5 @@
-//! HTTP and WebSocket where time matters: heads that do not come, messages that do not end, clients that do not
-//! read. Here the client's end of a connection.
+//! HTTP and WebSocket in virtual time: missing heads, messages without an end, clients that do not read. Here the
+//! client's end of a connection.
 //!
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
 
@@ -35,7 +35,7 @@ fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
     connect_through(gateway, &Arc::default(), room)
 }
 
-/// The same, on conditions that are shared with others.
+/// The same, with shared rules of admission.
 fn connect_through(gateway: &Gateway, admission: &Arc<Admission>, room: usize) -> DuplexStream {
     let (ours, theirs) = duplex(room);
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
@@ -66,10 +66,10 @@ async fn receive_text(socket: &mut Client<DuplexStream>) -> String {
     }
 }
 
-/// Bytes that are read or written at most before others have a turn.
+/// Most bytes that are read or written before other tasks have a turn.
 const TURN: usize = 64 * 1024;
 
-/// How many turns others have while `doing` is done, and what came of it.
+/// The number of turns of other tasks during `doing`, and its result.
 async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
     let turns = Rc::new(Cell::new(0));
     let counted = Rc::clone(&turns);

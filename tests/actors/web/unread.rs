@@ -1,9 +1,9 @@
-//! WebSocket clients that do not read. `exchanges/connections.txt` has the time that a client has for reading.
+//! WebSocket clients that do not read. `exchanges/connections.txt` has their deadline.
 
 use super::*;
 
-/// Pings of a peer that reads no pong: fewer pongs wait for it than a write of ours holds, and when it reads, the last
-/// of them has been answered.
+/// Pings of a peer that reads no pong: fewer pongs wait for it than one write holds. When it reads, the last ping has
+/// been answered.
 #[test]
 fn pings_whose_pongs_are_not_read_cost_next_to_nothing() {
     in_virtual_time(async {

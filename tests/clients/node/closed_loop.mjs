@@ -1,5 +1,5 @@
-// The JavaScript of docs/protocol.md that closes a loop of its own, as it stands there but for the address. Two runs give
-// the same bits.
+// The JavaScript of docs/protocol.md that closes a loop of its own, unchanged except for the address. Two runs give the
+// same bits.
 import { readFile } from "node:fs/promises";
 import { WebSocket } from "ws";
 import { check, run, url } from "./common.mjs";

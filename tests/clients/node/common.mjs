@@ -1,9 +1,9 @@
-// Parts that the clients share: where the runtime is, and promises with a limit.
+// Parts that the clients share: the runtime's address, and promises with a limit.
 export const address = process.argv[2];
 export const url = `ws://${address}`;
 const PATIENCE_MS = 30_000;
 
-/** A promise of what `begin(resolve, reject)` brings; fails with `what` when it does not come. */
+/** A promise of the result of `begin(resolve, reject)`. It fails with `what` after the limit. */
 export function within(what, begin) {
   return new Promise((resolve, reject) => {
     const timer = setTimeout(() => reject(new Error(`${what} did not come`)), PATIENCE_MS);

@@ -1,5 +1,5 @@
-// @mcap/core, unmodified, on records of the built program: `mcap_core.mjs WHOLE KILLED`. One was ended as it should be, by its
-// index; the other was left by a program that was killed. The first is cut in many places too.
+// @mcap/core, unmodified, on records of the built program: `mcap_core.mjs WHOLE KILLED`. One is complete and has its
+// index. The other is from a killed program. The first is also truncated in many places.
 import { open, readFile } from "node:fs/promises";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { check, run } from "./common.mjs";

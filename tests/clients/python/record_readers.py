@@ -82,8 +82,8 @@ def kill_when_it_is_written(program):
 
 
 whole, killed = Path(sys.argv[2]), Path(sys.argv[3])
-# The program ends within a second of SIGTERM in any case; where the disk stands still for that long, the record has no
-# summary: then once more.
+# The program ends within a second of SIGTERM in any case; if the disk blocks for that long, the record has no summary,
+# and the test repeats it.
 for _ in range(3):
     whole.unlink(missing_ok=True)
     record(whole, end_when_it_is_written)
@@ -136,7 +136,7 @@ assert json.loads(asked[0].content) == {"data": True}, asked
 assert answered[0].result and json.loads(answered[0].content) == {"data": True}, answered
 print(f"mcap, mcap-ros2-support: {len(messages)} messages on {len(by_topic)} topics")
 
-# rosbags knows the types of ROS, and learns ours from the file.
+# rosbags has the types of ROS, and reads this project's types from the file.
 with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
     count = 0
     for connection, _, raw in reader.messages():

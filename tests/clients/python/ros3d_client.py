@@ -71,7 +71,7 @@ with Browser(extra=SOFTWARE) as browser:
     page = browser.page(f"http://127.0.0.1:{server.server_port}/", width=WIDTH, height=HEIGHT)
     page.until("place('link2') !== null", PATIENCE, "the arm on the scene")
     page.run("service('/pid_controller/enable', {data: true})")
-    # The solution that is nearest to where the arm is, which must not move between the question and the goal.
+    # The solution nearest to the present pose. The arm must not move between the request and the goal.
     page.run("service('/arm_sim/pause', {data: true})")
     wanted = page.run("service('/ik/solve', {x: 0.5, y: 1.2})")["positions"]
     page.run("service('/ik_action/send_goal', {x: 0.5, y: 1.2})")

@@ -55,7 +55,7 @@ async def drive(session):
 
 async def main():
     server = StdioServerParameters(command=str(Path(sys.executable).with_name("ros-mcp")), args=[])
-    # It tells every read of its socket.
+    # It logs every read of its socket.
     log = open(os.devnull, "w")
     async with stdio_client(server, errlog=log) as (reads, writes), ClientSession(reads, writes) as session:
         await session.initialize()

@@ -33,7 +33,7 @@ EXPECTED = {
     "param get gravity": "9.81",
 }
 
-# Each is a Python of its own that takes a second to begin.
+# Each is a separate Python process that takes a second to start.
 with ThreadPoolExecutor(4) as pool:
     for words, lines in zip(EXPECTED, pool.map(run, EXPECTED)):
         assert EXPECTED[words] in lines, (words, lines)

@@ -1,4 +1,4 @@
-//! The suite of the specification against our own program: every rule holds, and every rule can fail.
+//! The suite of the specification against this program: every rule holds, and every rule can fail.
 
 #![allow(
     clippy::expect_used,
@@ -28,7 +28,7 @@ use faults::Planted;
 use program::Program;
 use proxy::{Fault, Proxy, Side};
 
-/// Programs that are tried at once; a rule waits more than it computes.
+/// Programs that are tested at once. A rule waits longer than it computes.
 const WORKERS: usize = 8;
 
 fn all_hold(links: usize) {
@@ -51,15 +51,15 @@ fn every_rule_holds_for_3_links() {
     all_hold(3);
 }
 
-/// The outcome of a rule against a server with a fault: nothing if it fails for the fault. A busy machine may keep the
-/// suite from preparing the arm, which says nothing about the rule; that is tried again.
+/// The outcome of a rule against a server with a fault: nothing if it fails for the fault. On a busy machine the suite
+/// may fail to prepare the arm. That is no result, so the rule is tried again.
 fn escapes(program: &Program, found: &Found, planted: &Planted, links: usize) -> Option<String> {
     let mut outcome = String::new();
     for _ in 0..3 {
         let proxy = Proxy::start(&program.address, planted.fault(links));
         let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_| {});
-        // Past the proxy: the next fault finds a server as it was started.
+        // Without the proxy, so the next fault meets the server in its initial state.
         found.restore(&program.address);
         match rows.as_deref() {
             Ok([row]) => match &row.got {
@@ -121,7 +121,7 @@ fn every_fault_is_for_a_rule() {
 }
 
 #[test]
-fn a_server_that_says_nothing_is_reported_soon() {
+fn a_silent_server_is_reported_soon() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let began = Instant::now();
@@ -130,7 +130,7 @@ fn a_server_that_says_nothing_is_reported_soon() {
     assert!(began.elapsed() < Duration::from_secs(30));
 }
 
-/// As a server that is being written: the rules of the other sections can be tried.
+/// Like an unfinished server, on which the rules of the other sections can be tried.
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
     let program = Program::start(2);
@@ -159,7 +159,7 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
         if side == Side::Server {
             asked += 1;
             for (at, name) in ["values", "result", "status", "msg"].into_iter().enumerate() {
-                // The first answers say how many links there are.
+                // The first answers have the number of links.
                 if asked > 20
                     && let Some(member) = frame.get_mut(name)
                 {
@@ -186,7 +186,7 @@ fn the_suites_own_arm_agrees_with_the_reference_values() {
     for case in data["cases"].as_array().unwrap() {
         let own = arm::Arm { masses: list(&case["masses"]), lengths: list(&case["lengths"]), gravity: case["gravity"].as_f64().unwrap() };
         let state = arm::State { position: list(&case["q"]), velocity: list(&case["qdot"]) };
-        // The data say how much a rounding of the inputs may change; 32 roundings are allowed.
+        // The data have the effect of a rounding of the inputs. 32 roundings are allowed.
         let near = |name: &str, got: f64, expected: &Value, sensitivity: &Value| {
             let (expected, sensitivity) = (expected.as_f64().unwrap(), sensitivity.as_f64().unwrap());
             let error = (got - expected).abs();

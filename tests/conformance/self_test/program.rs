@@ -1,4 +1,4 @@
-//! Our own program on a free port, ended when it is dropped.
+//! The program on a free port. Dropping it ends the process.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};

@@ -1,4 +1,4 @@
-//! A proxy between the suite and our program that falsifies frames, so that the suite sees a server with a fault.
+//! A proxy between the suite and the program that changes frames, so the suite tests a server with a fault.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::thread;
 
 use serde_json::Value;
 
-/// Where a frame comes from.
+/// The source of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// From the suite.
@@ -16,11 +16,11 @@ pub enum Side {
     Server,
 }
 
-/// Turns a frame into those that are passed on: none, one or more. It is told the side and the number of the
-/// connection. A line that is not JSON comes as a text.
+/// Converts a frame into the forwarded frames: none, one or more. Its arguments are the side and the number of the
+/// connection. A line that is not JSON is passed as a text.
 pub type Fault = Box<dyn FnMut(Side, usize, Value) -> Vec<Value> + Send>;
 
-/// A proxy; its threads end with the connections.
+/// A proxy. Its threads end with the connections.
 pub struct Proxy {
     /// Where it listens.
     pub address: String,

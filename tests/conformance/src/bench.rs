@@ -69,7 +69,7 @@ impl Found {
         Ok(found)
     }
 
-    /// Gives the server its settings back, as far as it takes them.
+    /// Restores the server's settings, as far as it accepts them.
     pub fn restore(&self, address: &str) {
         let Ok(mut bench) = Bench::prepared(address, self) else {
             return;
@@ -197,7 +197,7 @@ impl Bench {
         self.message_that(topic, within, "a message", |_| true)
     }
 
-    /// The next message on a topic that is as it should be; others are left.
+    /// The next expected message on a topic. Others are kept.
     pub fn message_that(&mut self, topic: &str, within: Duration, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
         let holds = |frame: &Value| is_message(frame, topic) && frame.get("msg").is_some_and(&is_it);
         match self.peer.find(Instant::now() + within, holds) {
@@ -207,7 +207,7 @@ impl Bench {
         }
     }
 
-    /// All messages on a topic that come in a time.
+    /// All messages on a topic within a time.
     pub fn messages_for(&mut self, topic: &str, time: Duration) -> Result<Vec<Value>, String> {
         let until = Instant::now() + time;
         let mut found = Vec::new();
@@ -220,7 +220,7 @@ impl Bench {
         }
     }
 
-    /// Forgets the messages on a topic that have come.
+    /// Discards the received messages on a topic.
     pub fn forget(&mut self, topic: &str) {
         self.peer.forget(|frame| is_message(frame, topic));
     }
@@ -234,7 +234,7 @@ impl Bench {
         Ok(joints)
     }
 
-    /// Joint states from after everything that this connection has sent; starts to listen where it does not yet.
+    /// Joint states from after all requests of this connection. Subscribes if necessary.
     pub fn fresh(&mut self) -> Result<Joints, String> {
         self.watch("/joint_states")?;
         // A call that changes nothing. Messages before its answer may be older than this connection's requests.
@@ -298,7 +298,7 @@ impl Bench {
         self.accepted("/pid_controller/set_gains", &args).map(drop)
     }
 
-    /// Sets gains that hold the arm of 1 m and 1 kg links; `integral` says whether with the integral term.
+    /// Sets gains that hold the arm of 1 m and 1 kg links, with the integral term if `integral` is true.
     pub fn set_holding_gains(&mut self, integral: bool) -> Result<(), String> {
         let (kp, kd): (&[f64], &[f64]) =
             if self.links == 2 { (&[200.0, 60.0], &[50.0, 10.0]) } else { (&[400.0, 150.0, 40.0], &[90.0, 35.0, 7.0]) };
@@ -351,7 +351,7 @@ impl Bench {
         Ok(pose)
     }
 
-    /// Pushes the arm by the controller for a moment, then leaves it to itself: it swings.
+    /// Pushes the arm by the controller for a moment, then switches it off, so the arm swings freely.
     pub fn swing(&mut self) -> Result<(), String> {
         self.set_gains(20.0, 0.0, 0.0)?;
         let pose = self.reset()?;

@@ -100,7 +100,7 @@ pub const fn rule(id: &'static str, says: &'static str, expected: &'static str, 
     Rule { id, category: Category::Integrators, links: Links::Any, says, expected, check }
 }
 
-/// A rule that has been tried.
+/// The result of a rule.
 #[derive(Debug)]
 pub struct Row {
     /// The rule.

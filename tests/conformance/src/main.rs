@@ -28,7 +28,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The address and the filters; nothing if they are not as they should be.
+/// The address and the filters. `None` if they are not valid.
 fn options() -> Option<(String, Selection)> {
     let mut address = None;
     let mut selection = Selection::default();

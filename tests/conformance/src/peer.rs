@@ -1,7 +1,7 @@
 //! One connection to the server: frames out, frames in, each with a deadline.
 //!
-//! Nothing here panics. An error says that nothing listens at the address, that no answer came in time, or that the connection has
-//! ended. A malformed answer becomes an error that quotes it.
+//! Nothing here panics. Errors are: no server at the address, no answer in time, and a closed connection. A malformed
+//! answer becomes an error that quotes it.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -17,7 +17,7 @@ const KEPT: usize = 4096;
 /// Bytes of one frame; a longer one is an error.
 const LONGEST: usize = 64 << 20;
 
-/// The reason that no frame came.
+/// The reason for a missing frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     /// The deadline passed.
@@ -106,7 +106,7 @@ impl Peer {
         Ok(id)
     }
 
-    /// The first frame, kept or new, for which `is_it` holds; it is taken out, others are kept.
+    /// The first frame, kept or new, for which `is_it` is true. It is removed, and others are kept.
     pub fn find(&mut self, until: Instant, is_it: impl Fn(&Value) -> bool) -> Result<Value, Trouble> {
         if let Some(at) = self.kept.iter().position(&is_it) {
             return self.kept.remove(at).ok_or(Trouble::Silence);
@@ -191,7 +191,8 @@ fn without_non_finite(text: &str) -> String {
         if at > 0 {
             out.push('"');
         }
-        // Every second piece is inside a string, but for escaped quotes, which no number of this protocol is near to.
+        // Every second piece is inside a string, except at escaped quotes, which are never next to a number in this
+        // protocol.
         if at % 2 == 0 {
             out.push_str(&piece.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"));
         } else {

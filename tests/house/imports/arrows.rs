@@ -48,12 +48,12 @@ impl Package {
     }
 }
 
-pub(super) struct House {
+pub(super) struct SourceTree {
     name: &'static str,
     pub(super) modules: BTreeMap<Module, File>,
 }
 
-impl House {
+impl SourceTree {
     pub(super) fn read(package: &Package) -> Self {
         let mut modules = BTreeMap::new();
         let source = package.source();
@@ -65,8 +65,8 @@ impl House {
         }
     }
 
-    /// The meaning of `path` as it is spelled in the file of `from`: a module of ours, and the item in it unless the module
-    /// itself is meant. None for other crates' names, and for those that the file itself defines.
+    /// The meaning of `path` in the file of `from`: a module of the crate, and the item in it if the path names one.
+    /// None for names of other crates, and for names that the file itself defines.
     fn place(&self, from: &Module, path: &[String], seen: &mut Seen) -> Option<Place> {
         let (first, behind) = path.split_first()?;
         match first.as_str() {
@@ -85,7 +85,7 @@ impl House {
         }
     }
 
-    /// The same for a path that goes on in `module`.
+    /// The same for a path that continues in `module`.
     fn walk(&self, module: Module, path: &[String], seen: &mut Seen) -> Option<Place> {
         let Some((name, behind)) = path.split_first() else {
             return Some((module, None));
@@ -100,7 +100,7 @@ impl House {
         let mut imports = self.modules[&module].imports.iter();
         let import = imports.find(|import| import.name == *name);
         match import {
-            // A name may be imported that is defined here too, as a macro's is.
+            // An imported name may also be defined here, for example a macro's.
             Some(import) if seen.insert((module.clone(), name.clone())) => {
                 match self.place(&module, &import.path, seen)? {
                     (handed_on, None) => self.walk(handed_on, behind, seen),
@@ -121,7 +121,7 @@ impl House {
                 .filter(|import| !import.handed_on || used(&import.name))
                 .map(|import| &import.path);
             for path in imported.chain(&file.paths) {
-                // A module that is named without anything in it is no arrow. An item of it is one.
+                // A module alone is no arrow. An item of it is one.
                 if let Some((target, Some(name))) = self.place(module, path, &mut Seen::new())
                     && target != *module
                 {

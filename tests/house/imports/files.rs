@@ -13,7 +13,7 @@ pub(super) struct File {
     pub(super) path: String,
     /// Names that are declared by `use`: the name here, and the path behind it.
     pub(super) imports: Vec<Import>,
-    /// Paths in the code, `use` apart.
+    /// Paths in the code outside of `use`.
     pub(super) paths: BTreeSet<Vec<String>>,
 }
 
@@ -27,7 +27,7 @@ pub(super) fn child(module: &Module, name: &str) -> Module {
     [module.as_slice(), &[name.to_owned()]].concat()
 }
 
-/// Every module below `source` in `folder`, with what its file holds.
+/// Every module below `source` in `folder`, with the content of its file.
 pub(super) fn read(source: &Path, folder: &Path, at: &Module, found: &mut BTreeMap<Module, File>) {
     let has_library = source.join("lib.rs").exists();
     for entry in fs::read_dir(folder).unwrap() {
@@ -73,7 +73,7 @@ fn is_path_separator(tokens: &[TokenTree], at: usize) -> bool {
     is_punct(tokens.get(at), ':') && is_punct(tokens.get(at + 1), ':')
 }
 
-/// Collects imports and paths; of a macro's arguments too, which only the compiler could read otherwise.
+/// Collects imports and paths, including those in the arguments of macros.
 fn scan(tokens: TokenStream, file: &mut File) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut at = 0;
@@ -86,7 +86,7 @@ fn scan(tokens: TokenStream, file: &mut File) {
             TokenTree::Group(group) => scan(group.stream(), file),
             TokenTree::Ident(word) if *word == "use" => {
                 let end = (at..tokens.len()).find(|&end| is_punct(tokens.get(end), ';'));
-                // In bounds of lifetimes, `use<'a>` is no import.
+                // `use<'a>` in a bound is no import.
                 if let Some(end) = end.filter(|_| !is_punct(tokens.get(at + 1), '<')) {
                     let handed_on = is_handed_on(&tokens[..at]);
                     tree(&tokens[at + 1..end], &[], handed_on, &mut file.imports);

@@ -1,4 +1,4 @@
-//! ARCHITECTURE.md and the glossary: the modules, paths, functions and types that they name are there.
+//! ARCHITECTURE.md and the glossary: the modules, paths, functions and types that they name exist.
 
 use std::collections::BTreeSet;
 
@@ -26,7 +26,7 @@ fn place_of(path: &str) -> Option<(String, Option<String>)> {
 }
 
 #[test]
-fn every_word_of_the_glossary_is_carried_by_what_it_names() {
+fn every_word_of_the_glossary_is_the_name_of_its_item() {
     let rows = table(&text("docs/glossary.md"), "word | means");
     assert!(rows.len() > 25, "{} words", rows.len());
     for row in rows {
@@ -67,7 +67,7 @@ fn every_path_that_the_architecture_names_exists() {
     }
 }
 
-/// Names such as `Registry::fan_out` in the drawing of a frame's way.
+/// Names such as `Registry::fan_out` in the drawing of a frame's path.
 #[test]
 fn every_function_on_the_way_of_a_frame_exists() {
     let paper = text("ARCHITECTURE.md");
@@ -113,7 +113,7 @@ fn every_function_on_the_way_of_a_frame_exists() {
     }
 }
 
-/// The files that a table of `header` names and the names in each; how many files, and their lines.
+/// The files in the table with this header, and the names in each. Returns the number of files and of their lines.
 fn walk(header: &str) -> (usize, usize) {
     let rows = table(&text("ARCHITECTURE.md"), header);
     let mut lines = 0;
@@ -137,13 +137,13 @@ fn walk(header: &str) -> (usize, usize) {
         }
     }
     let paths: BTreeSet<&str> = rows.iter().map(|row| codes(&row[0])[0]).collect();
-    assert_eq!(paths.len(), rows.len(), "a file stands twice");
+    assert_eq!(paths.len(), rows.len(), "a file is listed twice");
     (rows.len(), lines)
 }
 
-/// The bounds are what has been reached: neither walk becomes longer unnoticed.
+/// The bounds are the present lengths, so a longer walk fails the test.
 #[test]
-fn the_walks_name_what_is_there_and_become_no_longer() {
+fn the_walks_name_existing_files_and_become_no_longer() {
     let (files, lines) = walk("a message passes");
     assert!(
         files <= 17 && lines <= 6_055,
@@ -158,7 +158,7 @@ fn the_walks_name_what_is_there_and_become_no_longer() {
 
 /// In the drawings: paths by their slash, actors and messages by their capitals.
 #[test]
-fn whatever_the_architectures_drawings_name_exists() {
+fn every_name_in_the_architectures_drawings_exists() {
     let paper = text("ARCHITECTURE.md");
     let drawings: Vec<&str> = paper.split("```mermaid\n").skip(1).collect();
     assert!(drawings.len() >= 2);
@@ -170,13 +170,13 @@ fn whatever_the_architectures_drawings_name_exists() {
     let mut named = 0;
     for drawing in drawings {
         let drawing = drawing.split("```").next().unwrap().replace("<br/>", " ");
-        // A label is between quotes; its type names and paths stand between spaces and commas.
+        // A label is between quotes. Its type names and paths are separated by spaces and commas.
         let labels = drawing.split('"').skip(1).step_by(2);
         for word in labels.flat_map(|label| label.split([' ', ','])) {
             if word.contains('/') {
                 assert!(root.join(word).exists(), "ARCHITECTURE.md draws {word}");
             } else if word.starts_with(char::is_uppercase) && word.contains(char::is_lowercase) {
-                // WebSocket is no type of ours, but the protocol's name.
+                // `WebSocket` is the name of the protocol, not of a type.
                 let is_ours = ["struct", "enum"]
                     .iter()
                     .any(|kind| sources.contains(&format!("{kind} {word}")));

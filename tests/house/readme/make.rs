@@ -73,7 +73,7 @@ fn every_filter_of_a_test_in_the_documents_names_a_module() {
     assert!(filters > 10, "{filters} filters");
 }
 
-/// A target that CI does not run breaks unseen. Functions that no step calls do not count.
+/// A target that CI does not run can break unnoticed. Functions without a call do not count.
 #[test]
 fn ci_runs_every_target() {
     let makefile = text("Makefile");
@@ -144,7 +144,7 @@ fn ci_runs_every_target() {
 #[test]
 fn make_alone_shows_the_help() {
     let make = |arguments: &[&str]| {
-        // Under `make test` the outer make hands its own flags down.
+        // Under `make test` the outer make passes its own flags.
         let mut command = Command::new("make");
         printed(
             command
@@ -163,7 +163,7 @@ fn make_alone_shows_the_help() {
     }
 }
 
-/// As after unpacking a release on a machine without a toolchain.
+/// This is the state of an unpacked release on a machine without a toolchain.
 #[cfg(unix)]
 #[test]
 fn make_run_runs_a_program_that_is_there_where_there_is_no_cargo() {

@@ -6,7 +6,7 @@ use std::process::Command;
 use super::{codes, printed};
 use crate::papers::{table, text};
 
-/// The lines of a manifest, each with the section that it stands in.
+/// The lines of a manifest, each with its section.
 fn by_section(manifest: &str) -> impl Iterator<Item = (&str, &str)> {
     let mut section = "";
     manifest.lines().filter_map(move |line| {
@@ -40,7 +40,7 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("LICENSE-APACHE").contains("Apache License"));
 }
 
-/// Where they are built otherwise, nothing that `make test` has built serves them, and CI builds all of it twice.
+/// With another profile they could not reuse the build of `make test`, and CI would build everything twice.
 #[test]
 fn the_fuzz_targets_are_built_as_the_tests_are() {
     let profile = |path: &str| -> BTreeSet<String> {
@@ -62,10 +62,10 @@ fn the_fuzz_targets_are_built_as_the_tests_are() {
     assert_eq!(profile("fuzz/Cargo.toml"), tests);
 }
 
-/// `rust-version` is a promise to whoever has an older compiler than ours: no package may break it.
+/// `rust-version` is a promise to users with an older compiler, so no package may need a newer one.
 #[test]
 fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
-    // Only packages for this platform are sure to be at hand after a build.
+    // After a build only the packages for this platform are sure to be present.
     let compiler = printed(Command::new("rustc").arg("-vV"));
     let host = compiler
         .lines()

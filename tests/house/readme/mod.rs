@@ -1,5 +1,5 @@
-//! The papers of the house say what is so: the tables of README and docs/ against the Makefile, the manifest and the
-//! catalog. Here README itself.
+//! The documents agree with the sources: the tables of README and docs/ against the Makefile, the manifest and the
+//! catalog. This file checks README itself.
 //!
 //! **Invariant:** each check reads both sides, so that neither can change alone.
 

@@ -3,7 +3,7 @@
 use crate::papers::text;
 use pendularm::math::integrator::Method;
 
-/// Each beside its order, where it is a Runge-Kutta method with as many evaluations.
+/// Each method with its order, if it is a Runge-Kutta method with as many evaluations.
 #[test]
 fn the_page_has_every_method_in_its_order() {
     let script = text("page/format.js");

@@ -1,4 +1,4 @@
-//! The tables of docs/protocol.md against the catalog, and against what the arm begins with.
+//! The tables of docs/protocol.md against the catalog, and against the arm's defaults.
 
 use std::collections::BTreeSet;
 
@@ -73,7 +73,7 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
             .map(|name| (name, !row[1].contains(&format!("*`{name}`*"))))
             .collect();
         assert_eq!(written, expected, "{}", service.name());
-        // Explanations come behind a colon.
+        // Explanations follow a colon.
         let said = row[2].split(':').next().unwrap();
         let echoes = ["both", "all three", "the three"];
         let values: Vec<&str> = if echoes.iter().any(|all| said.starts_with(all)) {
@@ -108,7 +108,7 @@ fn the_papers_list_every_question_of_rosapi_with_its_fields_in_order() {
     }
 }
 
-/// The column of an arm of `N` links in the table of what it begins with.
+/// The column of an arm of `N` links in the table of defaults.
 fn defaults<const N: usize>() -> Vec<String>
 where
     Gains<N>: Default,
@@ -137,7 +137,7 @@ where
 }
 
 #[test]
-fn the_papers_list_what_the_arm_begins_with() {
+fn the_papers_list_the_arms_defaults() {
     let rows = table(&text("docs/protocol.md"), "default");
     let column = |k: usize| rows.iter().map(|row| row[k].clone()).collect::<Vec<_>>();
     assert_eq!(column(1), defaults::<2>());

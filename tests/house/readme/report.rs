@@ -1,10 +1,10 @@
-//! The kept report, and the papers that repeat its numbers.
+//! The kept report, and the documents that repeat its numbers.
 
 use std::path::Path;
 use std::process::Command;
 
 #[test]
-fn the_papers_say_what_the_kept_report_says() {
+fn the_papers_agree_with_the_kept_report() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let check = Command::new("python3")
         .arg(root.join("scripts/keep-report.py"))

@@ -20,7 +20,7 @@ fn every_text_of_the_table_has_its_value() {
         ("-2^-2", 0.25),
         ("-(2^2)", -4.0),
         ("0-2^2", -4.0),
-        // Unary minus stands wherever a value does.
+        // Unary minus is allowed before every value.
         ("-3", -3.0),
         ("1--1", 2.0),
         ("1+-1", 0.0),
@@ -87,7 +87,7 @@ fn t_is_the_time_of_the_evaluation() {
 }
 
 #[test]
-fn white_space_may_stand_between_any_two_tokens() {
+fn white_space_is_allowed_between_any_two_tokens() {
     let spaced = parse(" \t- t\r\n^ 2 +sin (\tt )* ( 3 ) ");
     assert_eq!(spaced, parse("-t^2+sin(t)*(3)"));
 }

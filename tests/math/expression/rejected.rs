@@ -1,4 +1,4 @@
-//! Expressions that are rejected, and the reasons that their authors hear.
+//! Rejected expressions, and their reasons.
 //!
 //! **Invariant:** nothing here is accepted, and every message is checked, its column included.
 
@@ -6,7 +6,7 @@ use pendularm::math::expression::{Expression, ExpressionError};
 
 use super::rejection;
 
-/// `{NAMES}` and `{OPERAND}` in a message stand for these.
+/// `{NAMES}` and `{OPERAND}` in a message are replaced by these texts.
 const NAMES: &str = ": the variable is t, the functions are sin, cos, tan, exp, sqrt, ln and abs";
 const OPERAND: &str = "expected a number, t, a function, - or (";
 
@@ -129,7 +129,7 @@ fn an_empty_function_is_rejected() {
 }
 
 #[test]
-fn what_a_message_repeats_is_short() {
+fn quoted_client_text_is_short() {
     let long = "a".repeat(1_000_000);
     let twenty = "a".repeat(20);
     assert!(rejection(&long).starts_with(&format!("unknown name '{twenty}...' at column 1")));

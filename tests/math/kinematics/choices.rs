@@ -1,4 +1,4 @@
-//! Which of several solutions is chosen.
+//! The choice among several solutions.
 
 use super::*;
 
@@ -52,7 +52,7 @@ fn two_elbows_equally_near_give_the_one_with_a_positive_second_joint() {
 }
 
 #[test]
-fn an_elbow_that_is_nearer_by_a_millionth_of_a_radian_is_not_taken_for_a_tie() {
+fn elbows_that_differ_by_a_millionth_of_a_radian_are_no_tie() {
     // Near full stretch the elbows differ by 2e-7 rad; squares of that are far below the rounding of a squared radian.
     let lengths = [1.0, 1.0];
     let pose = [0.3, -1e-7];
@@ -61,7 +61,7 @@ fn an_elbow_that_is_nearer_by_a_millionth_of_a_radian_is_not_taken_for_a_tie() {
     assert!(q[1] < 0.0, "{q:?}");
 }
 
-/// Admissible headings by looking at each of many: how far the nearest one is from `present`.
+/// Admissible headings by a scan: the distance of the nearest one from `present`.
 fn scanned(lengths: &[f64; 3], target: DVec2, present: f64, samples: u32) -> Option<f64> {
     let [l1, l2, l3] = *lengths;
     let range = (l1 - l2).abs()..=l1 + l2;
@@ -168,7 +168,7 @@ fn with_the_target_on_the_base_all_orientations_are_admissible_or_none() {
 }
 
 #[test]
-fn two_links_ignore_an_orientation_whatever_it_is() {
+fn two_links_ignore_every_orientation() {
     let plain = solve(&[1.0, 1.0], &[0.0; 2], &at(1.0, 0.3)).unwrap();
     for phi in [0.0, 3.0, 1e300, f64::NAN, f64::INFINITY] {
         assert_eq!(

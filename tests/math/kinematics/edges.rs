@@ -62,7 +62,7 @@ fn a_target_within_a_billionth_of_the_arm_outside_its_reach_is_solved_as_the_bou
                 ..edge
             };
             let off = solve_any(&lengths, &target).unwrap_or_else(|e| panic!("{lengths:?}: {e}"));
-            // The boundary itself: as far off as the target lies outside, and no farther.
+            // On the boundary: the error is the target's distance from it, and no more.
             let outside = BOUNDARY * f64::max(share, 0.0);
             assert!(
                 (off - outside).abs() <= 1e-15,

@@ -19,7 +19,7 @@ fn share() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Joint angles: any, right angles, stretched and folded ones, and wound up ones.
+/// Joint angles: random ones, right angles, stretched, folded, and many turns.
 fn angle() -> impl Strategy<Value = f64> {
     prop_oneof![
         -PI..=PI,
@@ -46,8 +46,7 @@ fn check_round_trip<const N: usize>(lengths: &[f64; N], present: &[f64; N], targ
     if let (3, Some(phi)) = (N, target.orientation) {
         assert!(turn(forward(lengths, &q).orientation, phi).abs() <= 1e-14);
     }
-    // The joints that a goal commands are the same pose; digits that a wound angle cannot hold are not
-    // asked of it.
+    // The commanded joints are the same pose, within the resolution of an angle of many turns.
     let commanded = nearest_turn(&q, present);
     let bar = INTERIOR + present.iter().map(|p| f64::EPSILON * p.abs()).sum::<f64>();
     assert!(miss(lengths, &commanded, target) <= bar);
@@ -82,7 +81,7 @@ proptest! {
         let phi = along.y.atan2(along.x);
         check_round_trip(&lengths, &present, &at(x, y));
         check_round_trip(&lengths, &present, &aimed(x, y, phi));
-        // Whole turns of the orientation asked for are its own business.
+        // Whole turns of the requested orientation have no effect.
         check_round_trip(&lengths, &present, &aimed(x, y, phi - TAU));
     }
 

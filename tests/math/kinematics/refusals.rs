@@ -7,7 +7,7 @@ fn refusal<const N: usize>(lengths: [f64; N], target: Target) -> String {
 }
 
 #[test]
-fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
+fn a_refusal_names_the_exceeded_limit_and_its_numbers() {
     assert_eq!(
         refusal([1.0, 1.0], at(0.0, -3.2)),
         "target (0, -3.2) is 3.2 m from the base, beyond the arm's reach of 2 m"
@@ -24,7 +24,7 @@ fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
         refusal([1.0, 1.0, 1.0], aimed(1.5, 0.0, PI)),
         "phi = 3.1416 puts the wrist 2.5 m from the base, beyond the reach of links 1 and 2, 2 m"
     );
-    // Another size, in metres all the same.
+    // Another size, also in metres.
     assert_eq!(
         refusal([4.0, 4.0, 4.0], aimed(6.0, 0.0, PI)),
         "phi = 3.1416 puts the wrist 10 m from the base, beyond the reach of links 1 and 2, 8 m"
@@ -45,7 +45,7 @@ fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
 }
 
 #[test]
-fn what_is_no_number_is_refused_by_name() {
+fn a_value_that_is_no_number_is_refused_by_name() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         assert_eq!(refusal([1.0, 1.0], at(bad, 0.0)), "x must be finite");
         assert_eq!(refusal([1.0, 1.0], at(0.0, bad)), "y must be finite");
@@ -55,7 +55,7 @@ fn what_is_no_number_is_refused_by_name() {
             "phi must be finite"
         );
     }
-    // A present pose that is none is no obstacle.
+    // A present pose that is not finite is allowed.
     let q = solve(&[1.0; 3], &[f64::NAN, f64::INFINITY, 0.0], &at(1.0, 1.0)).unwrap();
     assert!(miss(&[1.0; 3], &q, &at(1.0, 1.0)) < 1e-15);
 }

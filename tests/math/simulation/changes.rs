@@ -1,4 +1,4 @@
-//! Changes from outside: a reset, control on and off, a state, a push; each with its effect and what it keeps.
+//! Changes from outside: a reset, control on and off, a state, a push. Each has its effect, and changes nothing else.
 
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
@@ -111,7 +111,7 @@ fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
 
 /// The prediction of a step must use the effort of that step.
 #[test]
-fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
+fn the_predicted_effort_is_the_effort_of_the_next_step() {
     for on in [false, true] {
         let mut simulation = moving(Method::Rk4);
         simulation.enable(on);

@@ -1,4 +1,4 @@
-//! The live loop: motion against 50-digit references, determinism, what each call changes and what it keeps.
+//! The live loop: motion against 50-digit references, determinism, and the effects of each call.
 
 mod changes;
 mod motion;

@@ -93,7 +93,7 @@ fn check_motion<const N: usize>(case: &Case) {
     }
 }
 
-/// A live arm without gravity takes another way through the dynamics (`weightless_dynamics`); the offline one does not.
+/// A live arm without gravity uses other formulas (`weightless_dynamics`). The offline one does not.
 #[test]
 fn without_gravity_an_arm_moves_by_the_same_bits() {
     fn check<const N: usize>() {
@@ -164,8 +164,8 @@ fn apart<const N: usize>(one: &[f64; N], other: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Beside the truncation error stands what rounding makes of the motion, which no method can avoid: a unit in the last
-/// place on the way, amplified as the oracle says.
+/// The tolerance adds the effect of rounding, which no method can avoid: a unit in the last place, amplified as in the
+/// oracle.
 fn check_sample<const N: usize>(
     case: &Case,
     method: Method,

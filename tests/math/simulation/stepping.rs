@@ -1,4 +1,4 @@
-//! Steps: where they start, what one is made of, how rounding and time add up, and who may watch them.
+//! Steps: their start, their parts, the sums of rounding and time, and observers.
 
 use std::ops::ControlFlow;
 

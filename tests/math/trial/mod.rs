@@ -189,7 +189,7 @@ fn the_end_is_not_missed_by_rounding() {
 
 /// A difference rounds once; a sum of differences would round at every one of them.
 #[test]
-fn what_has_elapsed_is_one_difference_however_often_the_same_time_is_told() {
+fn elapsed_time_is_one_difference_for_repeated_times() {
     let mut trial = Trial::default();
     let start = 0.1;
     let sample = || Some(target(1));

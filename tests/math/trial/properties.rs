@@ -40,7 +40,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn whatever_happens_the_status_makes_sense(events in prop::collection::vec(event(), 0..60)) {
+    fn the_status_is_consistent_after_random_events(events in prop::collection::vec(event(), 0..60)) {
         let mut trial = Trial::default();
         let mut elapsed = 0.0;
         let mut counted = 0;

@@ -1,4 +1,4 @@
-//! The limits of a frame's length and nesting, and of what the reader keeps.
+//! The limits of a frame's length and nesting, and of the reader's buffer.
 
 use pendularm::protocol::limits::{MAX_FRAME, MAX_NESTING};
 use pendularm::protocol::wire::frame::{FrameError, FrameReader};
@@ -15,8 +15,8 @@ fn a_frame_of_exactly_the_limit_is_taken() {
     assert!(read(stream.as_bytes().chunks(4093)) == [frame(&text), frame("{}")]);
 }
 
-/// Frames one byte and a lot beyond the limit, whole and in pieces. Brackets or a newline end them. One has brackets
-/// and an escaped newline in the part that is skipped. Another has a second fault behind the limit.
+/// Frames that exceed the limit by one byte and by many, whole and in pieces. Brackets or a newline end them. One has
+/// brackets and an escaped newline in the part that is skipped. Another has a second fault after the limit.
 #[test]
 fn a_longer_frame_gets_one_error_and_is_skipped_to_where_it_would_have_ended() {
     let filler = |length: usize| "x".repeat(length);
@@ -75,12 +75,12 @@ fn an_idle_reader_gives_back_the_memory_of_a_long_frame() {
     reader.push(text.as_bytes());
     assert_eq!(reader.by_ref().count(), 1);
     assert!(reader.buffered() < 64 * 1024);
-    // Room for usual frames stays, so that they are read without allocating.
+    // The buffer for usual frames stays, so they are read without an allocation.
     assert!(reader.buffered() >= 16 * 1024);
 }
 
 #[test]
-fn what_is_buffered_is_what_has_come_of_an_unfinished_frame() {
+fn the_buffer_holds_only_an_unfinished_frame() {
     let mut reader = FrameReader::new();
     let half = format!("{{\"a\":\"{}", "x".repeat(100_000));
     reader.push(half.as_bytes());
@@ -88,9 +88,9 @@ fn what_is_buffered_is_what_has_come_of_an_unfinished_frame() {
     assert!(reader.buffered() >= half.len());
 }
 
-/// The reader never is at the end of a frame when it is at the end of what was pushed.
+/// The end of a frame is never the end of the pushed bytes.
 #[test]
-fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
+fn finished_frames_are_not_kept_although_one_is_always_unfinished() {
     let mut reader = FrameReader::new();
     let text = format!("{{\"a\":\"{}\"}}\n", "x".repeat(1000));
     let (front, back) = text.split_at(10);

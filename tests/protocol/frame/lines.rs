@@ -1,4 +1,4 @@
-//! Frames in lines: where one begins and ends, and what a malformed one costs.
+//! Frames in lines: their beginning and end, and the effect of a malformed one.
 
 use pendularm::protocol::wire::frame::{Frame, FrameReader};
 
@@ -10,7 +10,7 @@ fn first_frame(stream: &str) -> Frame {
     reader.next().expect("an outcome").expect("a frame")
 }
 
-/// An outcome as the table spells it: the frame's text, or the error's name.
+/// An outcome in the spelling of the table: the frame's text, or the error's name.
 fn spelled(outcome: &Outcome) -> String {
     match outcome {
         Ok(text) => text.clone(),
@@ -21,8 +21,8 @@ fn spelled(outcome: &Outcome) -> String {
     }
 }
 
-/// A row: its name, a stream, and the outcomes, each a frame or the name of an error. In a stream, `\n`, `\r`, `\t`, `\\` and `\xff` stand
-/// for a byte.
+/// A row: its name, a stream, and the outcomes, each a frame or the name of an error. In a stream, `\n`, `\r`, `\t`,
+/// `\\` and `\xff` are one byte.
 const STREAMS: &str = include_str!("streams.txt");
 
 fn stream_of(text: &str) -> Vec<u8> {
@@ -76,7 +76,7 @@ fn a_line_that_is_no_object_is_quoted_in_part_with_its_control_characters_escape
 
 /// 32 bytes are enough to recognise a line; a sender that never ends it gets an error then.
 #[test]
-fn the_beginning_of_a_line_that_is_no_object_is_told_as_soon_as_32_bytes_are_there() {
+fn a_line_that_is_no_object_is_reported_after_32_bytes() {
     let mut reader = FrameReader::new();
     reader.push(&[b'x'; 31]);
     assert_eq!(reader.next(), None);

@@ -31,7 +31,7 @@ fn a_message_holds_one_object_and_may_be_pretty_printed() {
     }
 }
 
-/// Nothing is done of a message that holds anything else.
+/// A message with any other content has no effect.
 #[test]
 fn a_message_that_is_not_one_object_is_refused_as_a_whole() {
     let too_deep = nested(MAX_NESTING + 1);

@@ -12,7 +12,7 @@ use pendularm::protocol::wire::frame::{FrameError, FrameReader};
 
 type Outcome = Result<String, FrameError>;
 
-/// All outcomes of a stream that comes in these pieces.
+/// All outcomes of a stream that arrives in these pieces.
 fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Vec<Outcome> {
     let mut reader = FrameReader::new();
     let mut outcomes = Vec::new();
@@ -24,7 +24,7 @@ fn read<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Vec<Outcome> {
     outcomes
 }
 
-/// The outcomes of a stream that comes at once, which have to be those of the same stream byte by byte.
+/// The outcomes of a stream that arrives at once. They must equal those of the same stream byte by byte.
 fn outcomes(stream: &[u8]) -> Vec<Outcome> {
     let whole = read([stream]);
     assert_eq!(read(stream.chunks(1)), whole, "cut into single bytes");

@@ -1,4 +1,4 @@
-//! The first bytes of a connection: JSON, or another protocol that is named.
+//! The first bytes of a connection: JSON, or the name of another protocol.
 
 use pendularm::protocol::wire::frame::{Foreign, Opening, opening};
 

@@ -1,11 +1,11 @@
-//! Any stream, cut anywhere. The fuzz target `frame` holds the reader against the rules written down slowly.
+//! Any stream, split anywhere. The fuzz target `frame` compares the reader with a slow model of the rules.
 
 use pendularm::protocol::wire::frame::opening;
 use proptest::prelude::*;
 
 use super::{nested, outcomes, read};
 
-/// Streams in which what matters to the reader is frequent.
+/// Streams in which the characters that matter to the reader are frequent.
 fn stream() -> impl Strategy<Value = Vec<u8>> {
     let bits = prop_oneof![
         8 => proptest::sample::select(vec![
@@ -20,7 +20,7 @@ fn stream() -> impl Strategy<Value = Vec<u8>> {
     proptest::collection::vec(bits, 0..60).prop_map(|bits| bits.concat())
 }
 
-/// Cuts a stream at the given places, as far as they lie within it.
+/// Splits a stream at the given places that are within it.
 fn cut<'a>(stream: &'a [u8], cuts: &[prop::sample::Index]) -> Vec<&'a [u8]> {
     let mut ends: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len() + 1)).collect();
     ends.push(stream.len());

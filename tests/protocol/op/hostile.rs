@@ -1,4 +1,4 @@
-//! Frames that mean no good: long, deep or arbitrary ones.
+//! Hostile frames: long, deep or arbitrary ones.
 
 use pendularm::protocol::op::{Op, read};
 use proptest::prelude::*;
@@ -22,7 +22,7 @@ fn client_text_in_a_message_is_short_and_without_control_characters() {
     }
 }
 
-/// Payloads are skipped, not parsed, so that their depth costs no stack.
+/// Payloads are skipped, not parsed, so their depth needs no stack.
 #[test]
 fn deep_payloads_are_no_danger() {
     let deep = "[".repeat(100_000) + &"]".repeat(100_000);

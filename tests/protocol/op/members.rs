@@ -5,7 +5,7 @@ use pendularm::protocol::op::{Op, read};
 
 use super::{op, problem};
 
-/// The text about a bad member, in any form in which the sender gets it.
+/// The text about a bad member, in each form that the sender receives.
 fn refusal(op: &str, members: &str) -> String {
     problem(&format!(r#"{{"op":"{op}"{members}}}"#))
 }
@@ -42,7 +42,7 @@ const REQUIRED: [(&str, &[(&str, &str)]); 12] = [
     ),
 ];
 
-/// The required members of an operation without `left_out`, as they stand behind its name.
+/// The required members of an operation without `left_out`, as they follow its name.
 fn others(op: &str, left_out: &str) -> String {
     let (_, members) = REQUIRED.iter().find(|(name, _)| *name == op).unwrap();
     let kept = members.iter().filter(|(name, _)| *name != left_out);
@@ -112,7 +112,8 @@ fn a_bad_member_is_refused_with_what_it_must_be() {
     }
 }
 
-/// It is kept as long as what it names, and comes back with every answer. Its quotes count: an id is any JSON value.
+/// An id is kept as long as its call or goal, and is returned with every answer. Its quotes count, because an id is any
+/// JSON value.
 #[test]
 fn an_id_that_is_kept_is_bounded() {
     let id = |length: usize| format!(r#","id":"{}""#, "x".repeat(length - 2));

@@ -1,6 +1,7 @@
 //! The operations that clients send.
 //!
-//! `frames.txt` has a frame in each row, and behind ` => ` its id and its operation as `Debug` prints it, or its refusal.
+//! `frames.txt` has a frame in each row, ` its id and its operation => and after ` => ` its id and its operation => `
+//! its id and its operation as `Debug` prints it, or its refusal.
 //!
 //! **Invariant:** every bad field is tried in every operation that has it.
 
@@ -25,7 +26,7 @@ fn op(frame: &str) -> Op {
         .unwrap_or_else(|error| panic!("{frame}: {error}"))
 }
 
-/// The text about a bad frame, in any form in which the sender gets it.
+/// The text about a bad frame, in each form that the sender receives.
 #[track_caller]
 fn problem(frame: &str) -> String {
     match read(frame).op {
@@ -73,7 +74,7 @@ fn every_frame_is_the_operation_or_the_refusal_of_its_row() {
 }
 
 #[test]
-fn what_a_client_may_ask_for_is_bounded() {
+fn the_requests_of_a_client_are_bounded() {
     const DAY: u64 = 24 * 3600;
     assert_eq!(MAX_THROTTLE, Duration::from_secs(365 * DAY));
     assert_eq!(MAX_TIMEOUT, Duration::from_secs(DAY));
@@ -83,7 +84,7 @@ fn what_a_client_may_ask_for_is_bounded() {
 }
 
 #[test]
-fn a_verbosity_wants_its_level_and_what_is_more_serious() {
+fn a_verbosity_includes_its_level_and_more_serious_ones() {
     for (least, wanted) in [
         (Some(Level::Info), [true, true, true]),
         (Some(Level::Warning), [false, true, true]),

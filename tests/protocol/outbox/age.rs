@@ -1,4 +1,4 @@
-//! Messages that wait for long, and queues of bounded length.
+//! Messages that wait for a long time, and queues of bounded length.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,7 +29,7 @@ fn a_message_older_than_a_second_is_dropped_unless_it_is_the_newest_of_its_topic
 }
 
 #[test]
-fn an_old_message_goes_as_soon_as_its_topic_has_a_newer_one() {
+fn an_old_message_is_removed_as_soon_as_its_topic_has_a_newer_one() {
     let mut bench = Bench::new();
     bench.push("/a", "a1");
     bench.push("/b", "b1");
@@ -52,7 +52,7 @@ fn of_an_old_series_the_newest_message_is_left() {
 }
 
 #[test]
-fn a_message_ages_from_when_its_throttle_lets_it_go() {
+fn the_age_of_a_message_counts_from_its_release_by_the_throttle() {
     let mut bench = Bench::new();
     bench.throttle("/a", 5000, 2);
     for message in ["1", "2", "3"] {
@@ -67,7 +67,7 @@ fn a_message_ages_from_when_its_throttle_lets_it_go() {
 }
 
 #[test]
-fn a_queue_length_bounds_what_waits_while_the_client_does_not_take_all() {
+fn a_queue_length_bounds_the_queue_of_a_slow_client() {
     let topic: Arc<str> = "/a".into();
     let mut bench = Bench::new();
     let throttle = Throttle {
@@ -90,7 +90,7 @@ fn a_queue_length_bounds_what_waits_while_the_client_does_not_take_all() {
 }
 
 #[test]
-fn without_room_only_what_is_ahead_of_a_response_is_taken_and_only_fresh() {
+fn a_full_socket_takes_only_fresh_messages_ahead_of_a_response() {
     let mut bench = Bench::new();
     bench.push("/a", "old");
     bench.push("/b", "b");

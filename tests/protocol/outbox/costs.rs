@@ -40,7 +40,7 @@ fn a_long_message_is_there_until_its_last_byte_has_been_written() {
 
 /// A topic may have the action's name.
 #[test]
-fn feedback_is_past_all_throttles_and_drops_nothing_if_it_cannot_fit() {
+fn feedback_is_not_throttled_and_replaces_no_other_message() {
     let mut bench = Bench::new();
     bench.throttle("/a", 1000, 1);
     bench.push("/a", "1");

@@ -1,4 +1,4 @@
-//! Any course of an outbox, against its rules written down slowly.
+//! Random sequences of operations of an outbox, compared with a slow model.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 use super::Bench;
 
-/// The duties of an outbox, written down as slowly as they read: one list, searched from the front each time.
+/// A slow model of an outbox: one list, searched from the front each time.
 #[derive(Default)]
 struct Model {
     /// Queued and held back, in the order of their numbers.
@@ -105,7 +105,7 @@ impl Model {
     }
 
     fn set_throttle(&mut self, topic: usize, throttle: Option<(Duration, usize)>) {
-        // No time at all is no throttle.
+        // An interval of zero is no throttle.
         if let Some((interval, queue_length)) = throttle.filter(|(time, _)| !time.is_zero()) {
             let last = self.throttles.get(&topic).and_then(|throttle| throttle.2);
             self.throttles.insert(topic, (interval, queue_length, last));

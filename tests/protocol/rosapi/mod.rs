@@ -1,4 +1,4 @@
-//! Rosapi's answers, from the catalog and from what clients have registered; without a connection.
+//! Rosapi's answers, from the catalog and from clients' registrations, without a connection.
 //!
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 
@@ -6,7 +6,7 @@ use pendularm::protocol::catalog::{Action, Node, Rosapi, Service, Topic, types};
 use pendularm::protocol::ros::rosapi::{Census, ListedService, ListedTopic, answer};
 use serde_json::{Value, json};
 
-/// Clients that talk on `/chat` and about `/joint_states`, listen to `/wish`, and provide two services.
+/// Clients that publish on `/chat` and `/joint_states`, subscribe to `/wish`, and provide two services.
 fn census() -> Census {
     let topic = |name: &str, type_name: Option<&str>, published, subscribed| {
         let (name, type_name) = (name.into(), type_name.map(Into::into));

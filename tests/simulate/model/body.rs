@@ -1,4 +1,4 @@
-//! A message's body in either encoding: its sender, and a comparison with the sent one.
+//! The body of a message in either encoding: its sender, and a comparison with the sent body.
 
 use serde::Deserialize;
 
@@ -32,7 +32,7 @@ impl Body<'_> {
         }
     }
 
-    /// Whether it is what was sent: to the byte, or in another encoding to the value.
+    /// Whether it equals the sent body: in every byte, or in another encoding in every value.
     pub(super) fn is(&self, sent: &str) -> bool {
         match self {
             Self::Text(text) => *text == sent,

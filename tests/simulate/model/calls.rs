@@ -26,7 +26,7 @@ impl Model {
             return court.wrong(format!("a call lacks something: {text:.200}"));
         };
         let number = Json::read(args.get()).and_then(|args| args.get("call")?.number());
-        // Hostile clients call too.
+        // Hostile clients also call.
         let Some(forward) = number.and_then(|number| self.forwards.get_mut(&(number as u64)))
         else {
             return;

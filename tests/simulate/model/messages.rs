@@ -1,4 +1,4 @@
-//! Messages that a client receives on a topic: the right ones, unchanged, in order and not too often.
+//! Messages that a client receives on a topic: the expected ones, unchanged, in order and within the throttle.
 
 use std::time::Duration;
 

@@ -92,7 +92,7 @@ impl Course {
             Fault::PanicInPipe => {
                 self.abandon(at);
                 self.honest[at].fate.set(Fate::Panics);
-                // A pipe that nobody uses would not get to it.
+                // An unused pipe would not reach that byte.
                 self.honest[at].client.send_bytes(b" ".to_vec());
             }
             Fault::HalfClose => {
@@ -106,17 +106,17 @@ impl Course {
                 self.lose_provider(who);
             }
             Fault::Jump => {
-                // Bytes under way arrive first: a jump within a frame is a frame that took too long.
+                // Sent bytes arrive first, because a frame that is incomplete at the jump would exceed its time.
                 self.resume();
                 self.world.until_quiet().await;
                 self.look();
-                // So do the answers that providers have just given; they give no others until then.
+                // The latest answers of providers also arrive first. Providers give no others until then.
                 self.world.until_quiet().await;
                 self.listen(false);
                 let time =
                     Duration::from_millis(self.court.among(&[250, 300, 1000, 9_000, 14_000]));
                 self.world.jump(time).await;
-                // Providers now answer what they would have answered in the meantime.
+                // Providers now give the answers that were due in the meantime.
                 let now = Instant::now();
                 for (due, number, _) in self.honest.iter().flat_map(|one| &one.due_answers) {
                     if let Some(forward) = self.model.forwards.get_mut(number)
@@ -139,7 +139,7 @@ impl Course {
         }
     }
 
-    /// All who have stalled read again.
+    /// All stalled clients read again.
     pub(super) fn resume(&mut self) {
         for one in &mut self.honest {
             one.client.pause(false);

@@ -8,13 +8,13 @@ use super::Course;
 use crate::court::Verdict;
 use crate::honest::Expect;
 
-/// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
+/// Turns within which a light call is answered if its caller reads. They include the turns for all other frames.
 const LIGHT_TURNS: u64 = 30_000;
-/// Turns within which a computation is done, from the end of the client's one before, for each client that may compute.
-/// The longest computation of honest clients takes some 1,000 turns if no other client computes.
+/// Turns within which a computation ends, counted from the end of the client's previous one, for each client that
+/// computes. The longest computation of honest clients takes some 1,000 turns if no other client computes.
 const COMPUTED_TURNS: u64 = 2_000;
-/// The same for what is computed in a few turns: in two thousand seeds one took 43, beside a flood, and all others
-/// fewer than 40.
+/// The same for a short computation. In 2,000 seeds the longest took 43 turns, during a flood, and all others fewer
+/// than 40.
 const SHORT_TURNS: u64 = 80;
 /// Longest wait of a light call in virtual time.
 const LIGHT_TIME: Duration = Duration::from_secs(1);
@@ -100,8 +100,8 @@ impl Course {
             let taken = turns - next.turns.max(one.computed);
             court.at_most("most turns that a computation waits", taken);
             let clients = (self.honest.len() + self.hostile.len()) as u64;
-            // Where nothing is long on its way, what is over in a few turns has them soon, whatever others compute.
-            // In small pieces a client's own frames hold up its next one.
+            // Without long frames a short computation gets its turns soon, for any load by others. Frames in small
+            // pieces delay the client's next frame.
             let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
             let each = if is_wide && is_short {
                 court.at_most("most turns that a short one waits", taken);

@@ -18,11 +18,11 @@ use crate::plan::{Burst, Feature, Plan};
 use crate::workload::{UniqueNumbers, Workload};
 use crate::world::{World, in_virtual_time};
 
-/// Bytes in a pipe, and in a write, without which what a flood brings would be on its way for too long.
+/// Least bytes in a pipe and in a write for a flood. With fewer, its frames would arrive too late.
 const FLOODED_ROOM: usize = 4096;
 const FLOODED_PIECE: usize = 100;
-/// Processor time that all turns after one action may take, on a slow machine too. An arm with steps that are too short
-/// for real time takes seconds, because tests are built to be compiled quickly.
+/// Most processor time of all turns after one action, also on a slow machine. An arm with steps that are too short for
+/// real time takes seconds, because tests are compiled with few optimisations.
 const STANDSTILL: Duration = Duration::from_secs(10);
 
 /// The outcome of a seed.
@@ -34,7 +34,7 @@ pub struct Outcome {
     pub tally: std::collections::BTreeMap<&'static str, u64>,
 }
 
-/// Plays one seed; with bursts, if it is no older than they are.
+/// Plays one seed, with bursts unless it is older than they are.
 pub fn play(seed: u64, is_newest: bool, keeps_log: bool) -> Outcome {
     in_virtual_time(async {
         let court = Rc::new(Court::new(seed, keeps_log));
@@ -105,7 +105,7 @@ impl Course {
     }
 
     fn intrude(&self) -> Hostile {
-        // Theirs are wide, so that their messages arrive.
+        // Their pipes are wide, so their messages arrive.
         let (client, fate) = self.connect(1 << 16);
         self.court.count("hostile clients");
         Hostile::new(client, fate)
@@ -140,7 +140,8 @@ impl Course {
         }
     }
 
-    /// Everybody listens to something, and somebody provides what others call: else most of what follows is in vain.
+    /// Each client subscribes to a topic, and one provides a service. Otherwise most later actions would have no
+    /// effect.
     async fn settle_in(&mut self) {
         let provides = self
             .plan
@@ -237,7 +238,7 @@ impl Course {
                     self.pass(apart).await;
                 }
             }
-            // More than an outbox holds, while somebody does not read.
+            // More than an outbox holds, while a client does not read.
             Burst::Flood => {
                 if self.plan.scarce
                     || self.plan.room < FLOODED_ROOM
@@ -266,7 +267,7 @@ impl Course {
     }
 }
 
-/// Processor time of this thread so far, where the system tells it.
+/// Processor time of this thread so far, if the system has it.
 fn processor_time() -> Option<Duration> {
     processor_time_of("thread-self")
 }

@@ -19,7 +19,7 @@ impl Course {
     pub(super) async fn come_to_rest(&mut self) {
         self.hostile.clear();
         self.resume();
-        // Bytes that were sent before arrive before those that follow.
+        // Earlier bytes arrive before later ones.
         self.pass(Duration::from_millis(500)).await;
         // A goal ends when the arm is reset, and time passes when it is not paused.
         let mut sober = self.enter();
@@ -66,8 +66,8 @@ impl Course {
         self.check_messages();
     }
 
-    /// Whether all that is owed has come. Calls that may wait for a day do not count, nor does whoever has stopped
-    /// sending.
+    /// Whether every required answer has arrived. Calls that may wait for a day do not count, nor do clients that have
+    /// stopped sending.
     fn has_all(&self, one: &Honest) -> bool {
         let may_wait = |call: &Expect| match call {
             Expect::Forwarded(number) => self
@@ -102,7 +102,7 @@ impl Course {
         self.honest.iter().all(quiet) && self.world.pool.is_idle()
     }
 
-    /// Every message has come that had to, and of a throttled topic the newest.
+    /// Every required message has arrived, and of a throttled topic the newest.
     fn check_messages(&mut self) {
         for at in 0..self.honest.len() {
             let one = &self.honest[at];
@@ -171,10 +171,10 @@ impl Course {
     }
 }
 
-/// Whether the last message that came is the last that somebody sent.
+/// Whether the last received message is the last one of its publisher.
 fn has_newest(one: &crate::honest::Subscription) -> bool {
     let last = one.last.map(|(number, _)| number);
-    // Sent before the subscription, or by a client that is gone: it may be handled behind newer ones of others.
+    // A message from before the subscription, or of a disconnected client, may be handled after newer ones of others.
     let is_from_before = one
         .last_from
         .is_some_and(|from| !one.newest.contains_key(&from));

@@ -1,4 +1,4 @@
-//! Requests that take their time: computations, goals, trials.
+//! Requests that take some time: computations, goals, trials.
 
 use super::*;
 
@@ -28,7 +28,7 @@ impl Workload<'_> {
                 let args = format!(
                     "{{\"q0\":{q},\"duration\":{duration},\"timestep\":{timestep},\"integrator\":\"{name}\",\"params\":{params},\"samples\":{samples}}}"
                 );
-                // A sample a step at most, and the start.
+                // At most one sample per step, and the start.
                 let steps = (duration / timestep).round() as usize;
                 let expect = Expect::Computed {
                     entries: samples.min(steps + 1),
@@ -54,8 +54,8 @@ impl Workload<'_> {
         }
     }
 
-    /// The longest of all that clients compute: others' computations have their turns beside it. With 3 links it takes the
-    /// time of several seeds, and a second one asks nothing that the first has not asked.
+    /// The longest computation of clients, so others take turns with it. With 3 links it would take the time of several
+    /// seeds, and a second one would test nothing new.
     pub fn compute_long(&mut self) {
         let few = if self.plan.links == 3 { 1 } else { u64::MAX };
         if self.court.counted(LONG) >= few {
@@ -123,7 +123,7 @@ impl Workload<'_> {
 
     pub(super) fn goal(&mut self) {
         if self.court.chance(0.3) {
-            // This ends the active goal, whosever it is.
+            // This ends the active goal of any client.
             self.model.ends_any_goal = true;
             return self.call("/ik_action/cancel_goal", "{}", Expect::Anything, true);
         }

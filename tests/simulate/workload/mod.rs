@@ -1,4 +1,4 @@
-//! Requests of honest clients, and the answers that they then expect.
+//! Requests of honest clients, and their expected answers.
 
 mod computations;
 mod providers;
@@ -33,14 +33,14 @@ const WATCHED: [&str; 9] = [
     "/robot_description",
     "/arm_sim/error_estimate",
 ];
-/// Hostile clients may have taken all places for others: then the powers of two below count.
+/// If hostile clients have taken all places, the powers of two below count.
 const PIECE_SIZES: [usize; 7] = [64, 65, 80, 127, 128, 200, 263];
 const FUNCTIONS: [&str; 4] = ["sin(t)", "-9.81", "t^2 / (1 + t)", "exp(-t) * cos(3 * t)"];
 /// Default timeout of a forwarded call.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
-/// Turns after which what was sent has been handled, through the narrowest pipe.
+/// Turns after which all sent frames have been handled, through the narrowest pipe.
 const SETTLED: u64 = 1000;
-/// Bytes of a message in a flood: as many as are read where they come.
+/// Bytes of a message in a flood: few enough to be read on the gateway's thread.
 const FLOODING: usize = 60_000;
 const DAY: Duration = Duration::from_secs(24 * 3600);
 
@@ -96,7 +96,7 @@ impl Workload<'_> {
         }
     }
 
-    /// A fresh id, in every form that JSON has.
+    /// A new id, of every JSON type.
     fn id(&mut self) -> String {
         let n = self.numbers.next();
         match self.court.below(10) {
@@ -144,7 +144,7 @@ impl Workload<'_> {
             .note_call(&id, &format!("{spelling} {args}"), expect, is_light, court);
     }
 
-    /// The name, now and then without its slash.
+    /// The name, sometimes without its slash.
     fn spelled(&self, name: &str) -> String {
         let plain = self.court.chance(0.8);
         if plain { name } else { &name[1..] }.to_owned()

@@ -1,4 +1,4 @@
-//! Calls of the runtime's own services, right and wrong, whole and in pieces.
+//! Calls of the runtime's own services, valid and invalid, whole and in pieces.
 
 use super::*;
 
@@ -17,7 +17,7 @@ impl Workload<'_> {
             let reach = self.plan.links as f64 * reach;
             let (x, y) = (0.9 * reach * x, 0.9 * reach * y);
             let args = format!("{{\"x\":{x},\"y\":{y}}}");
-            // Three links are asked for an orientation only where one is given.
+            // With three links an orientation is requested only if one is given.
             self.call("/ik/solve", &args, Expect::Member("positions"), true);
         } else {
             let args = self.court.among(&["{}", "[]", "{\"unknown\":[1,{}]}"]);

@@ -85,7 +85,7 @@ impl Workload<'_> {
             } else {
                 self.court.note("sends", frame.as_bytes());
                 if self.plan.together {
-                    // Line behind line they go through as one.
+                    // Consecutive lines are forwarded as one op.
                     self.me().send_with_next(&frame);
                 } else {
                     self.me().send(&frame, 0);
@@ -121,7 +121,8 @@ impl Workload<'_> {
         self.me().flush();
     }
 
-    /// One message, on a topic whose messages are throttled for somebody, if there is such; gives the least time between two.
+    /// One message on a topic that is throttled for a subscriber, if there is one. Returns the least time between two
+    /// messages.
     pub fn stream(&mut self) -> Duration {
         let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
         let throttled = subscriptions
@@ -134,9 +135,9 @@ impl Workload<'_> {
         interval
     }
 
-    /// More than an outbox holds, for another client that subscribes to it; gives that one's place.
+    /// More than an outbox holds, for another client that subscribes to it. Returns that client's index.
     pub fn flood(&mut self) -> Option<usize> {
-        // A thousand pieces of each of its messages would take all the time there is, and hostile clients ask for pieces on one topic.
+        // Hostile clients request pieces on one topic. A thousand pieces of each message would take too much time.
         let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
         let in_pieces: Vec<&str> = subscriptions
             .filter(|one| one.is_in_pieces)

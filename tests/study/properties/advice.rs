@@ -50,7 +50,10 @@ fn start<const N: usize>(dice: &mut Dice, setpoint: &[f64; N]) -> State<N> {
     }
 }
 
-fn what_settles_is_not_lost_at_the_advice<const N: usize>(case: u64, tally: &mut Tally) {
+fn a_settling_loop_does_not_diverge_at_the_advised_timestep<const N: usize>(
+    case: u64,
+    tally: &mut Tally,
+) {
     let mut dice = Dice::of(case);
     let arm = if dice.one_in(2) {
         pendularm::math::arm::Arm::default()
@@ -91,8 +94,12 @@ fn what_settles_is_not_lost_at_the_advice<const N: usize>(case: u64, tally: &mut
 }
 
 #[test]
-fn what_settles_is_not_lost_at_the_timestep_that_is_advised() {
-    let tally = property!(what_settles_is_not_lost_at_the_advice, 60, 100_000);
+fn a_settling_motion_does_not_diverge_at_the_advised_timestep() {
+    let tally = property!(
+        a_settling_loop_does_not_diverge_at_the_advised_timestep,
+        60,
+        100_000
+    );
     assert_eq!(tally.outside, 0, "{tally:?}");
     // Many of these loops never settle.
     assert!(4 * tally.tried > tally.open, "{tally:?}");

@@ -1,4 +1,4 @@
-//! Suggested gains, on moves that their search has not made.
+//! Suggested gains, on moves that their search has not simulated.
 
 use std::f64::consts::TAU;
 
@@ -45,7 +45,7 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     );
     let mut live = control.simulation(State::rest());
     let mut off_at = 0.0;
-    // Ten moves stand for all of them: another may take a half more.
+    // Ten moves represent all of them. Another one may take 1.5 times as long.
     while live.time() < 2.0 * requirements.settling_time {
         assert!(live.step(), "{told}: diverged");
         let off = |i: usize| (live.state().position[i] - control.setpoint.position[i]).abs();
@@ -69,7 +69,7 @@ fn refusal(control: &ControlLoop<2>, requirements: GainsRequirements) -> GainsEr
 }
 
 #[test]
-fn what_cannot_be_had_is_refused_with_its_reason() {
+fn an_unavailable_resource_is_refused_with_its_reason() {
     let slow = ControlLoop::free(Arm::<2>::default()).with_timestep(0.5);
     let requirements = GainsRequirements {
         settling_time: 4.0,

@@ -151,6 +151,6 @@ fn no_pose_of_a_random_loop_is_worse_than_the_worst() {
 
 /// Its gains diverge without gravity, in a pose that gravity stabilises. The critical motion is the one without gravity.
 #[test]
-fn what_is_critical_grows_also_where_only_the_arm_without_weight_runs_away() {
+fn a_critical_motion_grows_also_if_only_the_weightless_arm_is_unstable() {
     no_pose_is_worse_than_the_worst::<3>(285, &mut Tally::default());
 }

@@ -124,7 +124,7 @@ fn run(claim: &str, cases: impl Iterator<Item = u64>, check: impl Fn(u64, &mut T
     tally
 }
 
-/// The cases of a test, or those that the environment asks for: `per` of a million.
+/// The cases of a test, or those of the environment: `per` of a million.
 fn cases(few: u64, per: u64) -> std::ops::Range<u64> {
     let number = |name: &str| -> Option<u64> { std::env::var(name).ok()?.parse().ok() };
     let from = number("FROM").unwrap_or(0);

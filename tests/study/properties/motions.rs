@@ -1,4 +1,4 @@
-//! Planned runs and answered errors, against motions of twice the digits.
+//! Planned runs and returned errors, against motions of twice the digits.
 
 use std::f64::consts::PI;
 
@@ -57,7 +57,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
     }
 }
 
-/// The true error is within the uncertainty of the one that a rollout answers, of regular motions and of chaotic ones.
+/// The true error is within the uncertainty of a rollout's error, for regular and for chaotic motions.
 fn an_uncertainty_holds_the_true_error<const N: usize>(case: u64, tally: &mut Tally) {
     let mut dice = Dice::of(case);
     let arm = dice.arm::<N>();

@@ -6,7 +6,7 @@ use super::{ask, json_of, said};
 use crate::common::Runtime;
 
 #[test]
-fn diagnostics_are_a_page_and_their_status_tells_whether_all_is_well() {
+fn diagnostics_are_a_page_and_their_exit_status_shows_whether_every_part_is_ok() {
     let runtime = Runtime::start();
     let page = said(&runtime, &["diagnostics"]);
     assert!(page.starts_with("OK arm_sim: running\n  state "), "{page}");

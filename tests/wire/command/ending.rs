@@ -81,7 +81,7 @@ fn server(says: &'static [u8], closes: bool) -> SocketAddr {
 }
 
 #[test]
-fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
+fn an_absent_or_silent_server_gives_status_3() {
     for (says, closes, word) in [
         (&b""[..], true, "closed"),
         (
@@ -139,7 +139,7 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
 
 /// As in `pendularm topic echo /clock | head -n 1`.
 #[test]
-fn a_reader_that_goes_away_ends_a_command_quietly() {
+fn a_closed_pipe_ends_a_command_without_an_error() {
     let runtime = Runtime::start();
     let address = runtime.address.to_string();
     for command in [
@@ -172,7 +172,7 @@ fn a_reader_that_goes_away_ends_a_command_quietly() {
 /// Every write to `/dev/full` fails.
 #[cfg(target_os = "linux")]
 #[test]
-fn output_that_cannot_be_written_is_no_success() {
+fn an_output_error_is_no_success() {
     let runtime = Runtime::start();
     let full = fs::File::options().write(true).open("/dev/full").unwrap();
     let output = common::program()
@@ -203,7 +203,7 @@ fn the_pages_of_help_have_examples_and_the_exit_statuses() {
         let subject = self::output(&[verb[0], "--help"]).stdout;
         let subject = String::from_utf8(subject).unwrap();
         assert!(
-            subject.contains("Exit status: 0 if") || verb.len() == 1,
+            subject.contains("Exit status: 0 for") || verb.len() == 1,
             "{subject}"
         );
         let widest = page.lines().map(|line| line.chars().count()).max();

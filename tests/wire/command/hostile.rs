@@ -78,7 +78,7 @@ const GOAL: [&str; 3] = ["action", "send_goal", "/t"];
 const FOREIGN: &[u8] = b"{\"op\":\"publish\",\"topic\":\"/other\",\"msg\":{}}\n";
 
 #[test]
-fn what_was_not_awaited_puts_no_timeout_off() {
+fn an_unexpected_frame_extends_no_timeout() {
     for command in [ECHO, CALL, GOAL] {
         for bytes in [FOREIGN, b" "] {
             let arguments = [&command[..], &["--timeout", "0.3"]].concat();

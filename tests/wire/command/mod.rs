@@ -20,7 +20,7 @@ use crate::common::{self, Runtime, signal};
 /// A command with the address of a runtime, ready to be started.
 fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
     let mut command = common::program();
-    // Behind `--` there are no options any more.
+    // After `--` there are no options.
     let (verb, rest) = arguments.split_at(arguments.len().min(2));
     command
         .args(verb)

@@ -105,7 +105,7 @@ fn a_command_that_moves_the_arm_hints_that_the_controller_is_off() {
 }
 
 #[test]
-fn an_address_has_any_form_and_stands_anywhere() {
+fn an_address_has_any_form_and_any_place() {
     let runtime = Runtime::start();
     let port = runtime.address.port();
     let output = |words: &[&str]| common::program().args(words).output().unwrap();

@@ -1,9 +1,9 @@
 //! Commands and their outcome, a row each: `rows.txt`.
 //!
-//! A paragraph begins with `# ` and its statement, and asks a runtime of its own. A row is an exit status, the arguments as a shell reads them,
-//! ` = ` and a part of the output. With ` == ` it is the whole output. Both may have the escapes of JSON. A command that succeeds says nothing on
-//! standard error. One that fails has one line there and no other output. `%3*x%` is `xxx`. A row that begins with `!` has no address of the
-//! runtime.
+//! A paragraph begins with `# ` and its statement, and uses its own runtime. A row is an exit status, the arguments as
+//! a shell reads them, ` = ` and a part of the output. With ` == ` it is the whole output. Both may have the escapes of
+//! JSON. A successful command writes nothing to standard error. A failed one writes one line there and nothing else.
+//! `%3*x%` is `xxx`. A row that begins with `!` has no address of the runtime.
 
 use super::ask;
 use crate::common::{self, Runtime};

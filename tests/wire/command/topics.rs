@@ -6,7 +6,7 @@ use super::{Going, ask, said};
 use crate::common::{self, Client, Runtime};
 
 #[test]
-fn what_another_client_says_acts_on_no_terminal_and_loses_nothing() {
+fn text_of_other_clients_is_escaped_without_loss() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     let msg = json!({"data": "\u{1b}[2J\u{202e}\u{9b}31m\r\n---\n", "ok": "\u{e9} yes: no", "\u{1b}": [[], {}, [1, [2]]]});
@@ -50,7 +50,7 @@ fn wait_for_subscriber(client: &mut Client, topic: &str, count: usize) {
 
 /// The rate is asked for by two independent numbers: it is the inverse of the mean, which lies between the extremes.
 #[test]
-fn a_rate_is_told_every_second_until_a_signal() {
+fn a_rate_is_printed_every_second_until_a_signal() {
     let runtime = Runtime::start();
     let mut child = Going::start(&runtime, &["topic", "hz", "/clock", "--json"]);
     let first: Value = serde_json::from_str(&child.line()).unwrap();
@@ -74,7 +74,7 @@ fn a_rate_is_told_every_second_until_a_signal() {
 }
 
 #[test]
-fn messages_are_published_once_so_many_times_or_until_a_signal() {
+fn messages_are_published_once_n_times_or_until_a_signal() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));

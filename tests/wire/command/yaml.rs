@@ -51,7 +51,7 @@ fn values() -> impl Strategy<Value = Value> {
 
 proptest! {
     #[test]
-    fn what_is_written_as_yaml_is_read_as_the_same_value(value in values()) {
+    fn a_value_written_as_yaml_is_read_as_the_same_value(value in values()) {
         let mut text = Vec::new();
         write_yaml(&to_raw_value(&value).unwrap(), "", &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
@@ -86,7 +86,7 @@ fn a_line_of_json_is_one_line_and_keeps_what_it_says() {
     );
 }
 
-/// An output whose reader goes away.
+/// An output whose reader closes the pipe.
 struct Pipe(usize);
 
 impl Write for Pipe {
@@ -101,7 +101,7 @@ impl Write for Pipe {
 }
 
 #[test]
-fn a_long_value_is_written_no_further_than_somebody_reads() {
+fn a_long_value_is_written_only_as_far_as_it_is_read() {
     let raw = to_raw_value(&vec![vec!["text"; 1000]; 100]).unwrap();
     let mut pipe = Pipe(0);
     let written = write_yaml(&raw, "", &mut pipe);

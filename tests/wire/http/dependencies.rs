@@ -1,8 +1,8 @@
-//! Crates that only the web's door needs.
+//! Crates that only the web server needs.
 
 use std::process::Command;
 
-/// The program without the feature web is to have nothing of it.
+/// The program without the feature `web` must not contain them.
 #[test]
 fn without_the_feature_no_crate_of_the_web_door_is_built_in() {
     let tree = |arguments: &[&str]| {

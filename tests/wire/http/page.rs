@@ -72,7 +72,7 @@ fn the_log_names_the_pages_address_at_the_start() {
     runtime.await_line(&page);
 }
 
-/// A browser shows nobody the answer to a handshake.
+/// A browser does not show the answer to a handshake.
 #[test]
 fn the_log_names_the_option_for_a_foreign_origin() {
     let mut runtime = Logged::start(program(), Stdio::null());

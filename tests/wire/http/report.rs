@@ -135,7 +135,7 @@ fn no_path_leads_out_of_the_reports_folder() {
 /// A pipe without a writer would keep its reader waiting.
 #[cfg(unix)]
 #[test]
-fn a_pipe_in_the_reports_folder_holds_up_nobody() {
+fn a_pipe_in_the_reports_folder_blocks_no_client() {
     let folder = folder("pipe");
     let made = Command::new("mkfifo").arg(folder.join("a.txt")).status();
     if !made.is_ok_and(|status| status.success()) {

@@ -1,9 +1,9 @@
-//! Requests by HEAD, and those that are refused while more of them comes. `tests/actors/exchanges/` has the others.
+//! Requests by HEAD, and requests that are refused before they are complete. `tests/actors/exchanges/` has the others.
 
 use crate::common::Runtime;
 use crate::web_client::exchange;
 
-/// Health checks ask so.
+/// Health checks use this method.
 #[test]
 fn head_has_the_head_of_the_answer_to_get_and_no_body() {
     let runtime = Runtime::start();
@@ -25,7 +25,7 @@ fn head_has_the_head_of_the_answer_to_get_and_no_body() {
 
 /// A socket that is closed with unread input is reset, and the answer is lost.
 #[test]
-fn what_follows_a_refused_head_is_swallowed_and_the_answer_can_be_read() {
+fn bytes_after_a_refused_head_are_discarded_and_the_answer_can_be_read() {
     let runtime = Runtime::start();
     let long = format!(
         "GET / HTTP/1.1\r\nHost: {}\r\nX: {}\r\n\r\n",

@@ -1,4 +1,4 @@
-//! Arguments that are no text, and any at all. `tests/wire/command/rows.txt` has those that are refused by name.
+//! Arguments that are no text, and random ones. `tests/wire/command/rows.txt` has those that are refused by name.
 
 #[cfg(unix)]
 use std::ffi::OsString;
@@ -24,7 +24,7 @@ fn bytes_that_are_no_text_are_refused_like_any_other_value() {
 }
 
 proptest! {
-    /// Any arguments give an answer, and a refusal is one line without control characters.
+    /// Random arguments give a result, and a refusal is one line without control characters.
     #[test]
     fn no_arguments_break_the_reader(
         arguments in prop::collection::vec(

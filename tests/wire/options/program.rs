@@ -1,4 +1,4 @@
-//! The program itself: how it ends, and on which of its outputs it says why.
+//! The program itself: its end, and the output with the reason.
 
 use std::process::{Command, Stdio};
 
@@ -11,7 +11,7 @@ fn program(arguments: &[&str]) -> Command {
     command
 }
 
-/// The address is taken: by a listener of this test's own.
+/// A listener of this test uses the address.
 #[test]
 fn as_json_the_reason_for_not_starting_is_an_object_too() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
@@ -31,7 +31,7 @@ fn as_json_the_reason_for_not_starting_is_an_object_too() {
 
 /// An address of documentation (RFC 5737) is no machine's.
 #[test]
-fn an_address_that_cannot_be_had_is_refused_with_the_remedy() {
+fn an_unavailable_address_is_refused_with_the_remedy() {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = listener.local_addr().unwrap().to_string();
     for (address, remedy) in [
@@ -89,7 +89,7 @@ fn output_that_is_lost_is_a_failure() {
 }
 
 #[test]
-fn a_reader_that_is_gone_is_no_failure() {
+fn a_closed_pipe_is_no_failure() {
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let output = program(&["--help"]).stdout(writer).output().unwrap();
@@ -98,7 +98,7 @@ fn a_reader_that_is_gone_is_no_failure() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_complaint_that_nobody_takes_changes_no_exit_status() {
+fn an_error_message_that_is_not_read_changes_no_exit_status() {
     let status = |arguments: &[&str]| {
         let mut program = program(arguments);
         program.stdout(full()).stderr(full());

@@ -84,7 +84,7 @@ fn every_variable_is_taken_and_a_wrong_one_is_refused_by_name_and_value() {
 }
 
 #[test]
-fn an_option_wins_over_its_variable_and_a_command_looks_at_none_of_serving() {
+fn an_option_overrides_its_variable_and_a_command_ignores_the_servers_variables() {
     let wrong = [("ARM_SIM_BIND", "nowhere"), ("ARM_SIM_TOKEN", "short")];
     assert_taken(&TAKEN, &wrong);
     let plan = output(&["plan", "--error", "0.1", "--duration", "0.1"], &wrong);

@@ -36,7 +36,7 @@ impl<const N: usize> Kernel<N> {
             ));
         };
         if !own.is_computation() {
-            self.attend();
+            self.take_due_steps();
         }
         let to = Address::new(own, service.into_boxed_str(), id).with_errors(self.error_form);
         match own {
@@ -82,7 +82,7 @@ impl<const N: usize> Kernel<N> {
         }
     }
 
-    /// Reads a question, answers it, and writes the answer after all news of goals.
+    /// Reads a question, answers it, and writes the answer after all reports of goals.
     fn answer<A: Answered>(
         &mut self,
         service: Service,
@@ -111,7 +111,7 @@ impl<const N: usize> Kernel<N> {
         });
     }
 
-    /// Takes all steps, with the news of the goal in between.
+    /// Takes all steps, with the reports of the goal in between.
     fn step(&mut self, ask: Step<N>) -> <Step<N> as pendularm::services::Ask>::Answer {
         let mut asked = self.arm.begin_steps(ask)?;
         loop {

@@ -109,20 +109,20 @@ impl<const N: usize> Kernel<N> {
                 self.verbosity = verbosity;
                 self.error_form = errors.unwrap_or(self.error_form);
             }
-            Ok(_) => self.complain("this operation needs a server", id.as_ref()),
+            Ok(_) => self.send_error("this operation needs a server", id.as_ref()),
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
                 let form = self.error_form;
                 self.send(messages::failure(&service, id.as_ref(), &why, form));
             }
-            Err(why) => self.complain(&why.to_string(), id.as_ref()),
+            Err(why) => self.send_error(&why.to_string(), id.as_ref()),
         }
         self.settle();
     }
 
     /// Publishes due messages, 60 times a second.
     pub fn tick(&mut self) {
-        self.attend();
+        self.take_due_steps();
         if let Some(control) = self.arm.limit_to_predict() {
             self.arm.keep_limit(control, Some(clock_limits(&control)));
         }
@@ -154,7 +154,7 @@ impl<const N: usize> Kernel<N> {
     }
 
     /// Takes the due steps.
-    fn attend(&mut self) {
+    fn take_due_steps(&mut self) {
         self.arm.catch_up();
         self.settle();
     }
@@ -171,7 +171,7 @@ impl<const N: usize> Kernel<N> {
         self.arm.world().send(frame.as_ref());
     }
 
-    fn complain(&self, why: &str, id: Option<&Payload>) {
+    fn send_error(&self, why: &str, id: Option<&Payload>) {
         self.tell(Level::Error, why, id);
     }
 
@@ -186,9 +186,9 @@ impl<const N: usize> Kernel<N> {
     fn take_message(&mut self, name: &str, msg: &Payload, id: Option<&Payload>) {
         let topic = Topic::from_name(name);
         let Some(topic) = topic.filter(|topic| topic.direction() == Direction::Subscribed) else {
-            return self.complain(&format!("topic: nobody listens to {name} here"), id);
+            return self.send_error(&format!("topic: nobody listens to {name} here"), id);
         };
-        self.attend();
+        self.take_due_steps();
         self.arm.world().pass_on(topic, msg);
         let refused = match topic {
             Topic::JointTrajectory => read_setpoint(msg)
@@ -202,7 +202,7 @@ impl<const N: usize> Kernel<N> {
             _ => None,
         };
         if let Some(why) = refused {
-            self.complain(&format!("{}: {why}", topic.name()), id);
+            self.send_error(&format!("{}: {why}", topic.name()), id);
         }
     }
 }

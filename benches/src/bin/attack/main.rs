@@ -1,9 +1,9 @@
 //! Attacks on the release program, one after the other, and the service of a healthy client during each.
 //!
 //! `attack PATH/TO/pendularm [--quick] [--list] [--only=WORD,WORD]`. For every attack the program is started anew on a
-//! free port. A healthy client makes a light call every 10 ms and watches `/joint_states`. Four times a second a newcomer
-//! connects, does a little of everything, and leaves. SIGTERM comes in the middle of the attack. Exit status 1 if a bar is
-//! missed. Linux only: memory is read from `/proc`.
+//! free port. A healthy client makes a light call every 10 ms and watches `/joint_states`. Four times a second a new
+//! client connects, does a little of everything, and disconnects. SIGTERM is sent in the middle of the attack. Exit
+//! status 1 if a bar is missed. Linux only: memory is read from `/proc`.
 
 mod table;
 
@@ -20,19 +20,19 @@ use pendularm_benches::program::{Program, peak};
 
 use table::{Bars, Row, Verdict};
 
-/// From the healthy client's first call to the attack.
+/// Time from the healthy client's first call to the attack.
 const CALM: Duration = Duration::from_millis(100);
 /// Bytes of the report's file that slow readers ask for.
 const LARGE: usize = 8 * 1024 * 1024;
 
-/// How long, how strict, which.
+/// Duration, strictness and selection of the attacks.
 struct Plan {
     program: String,
     attacked: Duration,
-    /// Until a call or a newcomer counts as not answered.
+    /// Time until a call or a new client counts as not answered.
     patience: Duration,
     bars: Bars,
-    /// How often an attack is played until it is in time.
+    /// Most repetitions of an attack that was too slow.
     tries: usize,
     /// Parts of the names of the attacks to play, separated by commas. All if empty.
     only: String,
@@ -54,8 +54,8 @@ impl Plan {
         if !arguments.iter().any(|argument| argument == "--quick") {
             return full;
         }
-        // A machine that pauses for seconds answers late; a client that is not answered at all waits for ever. A play of a second is
-        // late as a whole if the machine pauses once in it.
+        // A machine that pauses for seconds answers late, so only a missing answer counts. One pause of the machine can
+        // delay a whole play of a second.
         Self {
             attacked: Duration::from_millis(900),
             patience: Duration::from_secs(20),
@@ -100,7 +100,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Plays everything that was picked; the names of what missed a bar.
+/// Plays all selected attacks. Returns the names of those that missed a bar.
 fn run(plan: &Plan) -> Result<Vec<&'static str>, String> {
     let mut missed = Vec::new();
     println!("{}", plan.bars);
@@ -194,7 +194,7 @@ fn endure(attack: &Attack, plan: &Plan) -> Result<Row, String> {
 struct Folder(PathBuf);
 
 impl Folder {
-    /// Makes it, and goes there; the program's path from the root.
+    /// Creates it, and changes to it. Returns the program's absolute path.
     fn enter(program: &str) -> Result<(Self, String), String> {
         let program =
             std::fs::canonicalize(program).map_err(|error| format!("{program}: {error}"))?;

@@ -1,4 +1,4 @@
-//! The table: a row per attack, what misses a bar marked with a star.
+//! The table: a row per attack, with a star at each missed bar.
 
 use std::fmt;
 use std::sync::atomic::Ordering;
@@ -26,7 +26,7 @@ impl Bars {
         peak: 700.0,
         end: Duration::from_secs(1),
     };
-    /// A busy machine may be late; it may not hold more, lose answers, or stay.
+    /// A busy machine may only be late. More memory, lost answers, or a missing end are faults.
     pub const QUICK: Self = Self {
         p99: 500.0,
         gap: 1_000.0,
@@ -56,7 +56,7 @@ impl fmt::Display for Bars {
     }
 }
 
-/// Whether every bar held; where some did not, whether times alone were missed.
+/// Whether every bar was met, and if not, whether only times were missed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     Held,
@@ -68,11 +68,11 @@ pub enum Verdict {
 pub struct Row {
     pub name: &'static str,
     pub health: Health,
-    /// Newcomers have a place, and must be served.
+    /// New clients have a place, and must be served.
     pub newcomers_welcome: bool,
     /// Resident memory \[MB\].
     pub peak: f64,
-    /// From SIGTERM to the end, and the exit status.
+    /// Time from SIGTERM to the end, and the exit status.
     pub ended: Result<(Duration, Option<i32>), String>,
     pub deeds: Deeds,
     /// There were attackers.
@@ -137,7 +137,7 @@ impl Row {
             self.deeds.connections.load(Ordering::Relaxed),
             self.deeds.sent.load(Ordering::Relaxed),
         );
-        // An attack that did nothing shows nothing.
+        // An attack without any action shows nothing.
         let connections = mark(connections.to_string(), !self.attacked || connections > 0);
         println!(
             "{:<21} {answered:>11} {p50:>8.1} {p99:>9} {most:>9.0} {gap:>10} {served:>8} {:>9.0} {peak:>8} \

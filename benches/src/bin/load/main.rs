@@ -1,10 +1,10 @@
 //! Messages between many clients: pendularm beside redis (pub/sub) and mosquitto, the same messages in the same run.
 //!
 //! `load ports N` prints N free ports of loopback. `load PATH/TO/pendularm SERVER=ADDRESS=PID ... [--quick]` starts
-//! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene is played to each server in turn, by the same
-//! client on one thread. The processor time of the server for a delivery is compared: it hardly depends on other work
-//! of the machine. Fails if a message is lost, comes twice or comes out of order. Linux only: the figures are read from
-//! `/proc`.
+//! pendularm and measures it beside servers that run already, for `benches/load/run.sh`. Round after round every scene
+//! is played to each server in turn, by the same client on one thread. The processor time of the server for a delivery
+//! is compared: it depends little on other work of the machine. Fails if a message is lost, comes twice or comes out of
+//! order. Linux only: the figures are read from `/proc`.
 
 mod fleet;
 mod message;
@@ -21,7 +21,7 @@ use pendularm_benches::protocol::Protocol;
 /// The rate of the arm's topics, and of all publishers that do not flood.
 const RATE: Traffic = Traffic::Rate(60.0);
 
-/// The scenes that are played. The last of the fan-outs is that of the arm's own topic.
+/// The scenes. The last fan-out is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
     Scene {
         name: "60 Hz to 1",
@@ -73,11 +73,11 @@ const SCENES: [Scene; 8] = [
     },
 ];
 
-/// How long, how often.
+/// Duration and number of rounds.
 struct Plan {
     rounds: usize,
     seconds: f64,
-    /// Length of a run with probes beside it \[s\].
+    /// Length of a run with probes \[s\].
     probed_seconds: f64,
     bars: bool,
 }
@@ -101,7 +101,7 @@ pub struct Played {
     pub clock: Option<f64>,
 }
 
-/// Whether the arm's time and a caller's are looked at, too.
+/// Whether the arm's time and a caller's time are also measured.
 fn is_probed(scene: &Scene) -> bool {
     scene.subscribers >= 1000 || scene.traffic == Traffic::Flood
 }
@@ -201,7 +201,7 @@ fn rest(server: &Server, seconds: f64) -> f64 {
     (processor(server.pid) - before) as f64 / began.elapsed().as_secs_f64()
 }
 
-/// Plays a scene to each server in turn, as many rounds as planned; then once more with probes beside it.
+/// Plays a scene to each server in turn for all rounds, then once more with probes.
 fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played)> {
     let takes_part =
         |server: &&Server| scene.traffic != Traffic::Arm || server.protocol == Protocol::Pendularm;

@@ -1,4 +1,4 @@
-//! A server under load, seen by another client: the time of a light request, and whether the arm keeps real time.
+//! A server under load, measured by another client: the time of a light request, and whether the arm keeps real time.
 //!
 //! **Invariant:** each probe has its own connection and thread, and sends few requests.
 
@@ -117,7 +117,7 @@ impl Client {
         client
     }
 
-    /// Reads until something comes that `wanted` takes; `None` if it does not come in time.
+    /// Reads until `wanted` accepts an event. Returns `None` if none arrives in time.
     fn listen<T>(&mut self, patience: Duration, wanted: impl Fn(Event) -> Option<T>) -> Option<T> {
         self.stream
             .set_read_timeout(Some(patience))

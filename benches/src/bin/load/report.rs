@@ -12,7 +12,7 @@ const MOST_DRIFT: f64 = 0.001;
 /// For 99 of 100 calls \[ms\].
 const MOST_DELAY: f64 = 5.0;
 
-/// Servers with what they take in a second without clients \[ns\].
+/// Servers with their processor time in a second without clients \[ns\].
 pub type Rest = [(Protocol, f64)];
 
 pub fn print_rest(rest: &Rest) {
@@ -189,7 +189,7 @@ fn costs(played: &Played) -> Vec<f64> {
         .collect()
 }
 
-/// The same as a median, without what the server takes in any case.
+/// The same as a median, without the server's idle time.
 fn net(protocol: Protocol, played: &Played, rest: &Rest) -> f64 {
     let rest = rest
         .iter()

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Two results of one name may differ by this much, relative to the largest number of the result. Mass matrices of these arms
 /// have condition numbers up to some hundred, so rounding alone makes some 1e-14; a wrong inertia, sign or stage, 1e-3.
 const BOUND: f64 = 1e-13;
-/// The end of the swing: a thousand steps' roundings add up.
+/// The end of the swing, where the roundings of a thousand steps add up.
 const SWING_BOUND: f64 = 1e-12;
 
 /// The C that Pinocchio generates, by each of its builds.
@@ -70,7 +70,8 @@ pub(crate) fn compare(folder: &Path) {
     compare_times(folder);
 }
 
-/// Every program's results against every other's, the worst of each kind printed. False if one is out of bounds.
+/// Compares the results of all programs pairwise, and prints the worst of each kind. Returns false if one is out of
+/// bounds.
 fn compare_results(folder: &Path, links: usize) -> bool {
     let prefix = format!("check-{links}-");
     let mut programs: Vec<(String, Results)> = Vec::new();
@@ -86,7 +87,7 @@ fn compare_results(folder: &Path, links: usize) -> bool {
     }
     programs.sort_by(|a, b| a.0.cmp(&b.0));
     assert!(programs.len() > 1, "nothing to compare with");
-    // Kind of result: worst difference, and between whom.
+    // Kind of result: the worst difference, and the two programs.
     let mut worst: BTreeMap<&str, (f64, String)> = BTreeMap::new();
     for (i, (a_name, a)) in programs.iter().enumerate() {
         for (b_name, b) in &programs[i + 1..] {

@@ -30,7 +30,7 @@ use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
 use pendularm_benches::random::spread;
 
-// As in harness.h, which says what they mean.
+// The same as in harness.h, which explains them.
 const CALLS: usize = 500;
 const RUNS_MAX: usize = 20_000;
 const RUNS_MIN: usize = 20;

@@ -18,7 +18,7 @@ use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::Obstacle;
 use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::{Barrier, Done, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, Pursue};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal};
 use crate::math::arm::State;
 use crate::math::goal::{Cadence, Dwell};
 use crate::math::pid::Setpoint;
@@ -115,10 +115,10 @@ impl<const N: usize> Actor for PathFollower<N> {
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Pursue<FollowPath<N>>> for PathFollower<N> {
+impl<const N: usize> Handler<ForwardGoal<FollowPath<N>>> for PathFollower<N> {
     type Result = ();
 
-    fn handle(&mut self, goal: Pursue<FollowPath<N>>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, goal: ForwardGoal<FollowPath<N>>, ctx: &mut Context<Self>) {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.begin(goal, &motion, ctx),
@@ -181,11 +181,11 @@ impl<const N: usize> PathFollower<N> {
     /// Starts a goal in place of the previous one.
     fn begin(
         &mut self,
-        pursue: Pursue<FollowPath<N>>,
+        forwarded: ForwardGoal<FollowPath<N>>,
         motion: &JointMotion<N>,
         ctx: &mut Context<Self>,
     ) {
-        let Pursue { goal, client, done } = pursue;
+        let ForwardGoal { goal, client, done } = forwarded;
         let start = Waypoint {
             time: 0.0,
             position: motion.state.position,

@@ -32,7 +32,7 @@ impl<const N: usize> Ask for SendGoal<N> {
 #[derive(Clone)]
 pub enum GoalOwner<const N: usize> {
     /// A node.
-    Node(Recipient<GoalNews<N>>),
+    Node(Recipient<GoalReport<N>>),
     /// A client that sent it by the action.
     Client(Arc<ActionClient>),
 }
@@ -41,17 +41,17 @@ pub enum GoalOwner<const N: usize> {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CancelGoal {
     /// The goal to preempt.
-    pub goal: Meant,
+    pub goal: GoalSelector,
 }
 
 /// The identification of a goal to be ended.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum Meant {
+pub enum GoalSelector {
     /// The active goal.
     #[default]
     Active,
     /// The goal with this id, from the answer to its sender.
-    Called(String),
+    ById(String),
     /// The goal of this client, sent by the action.
     Sent(SentGoal),
 }
@@ -63,7 +63,7 @@ impl Ask for CancelGoal {
 /// The progress of a goal, for the owner in its [`SendGoal`].
 #[derive(Message, Debug, Clone, PartialEq)]
 #[rtype(result = "()")]
-pub struct GoalNews<const N: usize> {
+pub struct GoalReport<const N: usize> {
     /// The goal.
     pub goal_id: String,
     /// Distance between end effector and target \[m\].

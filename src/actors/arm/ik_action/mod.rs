@@ -17,7 +17,7 @@ use actix::prelude::*;
 use serde::Serialize;
 
 pub use self::messages::{
-    CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, Meant, SendGoal,
+    CancelGoal, CancelRejected, GoalOwner, GoalRejected, GoalReport, GoalSelector, SendGoal,
 };
 use self::services::GoalSender;
 use crate::actors::arm::ik::Solve;
@@ -27,7 +27,7 @@ use crate::actors::arm::sim::{
 };
 use crate::actors::node::{Barrier, Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
-use crate::actors::wire::action_client::{CancelSent, Pursue};
+use crate::actors::wire::action_client::{CancelSent, ForwardGoal};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Node, Service, Topic};
 use crate::protocol::messages::goal::{IkFeedback, IkResult, setpoint_trajectory};
@@ -130,20 +130,20 @@ impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
-        let pursuit = self.pursue(call.ask, call.reply, ctx.address());
+        let pursuit = self.start_goal(call.ask, call.reply, ctx.address());
         ctx.wait(pursuit);
     }
 }
 
-impl<const N: usize> Handler<Pursue<SendGoal<N>>> for IkAction<N> {
+impl<const N: usize> Handler<ForwardGoal<SendGoal<N>>> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, pursue: Pursue<SendGoal<N>>, ctx: &mut Context<Self>) {
-        let Pursue { goal, client, done } = pursue;
+    fn handle(&mut self, forwarded: ForwardGoal<SendGoal<N>>, ctx: &mut Context<Self>) {
+        let ForwardGoal { goal, client, done } = forwarded;
         let client = Arc::new(client);
         let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
         let owner = Some(GoalOwner::Client(client));
-        let pursuit = self.pursue(SendGoal { owner, ..goal }, reply, ctx.address());
+        let pursuit = self.start_goal(SendGoal { owner, ..goal }, reply, ctx.address());
         ctx.wait(pursuit);
     }
 }
@@ -153,7 +153,7 @@ impl<const N: usize> Handler<CancelSent> for IkAction<N> {
 
     /// The client is informed if that goal is not active. Otherwise the goal's result is the answer.
     fn handle(&mut self, CancelSent { from, done }: CancelSent, ctx: &mut Context<Self>) {
-        let cancellation = self.end(&Meant::Sent(from.goal.clone()), GoalStatus::Canceled);
+        let cancellation = self.end(&GoalSelector::Sent(from.goal.clone()), GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |outcome, _, _| {
             if let Err(why @ CancelRejected::NotSent) = outcome {
                 from.refuse(&why.to_string());
@@ -177,7 +177,7 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
     type Result = ResponseActFuture<Self, ()>;
 
     fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) -> Self::Result {
-        let end = self.end(&Meant::Active, GoalStatus::Aborted);
+        let end = self.end(&GoalSelector::Active, GoalStatus::Aborted);
         Box::pin(end.map(|_, _, _| ()))
     }
 }
@@ -239,15 +239,17 @@ impl<const N: usize> ActiveGoal<N> {
     }
 
     /// Whether this goal has the given id.
-    fn check(&self, meant: &Meant) -> Result<(), CancelRejected> {
-        match (meant, &self.owner) {
-            (Meant::Active, _) => Ok(()),
-            (Meant::Called(id), _) if *id == self.goal.id => Ok(()),
-            (Meant::Called(_), _) => Err(CancelRejected::OtherGoal {
+    fn check(&self, selector: &GoalSelector) -> Result<(), CancelRejected> {
+        match (selector, &self.owner) {
+            (GoalSelector::Active, _) => Ok(()),
+            (GoalSelector::ById(id), _) if *id == self.goal.id => Ok(()),
+            (GoalSelector::ById(_), _) => Err(CancelRejected::OtherGoal {
                 active: self.goal.id.clone(),
             }),
-            (Meant::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => Ok(()),
-            (Meant::Sent(_), _) => Err(CancelRejected::NotSent),
+            (GoalSelector::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => {
+                Ok(())
+            }
+            (GoalSelector::Sent(_), _) => Err(CancelRejected::NotSent),
         }
     }
 
@@ -259,7 +261,7 @@ impl<const N: usize> ActiveGoal<N> {
                 None => client.feed_back(self.feedback(judged)),
                 Some(_) => client.conclude(self.result(judged), self.status(judged)),
             },
-            Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
+            Some(GoalOwner::Node(owner)) => owner.do_send(GoalReport {
                 goal_id: self.goal.id.clone(),
                 distance: judged.distance,
                 positions: self.goal.positions,
@@ -272,7 +274,7 @@ impl<const N: usize> ActiveGoal<N> {
 
 impl<const N: usize> IkAction<N> {
     /// Solves a goal and starts it. Its sender is answered in between.
-    fn pursue(
+    fn start_goal(
         &self,
         goal: SendGoal<N>,
         mut reply: Reply<Result<String, GoalRejected>>,
@@ -339,13 +341,13 @@ impl<const N: usize> IkAction<N> {
     /// `status`.
     fn end(
         &self,
-        meant: &Meant,
+        selector: &GoalSelector,
         status: GoalStatus,
     ) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
-        let number = match (&self.active, meant) {
-            (None, Meant::Sent(_)) => Err(CancelRejected::NotSent),
+        let number = match (&self.active, selector) {
+            (None, GoalSelector::Sent(_)) => Err(CancelRejected::NotSent),
             (None, _) => Err(CancelRejected::NotActive),
-            (Some(goal), _) => goal.check(meant).map(|()| goal.goal.number),
+            (Some(goal), _) => goal.check(selector).map(|()| goal.goal.number),
         };
         let arm = self.arm.end.clone();
         let ended = async move {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::messages::{CancelGoal, CancelRejected, GoalRejected, Meant, SendGoal};
+use super::messages::{CancelGoal, CancelRejected, GoalRejected, GoalSelector, SendGoal};
 use crate::actors::node::{Asker, Done, Unserved};
 use crate::actors::wire::action_client::{ActionClient, Goal};
 use crate::actors::wire::{Address, Answered, Callable};
@@ -64,7 +64,7 @@ impl<const N: usize> Answered for SendGoal<N> {
 impl Callable for CancelGoal {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let CancelRequest { goal_id } = CancelRequest::read(service, arguments)?;
-        let goal = goal_id.map_or(Meant::Active, Meant::Called);
+        let goal = goal_id.map_or(GoalSelector::Active, GoalSelector::ById);
         Ok(Self { goal })
     }
 }

@@ -43,12 +43,12 @@ pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 /// The node that computes [`HeldLimit`]. From the runtime, once. Without it an arm has no limits.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
+pub struct SetLimitPredictor<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 /// Sets the listener of the journal, or none. From the recorder.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);
+pub struct SetListener<const N: usize>(pub Option<ArmListener<N>>);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 

@@ -14,16 +14,16 @@ mod waiting;
 mod world;
 
 pub use self::messages::{
-    AddBarrier, ArmMotion, ArmPose, ArmSettings, CommandEffort, CommandGoal, Consult, EndGoal,
-    HeldLimit, JointMotion, MoveSetpoint, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot,
-    Tell, TrackGoal,
+    AddBarrier, ArmMotion, ArmPose, ArmSettings, CommandEffort, CommandGoal, EndGoal, HeldLimit,
+    JointMotion, MoveSetpoint, SetLimitPredictor, SetListener, SetSetpoint, SimulationTime,
+    Snapshot, TakeSnapshot, TrackGoal,
 };
 pub use self::node::ArmSim;
 pub use self::orders::ArmOrder;
 pub use self::turn::{TURN, TURN_MESSAGES};
 pub use crate::live::{
-    ArmEvent, ArmListener, ArmNews, BREATHER, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle,
-    PUBLISH_RATE, Pose, Tracking, WAKE_UP_BUDGET,
+    ArmEvent, ArmListener, GoalOrder, GoalProgress, LEAST_PAUSE, Obstacle, PUBLISH_RATE, Pose,
+    STEP_PAUSE, StepEvent, Tracking, WAKE_UP_BUDGET,
 };
 pub use crate::services::arm::{
     Disturb, Enable, Integrator, MAX_STEPS, Pause, PeriodInForce, Push, Reset, STEPS_IN_A_ROW,

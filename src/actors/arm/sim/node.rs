@@ -2,7 +2,7 @@
 //!
 //! The arm wakes 60 times a second. It advances to the present time before it handles a message, so every answer has
 //! the present state. Work per wake-up is bounded by [`WAKE_UP_BUDGET`](crate::live::WAKE_UP_BUDGET). Steps beyond that
-//! are taken after [`BREATHER`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
+//! are taken after [`STEP_PAUSE`]. Waiting messages do not delay the wake-up, because it is checked at the end of every
 //! [turn](super::turn).
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit. An
@@ -16,13 +16,13 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::messages::{AddBarrier, ArmSettings, Consult, HeldLimit};
+use super::messages::{AddBarrier, ArmSettings, HeldLimit, SetLimitPredictor};
 use super::turn::Turn;
 use super::waiting::Steps;
 use super::world::ArmWorld;
 use crate::actors::node::{Barrier, Interest, Publish};
 use crate::actors::resources::gauges::Gauges;
-use crate::live::{BREATHER, GoalProgress, LiveArm, PUBLISH_RATE};
+use crate::live::{GoalProgress, LiveArm, PUBLISH_RATE, STEP_PAUSE};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::math::simulation::ArmInput;
@@ -116,10 +116,10 @@ impl<const N: usize> Handler<ArmSettings<N>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Handler<Consult<N>> for ArmSim<N> {
+impl<const N: usize> Handler<SetLimitPredictor<N>> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, Consult(study): Consult<N>, _: &mut Context<Self>) {
+    fn handle(&mut self, SetLimitPredictor(study): SetLimitPredictor<N>, _: &mut Context<Self>) {
         self.study = Some(study);
     }
 }
@@ -157,25 +157,25 @@ impl<const N: usize> ArmSim<N> {
     }
 
     /// Call this at every message that depends on the present state or changes it.
-    pub(super) fn attend(&mut self, ctx: &mut Context<Self>) {
+    pub(super) fn take_due_steps(&mut self, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         self.advance_to_now(ctx);
     }
 
-    /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
+    /// Takes the steps that are due, within the budget of one wake-up. The rest follows after a pause.
     fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         self.end_orphaned_command();
         let is_behind = self.arm.advance_to_now();
-        Self::breathe(is_behind, ctx);
+        Self::pause_steps(is_behind, ctx);
     }
 
-    /// Takes the remaining steps after a breather.
-    fn breathe(is_behind: bool, ctx: &mut Context<Self>) {
+    /// Takes the remaining steps after a pause.
+    fn pause_steps(is_behind: bool, ctx: &mut Context<Self>) {
         if is_behind {
-            ctx.run_later(BREATHER, |node, ctx| {
+            ctx.run_later(STEP_PAUSE, |node, ctx| {
                 node.end_orphaned_command();
                 let is_behind = node.arm.catch_up();
-                Self::breathe(is_behind, ctx);
+                Self::pause_steps(is_behind, ctx);
             });
         }
     }

@@ -8,7 +8,7 @@ use actix::prelude::*;
 
 use super::messages::{
     ArmMotion, ArmPose, CommandEffort, CommandGoal, EndGoal, JointMotion, MoveSetpoint,
-    SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, Tell, TrackGoal,
+    SetListener, SetSetpoint, SimulationTime, Snapshot, TakeSnapshot, TrackGoal,
 };
 use super::node::ArmSim;
 use crate::actors::wire::{Nodes, TopicMessage};
@@ -30,7 +30,7 @@ where
     type Result = MessageResult<M>;
 
     fn handle(&mut self, order: M, ctx: &mut Context<Self>) -> MessageResult<M> {
-        self.attend(ctx);
+        self.take_due_steps(ctx);
         MessageResult(order.perform(self))
     }
 }
@@ -47,7 +47,7 @@ impl<const N: usize> ArmOrder<N> for TakeSnapshot<N> {
     }
 }
 
-impl<const N: usize> ArmOrder<N> for Tell<N> {
+impl<const N: usize> ArmOrder<N> for SetListener<N> {
     /// A listener gets the whole simulation first.
     fn perform(self, node: &mut ArmSim<N>) {
         let Self(listener) = self;

@@ -51,7 +51,7 @@ impl<const N: usize, A: ArmRequest<N>> Handler<Call<A>> for ArmSim<N> {
     type Result = ();
 
     fn handle(&mut self, Call { ask, reply }: Call<A>, ctx: &mut Context<Self>) {
-        self.attend(ctx);
+        self.take_due_steps(ctx);
         let answer = ask.perform(&mut self.arm);
         let conclude = move || reply.conclude(answer);
         if A::waits_for_news(&self.arm) {
@@ -81,7 +81,7 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 
     /// The steps do not depend on wall time, and the arm continues from their end when it is resumed.
     fn handle(&mut self, Call { ask, reply }: Call<Step<N>>, ctx: &mut Context<Self>) {
-        self.attend(ctx);
+        self.take_due_steps(ctx);
         let asked = match self.arm.begin_steps(ask) {
             Ok(asked) => asked,
             Err(rejected) => return reply.conclude(Err(rejected)),

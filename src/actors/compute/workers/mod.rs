@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use crate::actors::ConnectionId;
 use crate::actors::panics::contain;
-use crate::actors::resources::priority::give_way;
+use crate::actors::resources::priority::lower_priority;
 use crate::actors::resources::work_clock;
 use crate::options::MAX_CLIENTS;
 
@@ -122,7 +122,7 @@ impl WorkerPool {
             let pool = pool.clone();
             let name = format!("worker-{number}");
             thread::Builder::new().name(name).spawn(move || {
-                give_way();
+                lower_priority();
                 while let Some(job) = pool.take() {
                     pool.advance(job);
                 }

@@ -47,12 +47,12 @@ fn computation(
 }
 
 /// Finds no room a few times.
-struct Hesitating {
+struct InitiallyFull {
     tries: usize,
     began: mpsc::Sender<()>,
 }
 
-impl Computation for Hesitating {
+impl Computation for InitiallyFull {
     fn advance(&mut self, _deadline: Instant) -> Progress {
         if self.tries > 0 {
             self.tries -= 1;
@@ -80,12 +80,12 @@ impl Computation for Endless {
 }
 
 #[test]
-fn what_waits_for_room_tries_again_while_others_compute_without_end() {
+fn a_task_waiting_for_memory_retries_while_others_compute() {
     let pool = WorkerPool::start(1).unwrap();
     let (done, endless) = mpsc::channel();
     let (began, seen) = mpsc::channel();
     pool.submit(ConnectionId(1), Box::new(Endless(endless)));
-    pool.submit(ConnectionId(2), Box::new(Hesitating { tries: 3, began }));
+    pool.submit(ConnectionId(2), Box::new(InitiallyFull { tries: 3, began }));
     seen.recv_timeout(Duration::from_secs(60))
         .expect("room is looked for again");
     drop(done);
@@ -113,7 +113,7 @@ fn one_too_many_is_refused_and_there_is_always_room_for_the_runtimes_own() {
 
 /// Abandoned ones are removed, so clients that disconnect do not block others.
 #[test]
-fn who_comes_when_all_are_abandoned_is_admitted() {
+fn a_client_is_admitted_when_all_others_are_abandoned() {
     let (log, seen) = mpsc::channel();
     let pool = WorkerPool::without_threads();
     for client in 1..=MAX_ADMITTED as u64 {

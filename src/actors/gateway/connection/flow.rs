@@ -278,7 +278,7 @@ mod sockets {
         use super::*;
 
         #[test]
-        fn it_tells_how_much_a_client_of_this_machine_has_not_read() {
+        fn the_unread_bytes_of_a_local_client_are_known() {
             for address in ["127.0.0.1:0", "[::1]:0", "[::]:0"] {
                 let Ok(listener) = TcpListener::bind(address) else {
                     continue;

@@ -32,7 +32,7 @@ use crate::actors::gateway::limits::{
 use crate::actors::gateway::messages::{Disconnect, Request, Respond, Retire, form_of};
 use crate::actors::gateway::registry::Registry;
 use crate::actors::panics::contain;
-use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, Permit, SHORT, cover};
 use crate::protocol::catalog::Service;
 use crate::protocol::limits::MEDIUM;
@@ -624,7 +624,7 @@ impl Performer {
             Ok(Op::Subscribe(Subscribe { encoding, .. }))
                 if encoding.compression != Compression::None && !self.takes_binary =>
             {
-                self.complain(NO_BINARY, id.as_ref()).await
+                self.send_error(NO_BINARY, id.as_ref()).await
             }
             Ok(op) => self.perform(id, op, length).await,
             Err(OpError::Call { service, problem }) => {
@@ -636,11 +636,11 @@ impl Performer {
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
                 // Over WebSocket, only a client that requested statuses gets this one.
-                self.complain(&why, id).await;
+                self.send_error(&why, id).await;
                 let result = messages::action_result(&action, id, &why, status as u8, false);
                 self.say(result, None).await
             }
-            Err(OpError::Status(problem)) => self.complain(&problem.to_string(), id.as_ref()).await,
+            Err(OpError::Status(why)) => self.send_error(&why.to_string(), id.as_ref()).await,
         }
     }
 
@@ -678,7 +678,7 @@ impl Performer {
     }
 
     /// Sends the client an error status.
-    async fn complain(&self, why: &str, id: Option<&Payload>) -> OpOutcome {
+    async fn send_error(&self, why: &str, id: Option<&Payload>) -> OpOutcome {
         tracing::debug!(connection = self.id.0, why, "refused");
         self.say(messages::status(Level::Error, why, id), Some(Level::Error))
             .await
@@ -731,7 +731,7 @@ async fn read_frame(
     let incoming = if length <= SHORT {
         read()
     } else {
-        let incoming = aside(WorkKind::of(length), read).await;
+        let incoming = run_long_work(WorkKind::of(length), read).await;
         incoming.ok_or_else(|| OpOutcome::Refused(refusal("a frame could not be read")))?
     };
     incoming.ok_or(OpOutcome::Done)

@@ -74,7 +74,7 @@ impl Drop for HeldPlace {
 }
 
 /// The result of the detection by a client's first bytes.
-enum HowServed {
+enum Detected {
     /// It exchanges frames.
     Json,
     /// It exchanges frames, and is a command of this program.
@@ -104,7 +104,7 @@ impl ClientSession {
         };
         let how = match place {
             Ok(_) => self.detect(&mut stream, &mut first, None).await,
-            Err(Some(Refused::Closed)) => HowServed::Json,
+            Err(Some(Refused::Closed)) => Detected::Json,
             Err(why) => {
                 let slot = self.admission.newcomers.take();
                 let time = if asks_token { HEAD_TIME } else { OPENING_TIME };
@@ -119,26 +119,26 @@ impl ClientSession {
                 };
                 place = match how {
                     #[cfg(feature = "web")]
-                    HowServed::Http(due) => {
+                    Detected::Http(due) => {
                         let newcomer = Err((outlets, slot, why));
                         return self.serve_http(stream, first, due, newcomer).await;
                     }
-                    HowServed::Command => self.wait_for_place(&outlets, &slot).await.map_err(Some),
-                    HowServed::Json => self.connect(&outlets, false).await.map_err(Some),
-                    HowServed::Refused(_) | HowServed::Gone => place,
+                    Detected::Command => self.wait_for_place(&outlets, &slot).await.map_err(Some),
+                    Detected::Json => self.connect(&outlets, false).await.map_err(Some),
+                    Detected::Refused(_) | Detected::Gone => place,
                 };
                 how
             }
         };
         drop(outlets);
         let place = match (how, place) {
-            (HowServed::Gone, _) => {
+            (Detected::Gone, _) => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
                 return None;
             }
-            (HowServed::Refused(why), _) => Err(why),
+            (Detected::Refused(why), _) => Err(why),
             #[cfg(feature = "web")]
-            (HowServed::Http(due), Ok(place)) => {
+            (Detected::Http(due), Ok(place)) => {
                 return self.serve_http(stream, first, due, Ok(place)).await;
             }
             (_, place) => place.map_err(|why| self.turn_away(why)),
@@ -151,12 +151,12 @@ impl ClientSession {
     }
 
     /// Waits until `due` for the first frame of a client without a place. It must send the token, if one is required.
-    async fn qualify<S>(&self, stream: &mut S, first: &mut BytesMut, due: Instant) -> HowServed
+    async fn qualify<S>(&self, stream: &mut S, first: &mut BytesMut, due: Instant) -> Detected
     where
         S: AsyncRead + Unpin,
     {
         let how = self.detect(stream, first, Some(due)).await;
-        if !matches!(how, HowServed::Json) {
+        if !matches!(how, Detected::Json) {
             return how;
         }
         let op = first_op(stream, first, due).await;
@@ -167,15 +167,15 @@ impl ClientSession {
                     if why == AuthError::Wrong {
                         self.delay_wrong_token().await;
                     }
-                    return HowServed::Refused(why.to_string());
+                    return Detected::Refused(why.to_string());
                 }
                 op => op,
             },
         };
         if op.is_ok_and(|op| is_command(&op)) {
-            HowServed::Command
+            Detected::Command
         } else {
-            HowServed::Json
+            Detected::Json
         }
     }
 
@@ -237,8 +237,8 @@ impl ClientSession {
         stream: &mut S,
         first: &mut BytesMut,
         due: Option<Instant>,
-    ) -> HowServed {
-        let foreign = |why: &str| HowServed::Refused(why.to_owned());
+    ) -> Detected {
+        let foreign = |why: &str| Detected::Refused(why.to_owned());
         let mut deadline = due;
         loop {
             match opening(first) {
@@ -253,18 +253,18 @@ impl ClientSession {
                         deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
-                Opening::Json => return HowServed::Json,
+                Opening::Json => return Detected::Json,
                 #[cfg(feature = "web")]
                 Opening::Foreign(Foreign::Http)
                     if first.starts_with(b"GET ") || first.starts_with(b"HEAD ") =>
                 {
-                    return HowServed::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME));
+                    return Detected::Http(due.unwrap_or_else(|| Instant::now() + HEAD_TIME));
                 }
                 Opening::Foreign(protocol) => return foreign(protocol.explanation()),
             }
             let read = tokio::select! {
                 biased;
-                () = self.finish.notified() => return HowServed::Gone,
+                () = self.finish.notified() => return Detected::Gone,
                 // A few bytes are enough, and `first` has room for them.
                 read = stream.read_buf(first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
@@ -274,12 +274,12 @@ impl ClientSession {
                             foreign(&AuthError::TooLate.to_string())
                         }
                         // It is refused like other clients without a place.
-                        Some(_) => HowServed::Json,
+                        Some(_) => Detected::Json,
                     };
                 }
             };
             if read.unwrap_or(0) == 0 {
-                return HowServed::Json;
+                return Detected::Json;
             }
         }
     }

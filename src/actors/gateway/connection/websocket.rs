@@ -267,7 +267,7 @@ fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
 // ---- the monitored stream: bytes that the peer takes, incomplete messages, and long messages ------------------------
 
 /// Waits for the memory permit of a long message.
-type ComingPermit = Pin<Box<dyn Future<Output = Permit>>>;
+type PendingPermit = Pin<Box<dyn Future<Output = Permit>>>;
 
 /// A stream that records when the peer last took a byte, and the bytes that the peer has sent of an incomplete message.
 pub(super) struct MonitoredStream<S> {
@@ -283,7 +283,7 @@ pub(super) struct MonitoredStream<S> {
     memory: Memory,
     /// The memory permit of the incoming message, if it is long.
     permit: Option<Permit>,
-    waiting: Option<ComingPermit>,
+    waiting: Option<PendingPermit>,
 }
 
 impl<S> MonitoredStream<S> {

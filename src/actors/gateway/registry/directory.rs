@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn so_many_topics_and_services_are_listed_and_no_more() {
+    fn a_bounded_number_of_topics_and_services_is_listed() {
         let mut directory = Directory::default();
         let name = |n: usize| format!("/{n:05}");
         for n in 0..=MAX_LISTED {

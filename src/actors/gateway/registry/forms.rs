@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_outbox_takes_is_not_made_and_counts_as_lost() {
+    fn a_message_that_fits_no_outbox_is_not_encoded_and_counts_as_dropped() {
         let times = format!("{{\"transforms\":[{}{{}}]}}", "{},".repeat(200_000));
         let quotes = format!("\"{}\"", "\\\"".repeat(MIB));
         for (msg, compression) in [

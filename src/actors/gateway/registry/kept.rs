@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn there_is_room_for_so_many_entries_and_again_once_one_is_gone() {
+    fn a_bounded_number_of_entries_fits_and_one_more_after_a_removal() {
         let kept = Kept::default();
         let mut entries = Vec::new();
         let full = loop {

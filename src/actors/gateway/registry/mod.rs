@@ -593,14 +593,14 @@ impl Registry {
         };
         let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
             registry.next_cleanup = None;
-            registry.clean_up_some();
+            registry.clean_up_batch();
             registry.schedule_cleanup(ctx);
         }));
         self.next_cleanup = Some((due, waiting));
     }
 
     /// Ends one batch: first calls past their deadlines, then requests of disconnected providers.
-    fn clean_up_some(&mut self) {
+    fn clean_up_batch(&mut self) {
         let now = Instant::now();
         for _ in 0..ENDED_IN_A_ROW {
             if let Some(call) = self.requests.take_due(now) {

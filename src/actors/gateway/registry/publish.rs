@@ -16,7 +16,7 @@ use super::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Handled, Publish, Tapped, ToClient};
 use crate::actors::node::{Done, guard};
-use crate::actors::resources::aside::{WorkKind, aside};
+use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::Topic;
@@ -132,7 +132,7 @@ impl Registry {
         }
         let done = done.cloned();
         let kind = WorkKind::of(message.plain.len());
-        let making = aside(kind, move || (message.make(), message));
+        let making = run_long_work(kind, move || (message.make(), message));
         ctx.spawn(making.into_actor(self).map(move |made, registry, _| {
             if let Some((made, message)) = made {
                 registry.deliver_made(&message, &made, done.as_ref());

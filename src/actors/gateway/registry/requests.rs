@@ -17,7 +17,7 @@ use crate::actors::gateway::messages::{Handled, Tapped};
 use crate::actors::node::{Feedback, guard};
 use crate::actors::resources::memory::cover_message;
 use crate::actors::wire::action_client::{
-    ActionClient, ActionRequest, CancelSent, Canceller, Pursue, SentGoal,
+    ActionClient, ActionRequest, CancelSent, Canceller, ForwardGoal, SentGoal,
 };
 use crate::actors::wire::{Caller, Route, ServiceCall};
 use crate::protocol::catalog::{Action, Service};
@@ -139,7 +139,7 @@ impl Registry {
         match route {
             Ok(node) => {
                 let (done, ended) = guard();
-                node(ActionRequest::Goal(Pursue {
+                node(ActionRequest::Goal(ForwardGoal {
                     goal: goal.args,
                     client: action_client,
                     done,

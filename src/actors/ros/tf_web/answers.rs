@@ -11,21 +11,21 @@ use crate::protocol::messages::{Header, Stamp};
 #[derive(Serialize)]
 pub(super) struct FramesFeedback {
     header: Header<'static>,
-    status: WishStatus,
+    status: RequestStatus,
     feedback: TfMessage,
 }
 
 /// `actionlib_msgs/GoalStatus`.
 #[derive(Serialize)]
-struct WishStatus {
-    goal_id: WishId,
+struct RequestStatus {
+    goal_id: RequestId,
     status: u8,
     text: &'static str,
 }
 
 /// `actionlib_msgs/GoalID`.
 #[derive(Serialize)]
-struct WishId {
+struct RequestId {
     stamp: Stamp,
     id: String,
 }
@@ -34,8 +34,8 @@ pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesF
     let frame_id = "";
     FramesFeedback {
         header: Header { stamp, frame_id },
-        status: WishStatus {
-            goal_id: WishId { stamp, id },
+        status: RequestStatus {
+            goal_id: RequestId { stamp, id },
             // The status `active` of ROS 1.
             status: 1,
             text: "",

@@ -7,7 +7,7 @@
 //! A request ends with its connection. A published one also ends when that connection unsubscribes from the feedback.
 //!
 //! **Invariant:** nothing is requested from the arm without a request and a subscriber. A connection has
-//! at most [`MAX_WISHES`] requests.
+//! at most [`MAX_FRAME_SUBSCRIPTIONS`] requests.
 
 mod answers;
 mod wire;
@@ -23,14 +23,14 @@ use tokio::time::Instant;
 use crate::actors::ConnectionId;
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, CancelSent, Pursue};
+use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::scene::{WORLD, frames, seen_from};
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
 /// Most requests of one connection. The oldest one ends when another arrives.
-pub const MAX_WISHES: usize = 4;
+pub const MAX_FRAME_SUBSCRIPTIONS: usize = 4;
 /// Most frames of one request.
 pub const MAX_FRAMES: usize = 32;
 /// Time between two requests to the arm, and so the shortest time between two messages.
@@ -69,7 +69,7 @@ pub struct FrameGoal<const N: usize> {
 /// Sends frames until cancelled. From clients, by the topic.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct WishFrames<const N: usize> {
+pub struct SubscribeFrames<const N: usize> {
     /// The frames.
     pub goal: FrameGoal<N>,
     /// The receiver of the frames.
@@ -94,7 +94,7 @@ pub enum FrameReceiver {
 /// Cancels the published goal with that id, or all of them. From clients, by the topic.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct ForgetFrames(pub Option<String>);
+pub struct UnsubscribeFrames(pub Option<String>);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -103,7 +103,7 @@ pub struct TfRepublisher<const N: usize> {
     arm: Recipient<ArmPose<N>>,
     publish: Recipient<Publish>,
     /// Oldest first.
-    wishes: VecDeque<(WishFrames<N>, Instant)>,
+    subscriptions: VecDeque<(SubscribeFrames<N>, Instant)>,
     /// When the topic is due next, while it has subscribers.
     topic: Option<Instant>,
     timer: Option<SpawnHandle>,
@@ -116,7 +116,7 @@ impl<const N: usize> TfRepublisher<N> {
         Self {
             arm,
             publish,
-            wishes: VecDeque::new(),
+            subscriptions: VecDeque::new(),
             topic: None,
             timer: None,
         }
@@ -139,30 +139,36 @@ impl<const N: usize> Handler<Call<RepublishTfs>> for TfRepublisher<N> {
     }
 }
 
-impl<const N: usize> Handler<WishFrames<N>> for TfRepublisher<N> {
+impl<const N: usize> Handler<SubscribeFrames<N>> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, wish: WishFrames<N>, ctx: &mut Context<Self>) {
+    fn handle(&mut self, subscription: SubscribeFrames<N>, ctx: &mut Context<Self>) {
         self.forget_gone();
-        let of_client = |(one, _): &(WishFrames<N>, Instant)| one.client() == wish.client();
-        let oldest = self.wishes.iter().position(of_client);
-        if self.wishes.iter().filter(|one| of_client(one)).count() >= MAX_WISHES
-            && let Some((oldest, _)) = oldest.and_then(|at| self.wishes.remove(at))
+        let of_client =
+            |(one, _): &(SubscribeFrames<N>, Instant)| one.client() == subscription.client();
+        let oldest = self.subscriptions.iter().position(of_client);
+        if self
+            .subscriptions
+            .iter()
+            .filter(|one| of_client(one))
+            .count()
+            >= MAX_FRAME_SUBSCRIPTIONS
+            && let Some((oldest, _)) = oldest.and_then(|at| self.subscriptions.remove(at))
         {
             oldest.end(GoalStatus::Aborted, TOO_MANY);
         }
-        self.wishes.push_back((wish, Instant::now()));
+        self.subscriptions.push_back((subscription, Instant::now()));
         self.keep_timer(ctx);
     }
 }
 
-impl<const N: usize> Handler<Pursue<FrameGoal<N>>> for TfRepublisher<N> {
+impl<const N: usize> Handler<ForwardGoal<FrameGoal<N>>> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, pursue: Pursue<FrameGoal<N>>, ctx: &mut Context<Self>) {
-        let Pursue { goal, client, .. } = pursue;
+    fn handle(&mut self, forwarded: ForwardGoal<FrameGoal<N>>, ctx: &mut Context<Self>) {
+        let ForwardGoal { goal, client, .. } = forwarded;
         let by = FrameReceiver::Client(Box::new(client));
-        self.handle(WishFrames { goal, by }, ctx);
+        self.handle(SubscribeFrames { goal, by }, ctx);
     }
 }
 
@@ -170,27 +176,31 @@ impl<const N: usize> Handler<CancelSent> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, cancel: CancelSent, ctx: &mut Context<Self>) {
-        let is_meant = |wish: &WishFrames<N>| match &wish.by {
+        let is_meant = |subscription: &SubscribeFrames<N>| match &subscription.by {
             FrameReceiver::Client(client) => client.is(&cancel.from.goal),
             FrameReceiver::Topic { .. } => false,
         };
-        let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
-        match at.and_then(|at| self.wishes.remove(at)) {
-            Some((wish, _)) => wish.end(GoalStatus::Canceled, Empty {}),
+        let at = self
+            .subscriptions
+            .iter()
+            .position(|(subscription, _)| is_meant(subscription));
+        match at.and_then(|at| self.subscriptions.remove(at)) {
+            Some((subscription, _)) => subscription.end(GoalStatus::Canceled, Empty {}),
             None => cancel.from.refuse(NOT_KEPT),
         }
         self.keep_timer(ctx);
     }
 }
 
-impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
+impl<const N: usize> Handler<UnsubscribeFrames> for TfRepublisher<N> {
     type Result = ();
 
-    fn handle(&mut self, ForgetFrames(id): ForgetFrames, ctx: &mut Context<Self>) {
-        self.wishes.retain(|(wish, _)| match &wish.by {
-            FrameReceiver::Client(_) => true,
-            FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
-        });
+    fn handle(&mut self, UnsubscribeFrames(id): UnsubscribeFrames, ctx: &mut Context<Self>) {
+        self.subscriptions
+            .retain(|(subscription, _)| match &subscription.by {
+                FrameReceiver::Client(_) => true,
+                FrameReceiver::Topic { id: own, .. } => id.as_ref().is_some_and(|id| id != own),
+            });
         self.keep_timer(ctx);
     }
 }
@@ -210,8 +220,8 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, _: ShutDown, ctx: &mut Context<Self>) {
-        for (wish, _) in self.wishes.drain(..) {
-            wish.end(GoalStatus::Aborted, Empty {});
+        for (subscription, _) in self.subscriptions.drain(..) {
+            subscription.end(GoalStatus::Aborted, Empty {});
         }
         self.keep_timer(ctx);
     }
@@ -219,7 +229,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> WishFrames<N> {
+impl<const N: usize> SubscribeFrames<N> {
     /// Informs a client with a goal of the action of its end.
     fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
         if let FrameReceiver::Client(client) = &self.by {
@@ -244,12 +254,13 @@ impl<const N: usize> WishFrames<N> {
 
 impl<const N: usize> TfRepublisher<N> {
     fn forget_gone(&mut self) {
-        self.wishes.retain(|(wish, _)| !wish.is_gone());
+        self.subscriptions
+            .retain(|(subscription, _)| !subscription.is_gone());
     }
 
     /// Runs a timer only while there are requests or subscribers.
     fn keep_timer(&mut self, ctx: &mut Context<Self>) {
-        let is_wanted = self.topic.is_some() || !self.wishes.is_empty();
+        let is_wanted = self.topic.is_some() || !self.subscriptions.is_empty();
         match self.timer {
             None if is_wanted => self.timer = Some(ctx.run_interval(PERIOD, Self::look)),
             Some(timer) if !is_wanted => {
@@ -285,17 +296,21 @@ impl<const N: usize> TfRepublisher<N> {
             publish(&self.publish, Topic::TfWeb, seen(WORLD, &frames(N)));
         }
         let mut due: Vec<_> = self
-            .wishes
+            .subscriptions
             .iter_mut()
             .filter(|(_, due)| *due <= soon)
             .collect();
         // The longest overdue are first.
         due.sort_by_key(|(_, due)| *due);
-        for (order, (wish, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
+        for (order, (subscription, due)) in (0..).zip(due.into_iter().take(AT_ONCE)) {
             // A nanosecond keeps the order, so requests that are always due take turns.
-            *due = next(*due, wish.goal.period, now + Duration::from_nanos(order));
-            let message = seen(&wish.goal.target, &wish.goal.sources);
-            match &wish.by {
+            *due = next(
+                *due,
+                subscription.goal.period,
+                now + Duration::from_nanos(order),
+            );
+            let message = seen(&subscription.goal.target, &subscription.goal.sources);
+            match &subscription.by {
                 FrameReceiver::Client(client) => client.feed_back(message),
                 FrameReceiver::Topic { id, .. } => {
                     let message = answers::feedback(stamp, id.clone(), message);

@@ -11,7 +11,8 @@ use serde_json::json;
 use serde_json::value::RawValue;
 
 use super::{
-    ForgetFrames, FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames,
+    FrameGoal, FrameReceiver, MAX_FRAMES, RepublishTfs, SubscribeFrames, TfRepublisher,
+    UnsubscribeFrames,
 };
 use crate::actors::wire::action_client::Goal;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, TopicMessage};
@@ -42,7 +43,7 @@ impl<const N: usize> TfRepublisher<N> {
         let node = address.clone();
         nodes.listen(Topic::TfWebCancel, move |message| {
             match read_cancel(message.msg.raw()) {
-                Ok(id) => node.do_send(ForgetFrames(id)),
+                Ok(id) => node.do_send(UnsubscribeFrames(id)),
                 Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
             }
         });
@@ -105,7 +106,7 @@ impl<const N: usize> Goal for FrameGoal<N> {
 // ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
-fn read_goal<const N: usize>(message: &TopicMessage) -> Result<WishFrames<N>, Rejections> {
+fn read_goal<const N: usize>(message: &TopicMessage) -> Result<SubscribeFrames<N>, Rejections> {
     let [id, goal] = members(message.msg.raw(), &["goal_id", "goal"])?;
     let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
     let id = id.and_then(|[id]| json::text(id?));
@@ -122,7 +123,7 @@ fn read_goal<const N: usize>(message: &TopicMessage) -> Result<WishFrames<N>, Re
         connection: message.connection,
         listening: Weak::clone(&message.listening),
     };
-    Ok(WishFrames { goal, by })
+    Ok(SubscribeFrames { goal, by })
 }
 
 /// `actionlib_msgs/GoalID`: an id, or none for all goals.

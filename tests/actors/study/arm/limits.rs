@@ -82,7 +82,7 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
     });
 }
 
-/// A thousand setpoints a second for two seconds: twenty questions, and one at the start.
+/// A thousand setpoints a second for two seconds cause twenty requests, and one at the start.
 #[test]
 fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
     in_virtual_time(async {
@@ -100,9 +100,10 @@ fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
     });
 }
 
-/// A limit of other gains says nothing: between the change and the answer the limit is unknown, and there is no warning.
+/// The limit of other gains does not apply. Between the change and the answer the limit is unknown, and there is no
+/// warning.
 #[test]
-fn a_limit_of_another_loop_is_never_held_against_the_arm() {
+fn a_limit_of_another_loop_causes_no_warning() {
     in_virtual_time(async {
         let mut arm = Consulting::new(0.0).await;
         arm.client.subscribe(Topic::Diagnostics.name()).await;

@@ -1,4 +1,4 @@
-//! The arm's questions to the study, in virtual time: here the study's stand-in.
+//! The arm's requests to the study, in virtual time, with a substitute for the study.
 
 mod limits;
 mod warnings;
@@ -39,7 +39,7 @@ impl Handler<HeldLimit<2>> for Oracle {
     }
 }
 
-/// An arm that asks the study's stand-in, and a client that hears what it publishes.
+/// An arm with a substitute for the study, and a client that receives the arm's messages.
 struct Consulting {
     stage: Stage<2>,
     client: Client,
@@ -63,7 +63,7 @@ impl Consulting {
         };
         let stage = Stage::start().await;
         let study = oracle.clone().start().recipient();
-        stage.arm.send(Consult(study)).await.unwrap();
+        stage.arm.send(SetLimitPredictor(study)).await.unwrap();
         Self {
             client: stage.connect(),
             stage,
@@ -78,13 +78,13 @@ impl Consulting {
         asked(&self.stage.arm, ask).await
     }
 
-    /// Questions to the study since the last look, once there has been time to ask.
+    /// Requests to the study since the last query, after enough time for a request.
     async fn questions(&self) -> Vec<ControlLoop<2>> {
         sleep(Duration::from_millis(150)).await;
         std::mem::take(&mut self.oracle.asked.borrow_mut())
     }
 
-    /// Messages on a topic since the last look at any.
+    /// Messages on a topic since the last query of any topic.
     async fn told(&mut self, topic: &str) -> Vec<Value> {
         self.client.settle().await;
         let told = self.client.messages(topic);

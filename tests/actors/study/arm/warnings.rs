@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
+fn a_warning_is_logged_at_its_start_and_its_end_running_or_paused() {
     in_virtual_time(async {
         let mut arm = Consulting::new(0.004).await;
         arm.ask(enable(true)).await;
@@ -56,7 +56,7 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
     });
 }
 
-/// Which clock is too slow, and that a shorter timestep mends neither a period that is too long nor the other way round.
+/// Which clock is too slow. A shorter timestep does not mend a control period that is too long, and the reverse.
 #[test]
 fn a_warning_names_the_clock_that_is_too_slow() {
     in_virtual_time(async {
@@ -103,7 +103,7 @@ fn a_warning_names_the_clock_that_is_too_slow() {
 }
 
 #[test]
-fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
+fn an_arm_without_a_limit_reports_it_and_does_not_warn() {
     in_virtual_time(async {
         let mut arm = Consulting::new(f64::INFINITY).await;
         arm.client.subscribe(Topic::Diagnostics.name()).await;
@@ -122,10 +122,10 @@ fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
     });
 }
 
-/// A free arm with nothing to be unstable about, and yet spun so fast, or falling so far, that the method cannot follow: the
-/// smaller of the two limits warns.
+/// A free arm is stable, but may turn too fast, or fall too far, for the method. The warning names the smaller of the
+/// two limits.
 #[test]
-fn a_motion_too_fast_for_the_timestep_is_warned_of() {
+fn a_motion_too_fast_for_the_timestep_causes_a_warning() {
     in_virtual_time(async {
         let mut arm = Consulting::new(0.2).await;
         arm.client.subscribe(Topic::Diagnostics.name()).await;
@@ -152,7 +152,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
 }
 
 #[test]
-fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
+fn the_error_estimate_is_published_ten_times_a_second_with_a_subscriber() {
     in_virtual_time(async {
         let mut arm = Consulting::new(0.004).await;
         arm.ask(integrator(None, Some(Method::Midpoint))).await;

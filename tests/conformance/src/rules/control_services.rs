@@ -71,7 +71,7 @@ const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
 const SET_PARAMS: &str = "/arm_sim/set_params";
 const PARAMS: [&str; 3] = ["gravity", "masses", "lengths"];
 
-/// A gain of the integral that hardly moves the arm while the error is 1 rad.
+/// An integral gain so small that the arm hardly moves while the error is 1 rad.
 const SMALL: f64 = 0.005;
 
 /// Passes if `{}` is accepted twice and returns the same values.
@@ -259,7 +259,7 @@ fn continues(bench: &mut Bench) -> Got {
     let resumed = Instant::now();
     bench.pause(false)?;
     let after = bench.fresh()?;
-    // The arm can have moved for as long as it has been running again, with some room for its clock, not for longer.
+    // The arm can only have moved while it was running again, with some tolerance for its clock.
     let limit = (resumed.elapsed().as_secs_f64() + 0.2) / 0.005;
     let arm = Arm::of(bench.links, GRAVITY);
     let (mut own, mut steps) = (frozen.state(), 0);

@@ -133,7 +133,7 @@ fn rates_change(bench: &mut Bench) -> Got {
     Ok(format!("relative changes {}", list(&changes)))
 }
 
-/// Lets an aggressive controller act at a timestep of 0.1 s; returns the sign of divergence.
+/// Runs an aggressive controller at a timestep of 0.1 s. Returns the sign of divergence.
 fn diverged(bench: &mut Bench) -> Got {
     let pose = bench.reset()?;
     bench.set_gains(2000.0, 0.0, 200.0)?;

@@ -1,6 +1,6 @@
 //! "PID services" and "Control law".
 //!
-//! Most rules take gravity away and use small gains: the arm hardly moves, and the effort shows each term alone.
+//! Most rules use no gravity and small gains, so the arm hardly moves, and the effort shows each term alone.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -60,7 +60,7 @@ pub const RULES: &[Rule] = &[
 const ENABLE: &str = "/pid_controller/enable";
 const SET_GAINS: &str = "/pid_controller/set_gains";
 const GAINS: [&str; 3] = ["kp", "ki", "kd"];
-/// A gain of the integral that hardly moves the arm while the error is 1 rad.
+/// An integral gain so small that the arm hardly moves while the error is 1 rad.
 const SMALL: f64 = 0.005;
 
 fn starts_disabled(bench: &mut Bench) -> Got {

@@ -49,7 +49,7 @@ fn shown_velocity(bench: &mut Bench) -> Result<Vec<f64>, String> {
     Ok(velocity.iter().zip(effort).map(|(rate, effort)| rate + effort / SMALL).collect())
 }
 
-/// Different angles for the joints, so that an exchange shows.
+/// Different angles for the joints, so an exchange of joints is visible.
 fn angles(bench: &Bench) -> Vec<f64> {
     [0.4, -0.3, 0.2].into_iter().take(bench.links).collect()
 }
@@ -109,7 +109,7 @@ fn wrong_velocity(bench: &mut Bench) -> Got {
     Ok(list(&shown))
 }
 
-/// Sends a trajectory after a good one; the good one must hold.
+/// Sends a trajectory after a valid one. The valid one must stay active.
 fn stays(bench: &mut Bench, points: &serde_json::Value) -> Got {
     bench.float(SMALL, 0.0, 0.0)?;
     let angles = angles(bench);

@@ -52,7 +52,7 @@ fn start(bench: &mut Bench) -> Result<(), String> {
     Ok(())
 }
 
-/// The next status that is as it should be; the error has the latest one that is not.
+/// The next expected status. The error has the latest unexpected one.
 fn status_that(bench: &mut Bench, name: &str, is_it: impl Fn(&Value) -> bool) -> Result<Value, String> {
     match bench.message_that(STATUS, PATIENCE, name, is_it) {
         Ok(status) => Ok(status),

@@ -17,12 +17,12 @@ use pendularm_benches::protocol::Protocol;
 
 /// Longest wait for a server. After that the run fails.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Before it is measured, a scene runs for so long.
+/// Duration of a scene before the measurement.
 const WARM_UP: Duration = Duration::from_millis(500);
-/// Messages that a flooding publisher hands over in one write.
+/// Messages that a flooding publisher sends in one write.
 const BURST: u64 = 16;
-/// Messages of a flooding publisher that its slowest subscriber may not have yet: few enough that no server has a
-/// reason to drop any.
+/// Messages of a flooding publisher that its slowest subscriber may still miss. They are few enough that no server
+/// drops any.
 const WINDOW: u64 = 256;
 
 /// The publisher, and its rate.
@@ -30,9 +30,9 @@ const WINDOW: u64 = 256;
 pub enum Traffic {
     /// This many times a second.
     Rate(f64),
-    /// As fast as the slowest subscriber takes them.
+    /// As fast as the slowest subscriber reads them.
     Flood,
-    /// Nobody here: the arm does, its own topic.
+    /// The arm publishes its own topic.
     Arm,
 }
 
@@ -51,7 +51,7 @@ pub struct Outcome {
     pub deliveries: u64,
     /// Processor time of the server while it was measured \[ns\].
     pub processor: u64,
-    /// From a message's making to its reading, each \[ns\]; none where the arm publishes.
+    /// Time from the creation of each message to its reading \[ns\]. None if the arm publishes.
     pub latencies: Vec<u32>,
     /// Resident memory of the server at the end \[MB\].
     pub resident: f64,
@@ -62,7 +62,7 @@ struct Link {
     stream: TcpStream,
     /// The topic that it publishes or subscribes to.
     topic: usize,
-    /// The beginning of an event whose end has not come.
+    /// The beginning of an incomplete event.
     unread: Vec<u8>,
     /// Bytes that the socket has not taken yet.
     unsent: Vec<u8>,
@@ -170,7 +170,7 @@ impl Fleet {
         self.links.push(link);
     }
 
-    /// Waits until each of these has been told that it is ready, and forgets it.
+    /// Waits until each of these has been confirmed, and removes it.
     fn await_ready(&mut self, links: std::ops::Range<usize>) {
         let deadline = Instant::now() + PATIENCE;
         while self.links[links.clone()].iter().any(|link| !link.ready) {
@@ -186,7 +186,7 @@ impl Fleet {
         }
     }
 
-    /// Runs the scene for `seconds` after a warm-up, then waits for all that is on its way.
+    /// Runs the scene for `seconds` after a warm-up, then waits for all sent messages.
     pub fn run(mut self, pid: u32, seconds: f64) -> Outcome {
         let began = Instant::now();
         let (mut measured_from, mut at_start, mut before) = (None, 0, 0);
@@ -267,11 +267,11 @@ impl Fleet {
         link.flush();
     }
 
-    /// Waits until every subscriber has all that was sent to it, and checks that it is so.
+    /// Waits until every subscriber has all messages, and checks them.
     fn drain(&mut self) {
         let deadline = Instant::now() + PATIENCE;
         if self.scene.traffic == Traffic::Arm {
-            // A subscriber may be a message ahead of another: all have to reach the newest of now.
+            // A subscriber may be a message ahead of another. All must reach the newest present message.
             let newest = self
                 .links
                 .iter()
@@ -324,7 +324,7 @@ impl Fleet {
 }
 
 impl Link {
-    /// Writes as much as the socket takes; `epoll` tells when it takes more.
+    /// Writes as much as the socket accepts. `epoll` reports when it accepts more.
     fn flush(&mut self) {
         while !self.unsent.is_empty() {
             match self.stream.write(&self.unsent) {

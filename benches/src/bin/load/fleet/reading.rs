@@ -1,4 +1,4 @@
-//! Turns of the fleet, and the reading in them: each message is held against those before it.
+//! Turns of the fleet, and their reads: each message is compared with the previous ones.
 //!
 //! **Invariant:** a message that is out of order, comes twice or follows a lost one ends the run.
 
@@ -12,7 +12,7 @@ use crate::message::{now, stamp};
 use pendularm_benches::protocol::Event;
 
 impl Fleet {
-    /// Waits for events, but no longer than `wait`, and takes all that there is to read.
+    /// Waits for events, at most `wait`, and reads everything.
     pub(super) fn turn(&mut self, wait: Duration) {
         let mut events = std::mem::replace(&mut self.events, Events::with_capacity(0));
         match self.poll.poll(&mut events, Some(wait)) {
@@ -58,7 +58,7 @@ impl Fleet {
         }
     }
 
-    /// Takes whole events off the front of `bytes`; gives how many bytes they had.
+    /// Reads whole events at the front of `bytes`. Returns their number of bytes.
     fn take(&mut self, number: usize, bytes: &[u8]) -> usize {
         let mut taken = 0;
         while let Some((event, length)) = (taken < bytes.len())
@@ -70,8 +70,8 @@ impl Fleet {
             match event {
                 Event::Message(payload) if self.scene.traffic == Traffic::Arm => {
                     let stamp = stamp(payload);
-                    // A late one is followed at once by the next, and no step may be due between them: two may have one
-                    // stamp, three not.
+                    // A late message is followed at once by the next, and no step may be due between them. So two
+                    // messages may have the same stamp, but not three.
                     let mut latest = link.stamps.iter().rev();
                     assert!(
                         latest.next() <= Some(&stamp) && latest.next() < Some(&stamp),

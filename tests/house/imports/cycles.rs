@@ -1,12 +1,12 @@
-//! Circles of arrows: between files, and between the rooms of a folder.
+//! Cycles of arrows: between files, and between the subfolders of a folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use super::arrows::{Arrows, House, PACKAGES};
+use super::arrows::{Arrows, PACKAGES, SourceTree};
 
-/// All that stand in a circle, and how: the arrows whose end leads back to their beginning.
-fn circles(arrows: &Arrows) -> (BTreeSet<String>, String) {
+/// The arrows that are part of a cycle: their end leads back to their beginning.
+fn cycles(arrows: &Arrows) -> (BTreeSet<String>, String) {
     let mut next: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (from, to) in arrows.keys() {
         next.entry(from).or_default().push(to);
@@ -24,38 +24,38 @@ fn circles(arrows: &Arrows) -> (BTreeSet<String>, String) {
         }
         false
     };
-    let (mut standing, mut shown) = (BTreeSet::new(), String::new());
+    let (mut in_cycle, mut shown) = (BTreeSet::new(), String::new());
     for ((from, to), names) in arrows {
         if reaches(to, from) {
-            standing.extend([from.clone(), to.clone()]);
+            in_cycle.extend([from.clone(), to.clone()]);
             let _ = writeln!(shown, "  {from} -> {to}: {names:?}");
         }
     }
-    (standing, shown)
+    (in_cycle, shown)
 }
 
-fn assert_none((standing, shown): (BTreeSet<String>, String)) {
-    assert!(standing.is_empty(), "in a circle: {standing:#?}\n{shown}");
+fn assert_none((in_cycle, shown): (BTreeSet<String>, String)) {
+    assert!(in_cycle.is_empty(), "in a cycle: {in_cycle:#?}\n{shown}");
 }
 
 #[test]
-fn no_import_runs_in_a_circle_between_files() {
+fn imports_between_files_have_no_cycle() {
     for package in &PACKAGES {
-        assert_none(circles(&House::read(package).arrows()));
+        assert_none(cycles(&SourceTree::read(package).arrows()));
     }
 }
 
-/// Each folder contains its files and folders. Its own `mod.rs` stands for the folder itself.
+/// Each folder contains its files and folders. Its own `mod.rs` is the folder itself.
 #[test]
-fn no_import_runs_in_a_circle_between_the_rooms_of_a_folder() {
+fn imports_between_folders_have_no_cycle() {
     for package in &PACKAGES {
-        assert_none(circles(&rooms(House::read(package).arrows())));
+        assert_none(cycles(&folders(SourceTree::read(package).arrows())));
     }
 }
 
-/// Arrows between rooms.
-fn rooms(files: Arrows) -> Arrows {
-    let mut rooms = Arrows::new();
+/// Arrows between folders.
+fn folders(files: Arrows) -> Arrows {
+    let mut folders = Arrows::new();
     for ((from, to), names) in files {
         let (from, to) = (from.split('/'), to.split('/'));
         let shared: Vec<&str> = from
@@ -66,10 +66,10 @@ fn rooms(files: Arrows) -> Arrows {
             .collect();
         let [from, to] = [from, to].map(|mut path| path.nth(shared.len()).unwrap_or_default());
         if ![from, to].contains(&"mod.rs") {
-            let ends = [from, to].map(|room| [shared.as_slice(), &[room]].concat().join("/"));
+            let ends = [from, to].map(|folder| [shared.as_slice(), &[folder]].concat().join("/"));
             let [from, to] = ends;
-            rooms.entry((from, to)).or_default().extend(names);
+            folders.entry((from, to)).or_default().extend(names);
         }
     }
-    rooms
+    folders
 }

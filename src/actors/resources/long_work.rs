@@ -84,7 +84,7 @@ impl WorkPermit {
 }
 
 /// Waits for a place and runs `work` there.
-pub async fn aside<T: Send + 'static>(
+pub async fn run_long_work<T: Send + 'static>(
     kind: WorkKind,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Option<T> {

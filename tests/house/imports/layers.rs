@@ -1,11 +1,11 @@
-//! The floors of the house: which room may name which.
+//! The layers: which folder may import which.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::arrows::{House, PENDULARM};
+use super::arrows::{PENDULARM, SourceTree};
 
-/// Layers that a layer may import, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 18] = [
+/// Layers that a layer may import, besides itself. A row names only rows above it.
+const LAYERS: [(&str, &[&str]); 18] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -54,43 +54,43 @@ const PROTOCOL: [(&str, &[&str]); 8] = [
     ("ros", &["names", "catalog", "messages"]),
 ];
 
-/// Holds the arrows between the rooms of `folder` against its table of floors.
-fn every_room_names_just_the_rooms_that_it_may(folder: &str, floors: &[(&str, &[&str])]) {
-    for (row, (floor, may)) in floors.iter().enumerate() {
-        let stands = |name: &&&str| floors[..row].iter().any(|(above, _)| *above == **name);
+/// Compares the arrows between the subfolders of `folder` with its table of layers.
+fn every_folder_imports_only_allowed_folders(folder: &str, layers: &[(&str, &[&str])]) {
+    for (row, (layer, may)) in layers.iter().enumerate() {
+        let is_above = |name: &&&str| layers[..row].iter().any(|(above, _)| *above == **name);
         assert_eq!(
-            may.iter().filter(stands).count(),
+            may.iter().filter(is_above).count(),
             may.len(),
-            "{floor} may name what has a row below its own"
+            "{layer} may import only layers with a row above its own"
         );
     }
-    let room = |path: &str| {
+    let folder = |path: &str| {
         let path = path.strip_prefix(folder)?;
-        let room = path.split(['/', '.']).next()?;
-        (room != "mod").then(|| room.to_owned())
+        let folder = path.split(['/', '.']).next()?;
+        (folder != "mod").then(|| folder.to_owned())
     };
-    let house = House::read(&PENDULARM);
-    let files = house.modules.values();
+    let tree = SourceTree::read(&PENDULARM);
+    let files = tree.modules.values();
     let mut found: BTreeMap<String, BTreeSet<String>> = files
-        .filter_map(|file| Some((room(&file.path)?, BTreeSet::new())))
+        .filter_map(|file| Some((folder(&file.path)?, BTreeSet::new())))
         .collect();
-    for (from, to) in house.arrows().keys() {
-        if let (Some(from), Some(to)) = (room(from), room(to))
+    for (from, to) in tree.arrows().keys() {
+        if let (Some(from), Some(to)) = (folder(from), folder(to))
             && from != to
         {
             found.entry(from).or_default().insert(to);
         }
     }
     let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-    let allowed: BTreeMap<String, BTreeSet<String>> = floors
+    let allowed: BTreeMap<String, BTreeSet<String>> = layers
         .iter()
-        .map(|(floor, may)| ((*floor).to_owned(), owned(may)))
+        .map(|(layer, may)| ((*layer).to_owned(), owned(may)))
         .collect();
-    assert_eq!(found, allowed, "left: as it is; right: the table");
+    assert_eq!(found, allowed, "left: the source; right: the table");
 }
 
 #[test]
-fn every_floor_names_just_the_floors_that_it_may() {
-    every_room_names_just_the_rooms_that_it_may("", &FLOORS);
-    every_room_names_just_the_rooms_that_it_may("protocol/", &PROTOCOL);
+fn every_layer_imports_only_allowed_layers() {
+    every_folder_imports_only_allowed_folders("", &LAYERS);
+    every_folder_imports_only_allowed_folders("protocol/", &PROTOCOL);
 }
