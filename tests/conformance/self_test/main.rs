@@ -10,8 +10,10 @@
     reason = "a test that panics has failed"
 )]
 
+#[path = "../../support/common.rs"]
+#[allow(dead_code, reason = "the wire tests use its other parts too")]
+mod common;
 mod faults;
-mod program;
 mod proxy;
 
 use std::collections::BTreeSet;
@@ -21,21 +23,21 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use pendularm_conformance::bench::Found;
-use pendularm_conformance::{Row, Rule, Selection, arm, rules, run, totals};
+use pendularm_conformance::{Row, Rule, Selection, rules, run, totals};
 use serde_json::Value;
 
+use common::Runtime;
 use faults::Planted;
-use program::Program;
 use proxy::{Fault, Proxy, Side};
 
 /// Programs that are tried at once; a rule waits more than it computes.
 const WORKERS: usize = 8;
 
 fn all_hold(links: usize) {
-    let program = Program::start(links);
+    let program = Runtime::with_links(links);
     // A run during other tests may take longer.
     let selection = Selection { time: Duration::from_secs(300), ..Selection::default() };
-    let rows = run(&program.address, &selection, |_| {}).unwrap();
+    let rows = run(&program.address.to_string(), &selection, |_| {}).unwrap();
     let failing: Vec<String> = rows.iter().filter(|row| !row.holds()).map(Row::to_string).collect();
     assert!(failing.is_empty(), "{}\n{}", failing.join("\n"), totals(&rows));
     assert!(rows.len() > 130, "{} rules alone", rows.len());
@@ -53,14 +55,14 @@ fn every_rule_holds_for_3_links() {
 
 /// The outcome of a rule against a server with a fault: nothing if it fails for the fault. A busy machine may keep the
 /// suite from preparing the arm, which says nothing about the rule; that is tried again.
-fn escapes(program: &Program, found: &Found, planted: &Planted, links: usize) -> Option<String> {
+fn escapes(program: &Runtime, found: &Found, planted: &Planted, links: usize) -> Option<String> {
     let mut outcome = String::new();
     for _ in 0..3 {
-        let proxy = Proxy::start(&program.address, planted.fault(links));
+        let proxy = Proxy::start(&program.address.to_string(), planted.fault(links));
         let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_| {});
         // Past the proxy: the next fault finds a server as it was started.
-        found.restore(&program.address);
+        found.restore(&program.address.to_string());
         match rows.as_deref() {
             Ok([row]) => match &row.got {
                 Err(why) if !why.starts_with("while preparing") => {
@@ -88,8 +90,8 @@ fn each_fails(links: usize) {
     let next = AtomicUsize::new(0);
     let escaped: Vec<String> = thread::scope(|scope| {
         let work = || {
-            let program = Program::start(links);
-            let found = Found::at(&program.address).unwrap();
+            let program = Runtime::with_links(links);
+            let found = Found::at(&program.address.to_string()).unwrap();
             let mut escaped = Vec::new();
             while let Some(planted) = planted.get(next.fetch_add(1, Ordering::Relaxed)) {
                 escaped.extend(escapes(&program, &found, planted, links));
@@ -133,12 +135,12 @@ fn a_server_that_says_nothing_is_reported_soon() {
 /// As a server that is being written: the rules of the other sections can be tried.
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
-    let program = Program::start(2);
+    let program = Runtime::start();
     let fault: Fault = Box::new(|_, _, frame| {
         let service = frame["service"].as_str().unwrap_or_default();
         if service.starts_with("/ik_") { vec![] } else { vec![frame] }
     });
-    let proxy = Proxy::start(&program.address, fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault);
     let selection = Selection { rule: Some("reset".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     assert!(!rows.is_empty() && rows.iter().all(Row::holds), "{rows:?}");
@@ -153,7 +155,7 @@ fn a_port_without_a_server_is_reported() {
 
 #[test]
 fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
-    let program = Program::start(2);
+    let program = Runtime::start();
     let mut asked = 0;
     let fault: Fault = Box::new(move |side, _, mut frame| {
         if side == Side::Server {
@@ -169,45 +171,9 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address, fault);
+    let proxy = Proxy::start(&program.address.to_string(), fault);
     let selection = Selection { category: Some("pid".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     let holding: Vec<String> = rows.iter().filter(|row| row.holds()).map(Row::to_string).collect();
     assert!(!rows.is_empty() && holding.len() < 3, "{}", holding.join("\n"));
-}
-
-/// The suite's own formulas against 50-digit values that were computed from the Lagrangian.
-#[test]
-fn the_suites_own_arm_agrees_with_the_reference_values() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/dynamics.json");
-    let data: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let list = |value: &Value| value.as_array().unwrap().iter().map(|one| one.as_f64().unwrap()).collect::<Vec<f64>>();
-    let mut tried = 0;
-    for case in data["cases"].as_array().unwrap() {
-        let own = arm::Arm { masses: list(&case["masses"]), lengths: list(&case["lengths"]), gravity: case["gravity"].as_f64().unwrap() };
-        let state = arm::State { position: list(&case["q"]), velocity: list(&case["qdot"]) };
-        // The data say how much a rounding of the inputs may change; 32 roundings are allowed.
-        let near = |name: &str, got: f64, expected: &Value, sensitivity: &Value| {
-            let (expected, sensitivity) = (expected.as_f64().unwrap(), sensitivity.as_f64().unwrap());
-            let error = (got - expected).abs();
-            assert!(error <= 32.0 * f64::EPSILON * (sensitivity + expected.abs()), "{name}: {got} instead of {expected} in {}", case["id"]);
-        };
-        for (joint, load) in own.gravity_load(&state.position).iter().enumerate() {
-            near("gravity load", *load, &case["G"][joint], &case["sens_G"][joint]);
-        }
-        near("kinetic energy", own.kinetic(&state), &case["kinetic"], &case["sens_kinetic"]);
-        near("potential energy", own.potential(&state.position), &case["potential"], &case["sens_potential"]);
-        // The data have accelerations with an effort; without one, M q'' + h + G must vanish.
-        let free = own.free_acceleration(&state.position, &state.velocity);
-        for (joint, row) in case["M"].as_array().unwrap().iter().enumerate() {
-            let terms: Vec<f64> = list(row).iter().zip(&free).map(|(inertia, acceleration)| inertia * acceleration).collect();
-            let (h, load) = (list(&case["h"])[joint], list(&case["G"])[joint]);
-            let size = terms.iter().map(|term| term.abs()).sum::<f64>() + h.abs() + load.abs();
-            let rest = terms.iter().sum::<f64>() + h + load;
-            let condition = case["cond2_abs_scaled"].as_f64().unwrap();
-            assert!(rest.abs() <= 1e-9 * condition * size, "equation of motion: {rest} of {size} in {}", case["id"]);
-        }
-        tried += 1;
-    }
-    assert!(tried > 10, "{tried} cases");
 }

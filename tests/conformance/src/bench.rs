@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
@@ -185,6 +186,15 @@ impl Bench {
         must(!answer.status.is_empty(), || format!("{service} {args} is rejected with an empty status"))?;
         must(answer.frame.get("result") == Some(&Value::Bool(false)), || format!("{service} {args}: no result"))?;
         Ok(answer)
+    }
+
+    /// Passes if each of these requests is rejected; the last reason.
+    pub fn rejects(&mut self, service: &str, requests: &[Value]) -> Got {
+        let mut status = String::new();
+        for request in requests {
+            status = self.rejected(service, request)?.status;
+        }
+        Ok(format!("{} rejected, the last with: {status}", requests.len()))
     }
 
     /// Subscribes to a topic.
