@@ -11,7 +11,7 @@
 )]
 
 #[path = "../../support/common.rs"]
-#[allow(dead_code, reason = "the wire tests use its other parts too")]
+#[allow(dead_code, clippy::needless_pass_by_value, reason = "the wire tests use its other parts too, and build values for it")]
 mod common;
 mod faults;
 mod proxy;
