@@ -444,3 +444,21 @@ pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), Strin
     }
     Ok(())
 }
+
+/// Passes if an answer has the members of `expected` with their values; it may have more.
+pub fn has(expected: &Value, got: &Value) -> Result<(), String> {
+    let members: Vec<&str> = expected.as_object().into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+    same(expected, got, &members)
+}
+
+/// Passes if a service applies each change alone: its other members stay as in `before`.
+pub fn apply_alone(bench: &mut Bench, service: &str, before: Value, changes: &[(&str, Value)]) -> Got {
+    let mut expected = before;
+    for (name, value) in changes {
+        if let Some(members) = expected.as_object_mut() {
+            members.insert((*name).to_owned(), value.clone());
+        }
+        has(&expected, &bench.accepted(service, &json!({ (*name): value }))?)?;
+    }
+    Ok("each field alone".to_owned())
+}
