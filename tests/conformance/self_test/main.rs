@@ -10,10 +10,8 @@
     reason = "a test that panics has failed"
 )]
 
-#[path = "../../support/common.rs"]
-#[allow(dead_code, clippy::needless_pass_by_value, reason = "the wire tests use its other parts too, and build values for it")]
-mod common;
 mod faults;
+mod program;
 mod proxy;
 
 use std::collections::BTreeSet;
@@ -26,18 +24,18 @@ use pendularm_conformance::bench::Found;
 use pendularm_conformance::{Row, Rule, Selection, rules, run, totals};
 use serde_json::Value;
 
-use common::Runtime;
 use faults::Planted;
+use program::Program;
 use proxy::{Fault, Proxy, Side};
 
 /// Programs that are tried at once; a rule waits more than it computes.
 const WORKERS: usize = 8;
 
 fn all_hold(links: usize) {
-    let program = Runtime::with_links(links);
+    let program = Program::start(links);
     // A run during other tests may take longer.
     let selection = Selection { time: Duration::from_secs(300), ..Selection::default() };
-    let rows = run(&program.address.to_string(), &selection, |_| {}).unwrap();
+    let rows = run(&program.address, &selection, |_| {}).unwrap();
     let failing: Vec<String> = rows.iter().filter(|row| !row.holds()).map(Row::to_string).collect();
     assert!(failing.is_empty(), "{}\n{}", failing.join("\n"), totals(&rows));
     assert!(rows.len() > 130, "{} rules alone", rows.len());
@@ -55,14 +53,14 @@ fn every_rule_holds_for_3_links() {
 
 /// The outcome of a rule against a server with a fault: nothing if it fails for the fault. A busy machine may keep the
 /// suite from preparing the arm, which says nothing about the rule; that is tried again.
-fn escapes(program: &Runtime, found: &Found, planted: &Planted, links: usize) -> Option<String> {
+fn escapes(program: &Program, found: &Found, planted: &Planted, links: usize) -> Option<String> {
     let mut outcome = String::new();
     for _ in 0..3 {
-        let proxy = Proxy::start(&program.address.to_string(), planted.fault(links));
+        let proxy = Proxy::start(&program.address, planted.fault(links));
         let selection = Selection { rule: Some(planted.rule.to_owned()), ..Selection::default() };
         let rows = run(&proxy.address, &selection, |_| {});
         // Past the proxy: the next fault finds a server as it was started.
-        found.restore(&program.address.to_string());
+        found.restore(&program.address);
         match rows.as_deref() {
             Ok([row]) => match &row.got {
                 Err(why) if !why.starts_with("while preparing") => {
@@ -90,8 +88,8 @@ fn each_fails(links: usize) {
     let next = AtomicUsize::new(0);
     let escaped: Vec<String> = thread::scope(|scope| {
         let work = || {
-            let program = Runtime::with_links(links);
-            let found = Found::at(&program.address.to_string()).unwrap();
+            let program = Program::start(links);
+            let found = Found::at(&program.address).unwrap();
             let mut escaped = Vec::new();
             while let Some(planted) = planted.get(next.fetch_add(1, Ordering::Relaxed)) {
                 escaped.extend(escapes(&program, &found, planted, links));
@@ -135,12 +133,12 @@ fn a_server_that_says_nothing_is_reported_soon() {
 /// As a server that is being written: the rules of the other sections can be tried.
 #[test]
 fn services_that_never_answer_fail_their_own_rules_alone() {
-    let program = Runtime::start();
+    let program = Program::start(2);
     let fault: Fault = Box::new(|_, _, frame| {
         let service = frame["service"].as_str().unwrap_or_default();
         if service.starts_with("/ik_") { vec![] } else { vec![frame] }
     });
-    let proxy = Proxy::start(&program.address.to_string(), fault);
+    let proxy = Proxy::start(&program.address, fault);
     let selection = Selection { rule: Some("reset".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     assert!(!rows.is_empty() && rows.iter().all(Row::holds), "{rows:?}");
@@ -155,7 +153,7 @@ fn a_port_without_a_server_is_reported() {
 
 #[test]
 fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
-    let program = Runtime::start();
+    let program = Program::start(2);
     let mut asked = 0;
     let fault: Fault = Box::new(move |side, _, mut frame| {
         if side == Side::Server {
@@ -171,7 +169,7 @@ fn answers_of_the_wrong_types_fail_the_rules_and_nothing_else() {
         }
         vec![frame]
     });
-    let proxy = Proxy::start(&program.address.to_string(), fault);
+    let proxy = Proxy::start(&program.address, fault);
     let selection = Selection { category: Some("pid".to_owned()), ..Selection::default() };
     let rows = run(&proxy.address, &selection, |_| {}).unwrap();
     let holding: Vec<String> = rows.iter().filter(|row| row.holds()).map(Row::to_string).collect();
