@@ -29,10 +29,10 @@ against() {
     runtime=
 }
 
-for client in roslibpy_client roslibpy_command compas_fab_client ros_mcp_client ros3d_client; do
+for client in roslibpy_client compas_fab_client ros_mcp_client ros3d_client; do
     against .venv/bin/python "python/$client.py"
 done
-for client in roslib2 roslib1 lichtblick foxglove closed_loop; do
+for client in roslib2 roslib1 lichtblick closed_loop; do
     against node "node/$client.mjs"
 done
 against roslibrust/target/debug/pendularm-client-roslibrust

@@ -22,6 +22,5 @@ mod limits;
 #[path = "../support/papers.rs"]
 mod papers;
 mod readme;
-mod style;
 mod tree;
 mod words;

@@ -59,33 +59,23 @@ pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
     files_in(folder, &["rs"])
 }
 
-#[test]
-fn every_source_file_begins_with_its_purpose_and_its_invariant() {
-    for path in rust_files("src") {
-        let text = fs::read_to_string(&path).unwrap();
-        let shown = path.display();
-        let first = text.lines().next().unwrap_or_default();
-        assert!(
-            first.starts_with("//! ") && first.len() > 20,
-            "{shown} opens with {first:?}"
-        );
-        // The crate's first page is the map, with the invariant of each layer.
-        if !path.ends_with("src/lib.rs") {
-            let head = text.lines().take_while(|line| line.starts_with("//!"));
-            let invariants = head
-                .filter(|line| line.starts_with("//! **Invariant:** "))
-                .count();
-            assert_eq!(invariants, 1, "invariants at the head of {shown}");
-        }
-    }
-}
+/// Longest source file, in lines.
+const MAX_LINES: usize = 800;
 
 #[test]
-fn every_test_file_and_fuzz_target_begins_with_its_purpose() {
-    for path in [rust_files("tests"), rust_files("fuzz")].concat() {
-        let text = fs::read_to_string(&path).unwrap();
-        assert!(text.starts_with("//! "), "{} does not", path.display());
-    }
+fn no_source_file_is_longer_than_a_reader_takes_in() {
+    let all = files(root());
+    let is_source = |path: &&PathBuf| {
+        let extension = path.extension().and_then(OsStr::to_str);
+        extension.is_some_and(|one| ["rs", "py", "js", "mjs", "sh"].contains(&one))
+    };
+    let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();
+    let long: Vec<&PathBuf> = all
+        .iter()
+        .filter(is_source)
+        .filter(|path| lines(path) > MAX_LINES)
+        .collect();
+    assert!(long.is_empty(), "longer than {MAX_LINES} lines: {long:?}");
 }
 
 /// Crates and parts of the standard library that the pure layers may not use. Comments do not count.
@@ -166,35 +156,6 @@ fn no_file_names_a_folder_of_a_build_machine() {
             });
             assert!(!named, "{} names {home}", path.display());
         }
-    }
-}
-
-#[test]
-fn no_line_ends_in_white_space_and_every_text_ends_in_a_newline() {
-    for path in files(root()) {
-        let Ok(text) = fs::read_to_string(&path) else {
-            continue;
-        };
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "json")
-        {
-            continue;
-        }
-        assert!(
-            text.is_empty() || text.ends_with('\n'),
-            "{} has no newline at its end",
-            path.display()
-        );
-        let loose = text
-            .lines()
-            .position(|line| line.ends_with([' ', '\t', '\r']));
-        assert_eq!(
-            loose,
-            None,
-            "{}: white space at the end of a line (from 0)",
-            path.display()
-        );
     }
 }
 

@@ -145,12 +145,3 @@ fn the_effort_of_three_links_is_near_the_load_once_they_are_slow() {
         );
     }
 }
-
-#[test]
-fn the_integral_gain_is_no_smaller_than_the_proportional_one_at_any_joint() {
-    fn check<const N: usize>(gains: Gains<N>) {
-        assert!((0..N).all(|i| gains.ki[i] >= gains.kp[i] && gains.kp[i] > 0.0));
-    }
-    check::<2>(Gains::default());
-    check::<3>(Gains::default());
-}

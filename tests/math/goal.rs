@@ -1,7 +1,7 @@
 //! A goal's entry and dwell at every physics step, and the cadence of its feedback, in simulation time alone.
 
 use glam::{DVec2, dvec2};
-use pendularm::math::goal::{Cadence, Criteria, EPSILON, Goal, Outcome, SUCCESS_HOLD};
+use pendularm::math::goal::{Cadence, Criteria, Goal};
 use proptest::prelude::*;
 
 const TARGET: DVec2 = dvec2(1.0, 0.5);
@@ -25,20 +25,6 @@ fn goal(success_hold: f64) -> Goal {
 /// The first step (counted from 1) after which the goal is reached, for an end effector on `path`.
 fn reached_at(goal: &mut Goal, h: f64, steps: u32, path: impl Fn(u32) -> DVec2) -> Option<u32> {
     (1..=steps).find(|&k| goal.judge(f64::from(k) * h, path(k)))
-}
-
-#[test]
-fn the_defaults_are_the_documented_ones() {
-    assert_eq!(
-        Criteria::default(),
-        Criteria {
-            epsilon: 0.02,
-            success_hold: 0.5
-        }
-    );
-    assert_eq!((EPSILON, SUCCESS_HOLD), (0.02, 0.5));
-    assert_eq!(Outcome::Reached.to_string(), "reached");
-    assert_eq!(Outcome::Preempted.to_string(), "preempted");
 }
 
 /// The step (counted from 1) after which a goal is reached, by `success_hold`, timestep and the steps at which the end
@@ -126,17 +112,6 @@ fn a_hand_that_is_nowhere_is_not_there() {
         assert!(!goal.judge(H, nowhere));
     }
     assert!(goal.distance(dvec2(1e300, 1e300)).is_finite());
-}
-
-#[test]
-fn elapsed_is_simulation_time_since_the_start() {
-    let goal = Goal::new(TARGET, Criteria::default(), 12.5);
-    assert_eq!(goal.elapsed(12.5), 0.0);
-    assert_eq!(goal.elapsed(13.0), 0.5);
-    assert_eq!(
-        (goal.target(), goal.criteria()),
-        (TARGET, Criteria::default())
-    );
 }
 
 proptest! {

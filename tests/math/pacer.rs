@@ -46,13 +46,6 @@ fn what_is_not_taken_stays_owed() {
 }
 
 #[test]
-fn a_stall_is_caught_up_by_a_quarter_of_a_second_and_no_more() {
-    let mut pacer = Pacer::new(Duration::ZERO, 0.001);
-    let woken = 3600 * SECOND + 456_789;
-    assert_eq!(pacer.due(ns(woken)), 251);
-}
-
-#[test]
 fn the_pace_after_a_stall_is_the_usual_one() {
     let mut pacer = Pacer::new(Duration::ZERO, 0.001);
     let woken = 3600 * SECOND + 456_789;

@@ -162,16 +162,9 @@ fn tell(seed: u64, failure: &Failure) {
     );
 }
 
-/// The kept seeds, and whether each is older than the feature of bursts. Such a seed is played without bursts, as when
-/// it failed.
-fn kept() -> impl Iterator<Item = (u64, bool)> {
-    let (older, newer) = KEPT.split_once("# with bursts").unwrap_or((KEPT, ""));
-    let seeds = |text: &'static str| {
-        let words = text.lines().map(|line| line.split_whitespace().next());
-        words.filter_map(|word| word?.parse().ok())
-    };
-    let older = seeds(older).map(|seed| (seed, true));
-    older.chain(seeds(newer).map(|seed| (seed, false)))
+fn kept() -> impl Iterator<Item = u64> {
+    let words = KEPT.lines().map(|line| line.split_whitespace().next());
+    words.filter_map(|word| word?.parse().ok())
 }
 
 /// Plays a seed; any panic is its failure.
@@ -179,8 +172,7 @@ fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
     SEED.store(seed, Ordering::Relaxed);
     BEGAN.store(began.elapsed().as_millis() as u64, Ordering::Relaxed);
     *PANIC.lock().unwrap() = None;
-    let is_newest = !kept().any(|(one, is_older)| one == seed && is_older);
-    let played = catch_unwind(AssertUnwindSafe(|| play(seed, is_newest, keeps_log)));
+    let played = catch_unwind(AssertUnwindSafe(|| play(seed, keeps_log)));
     let panic = PANIC.lock().unwrap().take();
     let mut outcome = played.unwrap_or_else(|_| Outcome {
         plan: String::new(),
@@ -252,8 +244,7 @@ fn play_many(began: Instant) -> i32 {
     let mut told = Instant::now();
     let mut tally: BTreeMap<&'static str, u64> = BTreeMap::new();
     let (mut played, mut failed, mut code) = (0, 0, 0);
-    let kept = kept().map(|(seed, _)| seed);
-    for seed in kept.chain(from..from.saturating_add(count)) {
+    for seed in kept().chain(from..from.saturating_add(count)) {
         if end.is_some_and(|end| began.elapsed() > end) {
             break;
         }

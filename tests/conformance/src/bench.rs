@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
@@ -185,6 +186,15 @@ impl Bench {
         must(!answer.status.is_empty(), || format!("{service} {args} is rejected with an empty status"))?;
         must(answer.frame.get("result") == Some(&Value::Bool(false)), || format!("{service} {args}: no result"))?;
         Ok(answer)
+    }
+
+    /// Passes if each of these requests is rejected; the last reason.
+    pub fn rejects(&mut self, service: &str, requests: &[Value]) -> Got {
+        let mut status = String::new();
+        for request in requests {
+            status = self.rejected(service, request)?.status;
+        }
+        Ok(format!("{} rejected, the last with: {status}", requests.len()))
     }
 
     /// Subscribes to a topic.
@@ -433,4 +443,22 @@ pub fn same(before: &Value, after: &Value, members: &[&str]) -> Result<(), Strin
         must(is_same, || format!("{name} was {} and is {}", show(one), show(other)))?;
     }
     Ok(())
+}
+
+/// Passes if an answer has the members of `expected` with their values; it may have more.
+pub fn has(expected: &Value, got: &Value) -> Result<(), String> {
+    let members: Vec<&str> = expected.as_object().into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+    same(expected, got, &members)
+}
+
+/// Passes if a service applies each change alone: its other members stay as in `before`.
+pub fn apply_alone(bench: &mut Bench, service: &str, before: Value, changes: &[(&str, Value)]) -> Got {
+    let mut expected = before;
+    for (name, value) in changes {
+        if let Some(members) = expected.as_object_mut() {
+            members.insert((*name).to_owned(), value.clone());
+        }
+        has(&expected, &bench.accepted(service, &json!({ (*name): value }))?)?;
+    }
+    Ok("each field alone".to_owned())
 }

@@ -94,6 +94,9 @@ impl Rule {
     }
 }
 
+/// The expected outcome of a request that must be rejected.
+pub const REJECTED: &str = "result false and a status";
+
 /// A rule for any arm. `rules::all` gives it the category of its file.
 #[must_use]
 pub const fn rule(id: &'static str, says: &'static str, expected: &'static str, check: fn(&mut Bench) -> Got) -> Rule {

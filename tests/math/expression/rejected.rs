@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** nothing here is accepted, and every message is checked, its column included.
 
-use pendularm::math::expression::{Expression, ExpressionError};
-
 use super::rejection;
 
 /// `{NAMES}` and `{OPERAND}` in a message are replaced by these texts.
@@ -12,6 +10,12 @@ const OPERAND: &str = "expected a number, t, a function, - or (";
 
 /// A text and its message.
 const REJECTED: &[(&str, &str)] = &[
+    // Nothing.
+    ("", "expected an expression in t, found an empty text"),
+    (
+        " \t\r\n",
+        "expected an expression in t, found an empty text",
+    ),
     // A parenthesis that is never closed.
     ("(t", "the ( at column 1 is never closed"),
     ("1+(2*(t)", "the ( at column 3 is never closed"),
@@ -114,17 +118,6 @@ fn every_text_of_the_table_is_rejected_with_its_message() {
             .replace("{NAMES}", NAMES)
             .replace("{OPERAND}", OPERAND);
         assert_eq!(rejection(text), expected, "{text:?}");
-    }
-}
-
-#[test]
-fn an_empty_function_is_rejected() {
-    for text in ["", " ", " \t\r\n"] {
-        assert_eq!(Expression::parse(text), Err(ExpressionError::Empty));
-        assert_eq!(
-            rejection(text),
-            "expected an expression in t, found an empty text"
-        );
     }
 }
 

@@ -4,23 +4,9 @@ use std::ops::ControlFlow;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
 
 use super::{moving, no_gains};
-
-#[test]
-fn a_simulation_starts_in_the_starting_pose_with_runge_kutta_at_a_millisecond_and_no_control() {
-    let simulation = Simulation::new(Arm::default(), Gains::<3>::default());
-    assert_eq!(simulation.state(), &State::rest());
-    assert_eq!(simulation.state().position, [0.0; 3]);
-    assert_eq!(simulation.method(), Method::Rk4);
-    assert_eq!(simulation.timestep(), 0.001);
-    assert!(!simulation.pid().is_enabled());
-    assert_eq!(simulation.effort(), &[0.0; 3]);
-    assert_eq!((simulation.time(), simulation.steps()), (0.0, 0));
-    assert_eq!(simulation.divergence(), None);
-}
 
 #[test]
 fn many_steps_at_once_are_the_same_bits_as_one_by_one() {

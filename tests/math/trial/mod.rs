@@ -10,7 +10,7 @@ use glam::dvec2;
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::Target;
 use pendularm::math::trial::{
-    ATTEMPTS, ActionStatus, Changes, Conclusion, Rejection, Settings, Status, Trial, TrialCommand,
+    ActionStatus, Changes, Conclusion, Rejection, Status, Trial, TrialCommand,
 };
 
 const TRANSCRIPTS: &str = include_str!("transcripts.txt");
@@ -154,20 +154,6 @@ fn every_event_has_its_commands_and_its_status() {
         .map(|(found, _)| found)
         .collect();
     assert!(other.is_empty(), "found:\n{}", other.join("\n"));
-}
-
-#[test]
-fn settings_default_to_the_documented_ones() {
-    let criteria = Criteria {
-        epsilon: 0.02,
-        success_hold: 0.5,
-    };
-    let settings = Settings {
-        duration: 60.0,
-        criteria,
-    };
-    assert_eq!(Trial::default().settings(), settings);
-    assert_eq!(ATTEMPTS, 8);
 }
 
 #[test]

@@ -34,14 +34,11 @@ pub struct Outcome {
     pub tally: std::collections::BTreeMap<&'static str, u64>,
 }
 
-/// Plays one seed, with bursts unless it is older than they are.
-pub fn play(seed: u64, is_newest: bool, keeps_log: bool) -> Outcome {
+/// Plays one seed.
+pub fn play(seed: u64, keeps_log: bool) -> Outcome {
     in_virtual_time(async {
         let court = Rc::new(Court::new(seed, keeps_log));
-        let mut plan = Plan::draw(&court);
-        if is_newest {
-            plan = plan.with_bursts(&court);
-        }
+        let plan = Plan::draw(&court);
         let text = format!("{plan:?}");
         let mut course = Course::new(&court, plan, seed).await;
         course.run().await;

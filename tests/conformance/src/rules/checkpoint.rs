@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::bench::{Bench, same};
 use crate::method::METHODS;
 use crate::values::{list, near};
-use crate::{Got, Rule, rule};
+use crate::{Got, REJECTED, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[
@@ -31,24 +31,89 @@ pub const RULES: &[Rule] = &[
         "the same joint states and settings before and after",
         writes_nothing,
     ),
-    rule("checkpoint-8", "An unknown integrator is rejected", "result false and a status", unknown_integrator),
-    rule("checkpoint-9", "dt = 0 and dt < 0 are rejected", "result false and a status", bad_dt),
-    rule("checkpoint-10", "steps = 0 is rejected", "result false and a status", no_steps),
-    rule("checkpoint-11", "A function that does not parse is rejected", "result false and a status", no_function),
+    rule("checkpoint-8", "An unknown integrator is rejected", REJECTED, |bench| {
+        rejects(bench, &[("integrator", json!("rk5")), ("integrator", json!(""))])
+    }),
+    rule("checkpoint-9", "dt = 0 and dt < 0 are rejected", REJECTED, |bench| rejects(bench, &[("dt", json!(0.0)), ("dt", json!(-0.1))])),
+    rule("checkpoint-10", "steps = 0 is rejected", REJECTED, |bench| rejects(bench, &[("steps", json!(0))])),
+    rule("checkpoint-11", "A function that does not parse is rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])
+    }),
     rule("checkpoint-12", "The server answers later calls after rejected ones", "an accepted call after 20 rejected ones", lives_on),
-    rule("function-1", "+ - * / are left-associative and * / bind tighter than + -", "10-4-3 = 3, 16/4/2 = 2, 2+3*4 = 14, ...", arithmetic),
-    rule("function-2", "^ is right-associative and binds tighter than * /", "2^3^2 = 512, 2*3^2 = 18, ...", powers),
-    rule("function-3", "Unary minus binds tighter than ^", "-3^2 = 9, 2^-1 = 0.5, ...", unary_minus),
-    rule("function-4", "Parentheses group", "(1+2)*3 = 9, 2^(1+2) = 8, ...", parentheses),
-    rule("function-5", "Numbers may have a fraction", "0.25, 12.5, 3", literals),
-    rule("function-6", "sin cos tan exp sqrt ln abs are known", "their values to 1e-9", named_functions),
-    rule("function-7", "t is the free variable; the specification's examples are valid", "t, sin(t), t^2 + 3*t - 1, -t + 1", examples),
-    rule("function-8", "An empty function is rejected", "result false and a status", empty),
-    rule("function-9", "Unbalanced parentheses are rejected", "result false and a status", unbalanced),
-    rule("function-10", "An unknown identifier is rejected", "result false and a status", unknown_name),
-    rule("function-11", "Text after a complete expression is rejected", "result false and a status", trailing),
-    rule("function-12", "Adjacent tokens without an operator are rejected", "result false and a status", adjacent),
-    rule("function-13", "An unrecognized character is rejected", "result false and a status", characters),
+    rule("function-1", "+ - * / are left-associative and * / bind tighter than + -", "10-4-3 = 3, 16/4/2 = 2, 2+3*4 = 14, ...", |bench| {
+        evaluates(
+            bench,
+            &[
+                ("10-4-3", |_| 3.0),
+                ("16/4/2", |_| 2.0),
+                ("2+3*4", |_| 14.0),
+                ("2*3+4", |_| 10.0),
+                ("7-6/2", |_| 4.0),
+                ("12/2*3", |_| 18.0),
+                ("t - 2*t + 5", |t| 5.0 - t),
+                ("t*t/4", |t| t * t / 4.0),
+            ],
+        )
+    }),
+    rule("function-2", "^ is right-associative and binds tighter than * /", "2^3^2 = 512, 2*3^2 = 18, ...", |bench| {
+        evaluates(bench, &[("2^3^2", |_| 512.0), ("2*3^2", |_| 18.0), ("12/2^2", |_| 3.0), ("t^3", |t| t.powi(3)), ("2^t", f64::exp2)])
+    }),
+    rule("function-3", "Unary minus binds tighter than ^", "-3^2 = 9, 2^-1 = 0.5, ...", |bench| {
+        evaluates(
+            bench,
+            &[
+                ("-3^2", |_| 9.0),
+                ("2^-1", |_| 0.5),
+                ("3--2", |_| 5.0),
+                ("2*-t", |t| -2.0 * t),
+                ("-t^2", |t| t * t),
+                ("-(t+1)", |t| -t - 1.0),
+            ],
+        )
+    }),
+    rule("function-4", "Parentheses group", "(1+2)*3 = 9, 2^(1+2) = 8, ...", |bench| {
+        evaluates(
+            bench,
+            &[("(1+2)*3", |_| 9.0), ("10-(4-3)", |_| 9.0), ("2^(1+2)", |_| 8.0), ("(2^3)^2", |_| 64.0), ("((t))*(t+1)", |t| t * (t + 1.0))],
+        )
+    }),
+    rule("function-5", "Numbers may have a fraction", "0.25, 12.5, 3", |bench| {
+        evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])
+    }),
+    rule("function-6", "sin cos tan exp sqrt ln abs are known", "their values to 1e-9", |bench| {
+        evaluates(
+            bench,
+            &[
+                ("sin(t)", f64::sin),
+                ("cos(t)", f64::cos),
+                ("tan(t)", f64::tan),
+                ("exp(t)", f64::exp),
+                ("sqrt(t)", f64::sqrt),
+                ("ln(t + 1)", f64::ln_1p),
+                ("abs(t - 1)", |t| (t - 1.0).abs()),
+                ("2*sin(cos(t))", |t| 2.0 * t.cos().sin()),
+            ],
+        )
+    }),
+    rule("function-7", "t is the free variable; the specification's examples are valid", "t, sin(t), t^2 + 3*t - 1, -t + 1", |bench| {
+        evaluates(bench, &[("t", |t| t), ("sin(t)", f64::sin), ("t^2 + 3*t - 1", |t| t * t + 3.0 * t - 1.0), ("-t + 1", |t| 1.0 - t)])
+    }),
+    rule("function-8", "An empty function is rejected", REJECTED, |bench| rejects_functions(bench, &["", "  "])),
+    rule("function-9", "Unbalanced parentheses are rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])
+    }),
+    rule("function-10", "An unknown identifier is rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])
+    }),
+    rule("function-11", "Text after a complete expression is rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])
+    }),
+    rule("function-12", "Adjacent tokens without an operator are rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["1 2", "t t", "(t)(t)"])
+    }),
+    rule("function-13", "An unrecognized character is rejected", REJECTED, |bench| {
+        rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])
+    }),
     rule(
         "function-14",
         "A domain error at evaluation does not stop the service",
@@ -62,24 +127,23 @@ fn request() -> Value {
 }
 
 /// The request with one member changed.
-fn with(name: &str, value: Value) -> Value {
+fn with(name: &str, value: &Value) -> Value {
     let mut request = request();
     if let Some(members) = request.as_object_mut() {
-        members.insert(name.to_owned(), value);
+        members.insert(name.to_owned(), value.clone());
     }
     request
 }
 
-fn rejects(bench: &mut Bench, request: &Value) -> Result<String, String> {
-    bench.rejected("/arm_sim/integration_step", request).map(|answer| answer.status)
+/// Passes if the request is rejected with each of these members.
+fn rejects(bench: &mut Bench, members: &[(&str, Value)]) -> Got {
+    let requests: Vec<Value> = members.iter().map(|(name, value)| with(name, value)).collect();
+    bench.rejects("/arm_sim/integration_step", &requests)
 }
 
 fn rejects_functions(bench: &mut Bench, functions: &[&str]) -> Got {
-    let mut status = String::new();
-    for function in functions {
-        status = rejects(bench, &with("function", json!(function)))?;
-    }
-    Ok(format!("{} rejected, the last with: {status}", functions.len()))
+    let members: Vec<(&str, Value)> = functions.iter().map(|function| ("function", json!(function))).collect();
+    rejects(bench, &members)
 }
 
 fn lengths(bench: &mut Bench) -> Got {
@@ -155,29 +219,9 @@ fn writes_nothing(bench: &mut Bench) -> Got {
     Ok("nothing changed".to_owned())
 }
 
-fn unknown_integrator(bench: &mut Bench) -> Got {
-    rejects(bench, &with("integrator", json!("rk5")))?;
-    rejects(bench, &with("integrator", json!("")))
-}
-
-fn bad_dt(bench: &mut Bench) -> Got {
-    rejects(bench, &with("dt", json!(0.0)))?;
-    rejects(bench, &with("dt", json!(-0.1)))
-}
-
-fn no_steps(bench: &mut Bench) -> Got {
-    rejects(bench, &with("steps", json!(0)))
-}
-
-fn no_function(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])
-}
-
 fn lives_on(bench: &mut Bench) -> Got {
     for _ in 0..5 {
-        for bad in [with("function", json!("((t")), with("integrator", json!("leapfrog")), with("dt", json!(-1)), with("steps", json!(0))] {
-            rejects(bench, &bad)?;
-        }
+        rejects(bench, &[("function", json!("((t")), ("integrator", json!("leapfrog")), ("dt", json!(-1)), ("steps", json!(0))])?;
     }
     bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
     Ok("an accepted call".to_owned())
@@ -200,90 +244,8 @@ fn evaluates(bench: &mut Bench, table: &[Expression]) -> Got {
     Ok(format!("{} expressions as expected", table.len()))
 }
 
-fn arithmetic(bench: &mut Bench) -> Got {
-    evaluates(
-        bench,
-        &[
-            ("10-4-3", |_| 3.0),
-            ("16/4/2", |_| 2.0),
-            ("2+3*4", |_| 14.0),
-            ("2*3+4", |_| 10.0),
-            ("7-6/2", |_| 4.0),
-            ("12/2*3", |_| 18.0),
-            ("t - 2*t + 5", |t| 5.0 - t),
-            ("t*t/4", |t| t * t / 4.0),
-        ],
-    )
-}
-
-fn powers(bench: &mut Bench) -> Got {
-    evaluates(bench, &[("2^3^2", |_| 512.0), ("2*3^2", |_| 18.0), ("12/2^2", |_| 3.0), ("t^3", |t| t.powi(3)), ("2^t", f64::exp2)])
-}
-
-fn unary_minus(bench: &mut Bench) -> Got {
-    evaluates(
-        bench,
-        &[("-3^2", |_| 9.0), ("2^-1", |_| 0.5), ("3--2", |_| 5.0), ("2*-t", |t| -2.0 * t), ("-t^2", |t| t * t), ("-(t+1)", |t| -t - 1.0)],
-    )
-}
-
-fn parentheses(bench: &mut Bench) -> Got {
-    evaluates(
-        bench,
-        &[("(1+2)*3", |_| 9.0), ("10-(4-3)", |_| 9.0), ("2^(1+2)", |_| 8.0), ("(2^3)^2", |_| 64.0), ("((t))*(t+1)", |t| t * (t + 1.0))],
-    )
-}
-
-fn literals(bench: &mut Bench) -> Got {
-    evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])
-}
-
-fn named_functions(bench: &mut Bench) -> Got {
-    evaluates(
-        bench,
-        &[
-            ("sin(t)", f64::sin),
-            ("cos(t)", f64::cos),
-            ("tan(t)", f64::tan),
-            ("exp(t)", f64::exp),
-            ("sqrt(t)", f64::sqrt),
-            ("ln(t + 1)", f64::ln_1p),
-            ("abs(t - 1)", |t| (t - 1.0).abs()),
-            ("2*sin(cos(t))", |t| 2.0 * t.cos().sin()),
-        ],
-    )
-}
-
-fn examples(bench: &mut Bench) -> Got {
-    evaluates(bench, &[("t", |t| t), ("sin(t)", f64::sin), ("t^2 + 3*t - 1", |t| t * t + 3.0 * t - 1.0), ("-t + 1", |t| 1.0 - t)])
-}
-
-fn empty(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["", "  "])
-}
-
-fn unbalanced(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])
-}
-
-fn unknown_name(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])
-}
-
-fn trailing(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])
-}
-
-fn adjacent(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["1 2", "t t", "(t)(t)"])
-}
-
-fn characters(bench: &mut Bench) -> Got {
-    rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])
-}
-
 fn domain_error(bench: &mut Bench) -> Got {
-    let answer = bench.peer.call("/arm_sim/integration_step", &with("function", json!("sqrt(-1)")))?;
+    let answer = bench.peer.call("/arm_sim/integration_step", &with("function", &json!("sqrt(-1)")))?;
     bench.integrate("t", [0.0, 0.0, 0.1], 3, "rk4")?;
     Ok(format!("result {}, then an accepted call", answer.result))
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{boolean, member, must, near, number, numbers_of, text};
-use crate::{Got, Rule, rule};
+use crate::{Got, REJECTED, Rule, rule};
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[
@@ -18,8 +18,13 @@ pub const RULES: &[Rule] = &[
         "result false; feedback of the old goal goes on, no result",
         leaves_alone,
     ),
-    rule("goal-3", "A goal without a numeric x or y is rejected", "result false and a status", not_numeric),
-    rule("goal-4", "epsilon must be positive and success_hold not negative", "result false and a status", bad_options),
+    rule("goal-3", "A goal without a numeric x or y is rejected", REJECTED, |bench| {
+        bench.rejects(SEND, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0}), json!({"x": "1", "y": 1.0})])
+    }),
+    rule("goal-4", "epsilon must be positive and success_hold not negative", REJECTED, |bench| {
+        let bad = [json!({"epsilon": 0.0}), json!({"epsilon": -0.1}), json!({"success_hold": -1.0})];
+        bench.rejects(SEND, &bad.map(|option| goal_at(bench, [0.5, -0.8, 0.4], &option)))
+    }),
     rule("goal-5", "A goal is commanded on /joint_trajectory", "a point that reaches the target", commands),
     rule("goal-6", "Feedback comes while a goal is active", "goal_id, target, positions, distance_remaining and elapsed", feedback),
     rule(
@@ -28,7 +33,7 @@ pub const RULES: &[Rule] = &[
         "a result with the old id, outcome preempted, target and final_distance",
         preempts,
     ),
-    rule("goal-8", "cancel_goal without an active goal is rejected", "result false and a status", nothing_to_cancel),
+    rule("goal-8", "cancel_goal without an active goal is rejected", REJECTED, nothing_to_cancel),
     rule("goal-9", "cancel_goal with another goal's id is rejected without effect", "result false; no result of the active goal", wrong_id),
     rule(
         "goal-10",
@@ -135,22 +140,6 @@ fn leaves_alone(bench: &mut Bench) -> Got {
     let msg = bench.message(FEEDBACK, PATIENCE)?;
     must(is_of(&msg, &id), || format!("feedback of another goal: {msg}"))?;
     Ok(format!("rejected with: {status}"))
-}
-
-fn not_numeric(bench: &mut Bench) -> Got {
-    for bad in [json!({}), json!({"x": 1.0}), json!({"y": 1.0})] {
-        bench.rejected(SEND, &bad)?;
-    }
-    Ok(bench.rejected(SEND, &json!({"x": "1", "y": 1.0}))?.status)
-}
-
-fn bad_options(bench: &mut Bench) -> Got {
-    for bad in [json!({"epsilon": 0.0}), json!({"epsilon": -0.1})] {
-        let goal = goal_at(bench, [0.5, -0.8, 0.4], &bad);
-        bench.rejected(SEND, &goal)?;
-    }
-    let goal = goal_at(bench, [0.5, -0.8, 0.4], &json!({"success_hold": -1.0}));
-    Ok(bench.rejected(SEND, &goal)?.status)
 }
 
 fn commands(bench: &mut Bench) -> Got {

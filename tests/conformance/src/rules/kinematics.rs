@@ -7,11 +7,13 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{list, must, near, numbers_of};
-use crate::{Got, Links, Rule, rule};
+use crate::{Got, Links, REJECTED, Rule, rule};
 
 const fn only(links: Links, rule: Rule) -> Rule {
     Rule { links, ..rule }
 }
+
+const SOLVE: &str = "/ik/solve";
 
 /// The rules of this part.
 pub const RULES: &[Rule] = &[
@@ -30,7 +32,11 @@ pub const RULES: &[Rule] = &[
     ),
     only(Links::Three, rule("ik-3", "phi is optional for 3 links", "x and y by forward kinematics, for 10 targets", without_phi)),
     only(Links::Two, rule("ik-4", "phi is ignored for 2 links", "x and y by forward kinematics, for any phi", ignores_phi)),
-    rule("ik-5", "A request without a numeric x or y is rejected", "result false and a status", not_numeric),
+    rule("ik-5", "A request without a numeric x or y is rejected", REJECTED, |bench| {
+        let wrong = [json!({"x": "1", "y": 1.0}), json!({"x": 1.0, "y": null}), json!({"x": 1.0, "y": [0.5]})];
+        bench.rejects(SOLVE, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0})])?;
+        bench.rejects(SOLVE, &wrong)
+    }),
     rule("ik-6", "A target beyond the full extension is rejected", "result false and a status, in 8 directions", too_far),
     only(Links::Two, rule("ik-7", "A target closer than |l1 - l2| is rejected", "result false and a status, in 8 directions", too_near)),
     only(
@@ -72,7 +78,7 @@ fn turned(angle: f64, other: f64) -> f64 {
 
 /// Solves and passes if the solution reaches the target to a tolerance.
 fn reaches(bench: &mut Bench, arm: &Arm, target: &Value, (x, y): (f64, f64), phi: Option<f64>, tolerance: f64) -> Result<Vec<f64>, String> {
-    let values = bench.accepted("/ik/solve", target)?;
+    let values = bench.accepted(SOLVE, target)?;
     let positions = numbers_of(&values, "positions", bench.links)?;
     let (got_x, got_y, heading) = arm.end_effector(&positions);
     near(&format!("x and y of {} for {target}", list(&positions)), &[got_x, got_y], &[x, y], tolerance)?;
@@ -120,30 +126,21 @@ fn ignores_phi(bench: &mut Bench) -> Got {
     Ok("4 targets reached".to_owned())
 }
 
-fn rejects(bench: &mut Bench, target: &Value) -> Got {
-    bench.rejected("/ik/solve", target).map(|answer| answer.status)
-}
-
-fn not_numeric(bench: &mut Bench) -> Got {
-    for bad in [json!({}), json!({"x": 1.0}), json!({"y": 1.0}), json!({"x": "1", "y": 1.0}), json!({"x": 1.0, "y": null})] {
-        rejects(bench, &bad)?;
-    }
-    rejects(bench, &json!({"x": 1.0, "y": [0.5]}))
-}
-
 fn directions(count: u32) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| TAU * f64::from(k) / f64::from(count))
 }
 
+/// Passes if targets at these distances are rejected, in 8 directions.
+fn rejects_at(bench: &mut Bench, distances: &[f64]) -> Got {
+    let places = directions(8).flat_map(|heading| distances.iter().map(move |distance| (heading, distance)));
+    let targets: Vec<Value> =
+        places.map(|(heading, distance)| target(bench, distance * heading.cos(), distance * heading.sin(), heading)).collect();
+    bench.rejects(SOLVE, &targets)
+}
+
 fn too_far(bench: &mut Bench) -> Got {
-    let mut status = String::new();
     let reach = Arm::of(bench.links, GRAVITY).lengths.iter().sum::<f64>();
-    for heading in directions(8) {
-        for distance in [1.001 * reach, 10.0 * reach] {
-            status = rejects(bench, &target(bench, distance * heading.cos(), distance * heading.sin(), heading))?;
-        }
-    }
-    Ok(status)
+    rejects_at(bench, &[1.001 * reach, 10.0 * reach])
 }
 
 /// 2 links of 1 m and 0.6 m.
@@ -153,20 +150,13 @@ fn unequal() -> Arm {
 
 fn too_near(bench: &mut Bench) -> Got {
     bench.set_arm(&unequal())?;
-    let mut status = String::new();
-    for heading in directions(8) {
-        for distance in [0.399, 0.1] {
-            status = rejects(bench, &json!({"x": distance * heading.cos(), "y": distance * heading.sin()}))?;
-        }
-    }
-    rejects(bench, &json!({"x": 0.0, "y": 0.0}))?;
-    Ok(status)
+    rejects_at(bench, &[0.399, 0.1, 0.0])
 }
 
 fn wrist_out(bench: &mut Bench) -> Got {
     // 1.5 m away, links of 1 m: with phi pointing back at the base the wrist is 2.5 m away.
     let arm = Arm::of(3, GRAVITY);
-    let status = rejects(bench, &json!({"x": 1.5, "y": 0.0, "phi": PI}))?;
+    let status = bench.rejected(SOLVE, &json!({"x": 1.5, "y": 0.0, "phi": PI}))?.status;
     reaches(bench, &arm, &json!({"x": 1.5, "y": 0.0, "phi": 0.0}), (1.5, 0.0), Some(0.0), 1e-6)?;
     Ok(status)
 }
@@ -200,7 +190,7 @@ fn new_lengths(bench: &mut Bench) -> Got {
     let wide = target(bench, far, 0.1, 0.0);
     reaches(bench, &long, &wide, (far, 0.1), None, 1e-6)?;
     bench.set_arm(&Arm::of(bench.links, GRAVITY))?;
-    rejects(bench, &wide)
+    bench.rejects(SOLVE, &[wide])
 }
 
 fn moves_nothing(bench: &mut Bench) -> Got {
@@ -208,7 +198,7 @@ fn moves_nothing(bench: &mut Bench) -> Got {
     bench.pause(true)?;
     let before = bench.fresh()?;
     let target = target(bench, 0.8, 0.9, 0.5);
-    bench.accepted("/ik/solve", &target)?;
+    bench.accepted(SOLVE, &target)?;
     let after = bench.fresh()?;
     near("position", &after.position, &before.position, 1e-12)?;
     must(after.effort == before.effort, || format!("effort {} after {}", list(&after.effort), list(&before.effort)))?;

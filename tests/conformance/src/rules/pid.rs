@@ -5,9 +5,9 @@
 use std::thread::sleep;
 use std::time::Duration;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
-use crate::bench::{Bench, point, shifted};
+use crate::bench::{Bench, apply_alone, has, point, shifted};
 use crate::rules::control_services::is_query;
 use crate::values::{fine, largest, list, minus, must, near};
 use crate::{Got, Rule, rule};
@@ -137,30 +137,16 @@ fn ends_effort(bench: &mut Bench) -> Got {
 fn reads_back(bench: &mut Bench) -> Got {
     let gains = json!({"kp": bench.each(12.5), "ki": bench.each(3.0), "kd": bench.each(0.75)});
     let answer = bench.accepted(SET_GAINS, &gains)?;
-    same(&gains, &answer)?;
-    same(&gains, &bench.accepted(SET_GAINS, &json!({}))?)?;
+    has(&gains, &answer)?;
+    has(&gains, &bench.accepted(SET_GAINS, &json!({}))?)?;
     Ok(answer.to_string())
-}
-
-fn same(expected: &Value, got: &Value) -> Result<(), String> {
-    crate::bench::same(expected, got, &GAINS)
 }
 
 fn gains_alone(bench: &mut Bench) -> Got {
     bench.set_gains(1.0, 2.0, 3.0)?;
-    let mut expected = json!({"kp": bench.each(1.0), "ki": bench.each(2.0), "kd": bench.each(3.0)});
-    for (name, value) in [("kp", 4.0), ("ki", 5.0), ("kd", 6.0)] {
-        let array = json!(bench.each(value));
-        let mut request = json!({});
-        for object in [&mut request, &mut expected] {
-            if let Some(members) = object.as_object_mut() {
-                members.insert(name.to_owned(), array.clone());
-            }
-        }
-        let values = bench.accepted(SET_GAINS, &request)?;
-        same(&expected, &values)?;
-    }
-    Ok("each gain alone".to_owned())
+    let before = json!({"kp": bench.each(1.0), "ki": bench.each(2.0), "kd": bench.each(3.0)});
+    let changes = [("kp", 4.0), ("ki", 5.0), ("kd", 6.0)].map(|(name, value)| (name, json!(bench.each(value))));
+    apply_alone(bench, SET_GAINS, before, &changes)
 }
 
 /// Passes if each bad array is rejected for each gain, with the other two applied.
@@ -176,7 +162,7 @@ fn rejects_gains(bench: &mut Bench, bad: &[Vec<f64>]) -> Got {
                 expected.insert(name.to_owned(), json!(bench.each(1.0)));
             }
             let answer = bench.rejected(SET_GAINS, &request)?;
-            same(&expected, &answer.values)?;
+            has(&expected, &answer.values)?;
             status = answer.status;
         }
     }

@@ -23,8 +23,10 @@ pub const RULES: &[Rule] = &[
     rule("trajectory-3", "velocities of the point become the velocity setpoint", "effort = kd (velocities - actual)", velocity),
     rule("trajectory-4", "velocities that are left out are zeros", "effort as for zero velocity", no_velocity),
     rule("trajectory-5", "velocities of the wrong length are zeros", "effort as for zero velocity, and the new position", wrong_velocity),
-    rule("trajectory-6", "positions of the wrong length are ignored", "the setpoint stays", wrong_position),
-    rule("trajectory-7", "A trajectory without points is ignored", "the setpoint stays", no_points),
+    rule("trajectory-6", "positions of the wrong length are ignored", "the setpoint stays", |bench| {
+        stays(bench, &json!([point(&[0.9], &[0.0])]))
+    }),
+    rule("trajectory-7", "A trajectory without points is ignored", "the setpoint stays", |bench| stays(bench, &json!([]))),
     rule("trajectory-8", "A trajectory counts while the controller is off", "its setpoint holds once the controller is on", while_off),
     rule("states-1", "/joint_states is published continuously", "at least 5 messages in a second", continuous),
     rule("states-2", "name has one entry per joint, all different", "as many names as links", names),
@@ -37,16 +39,20 @@ pub const RULES: &[Rule] = &[
     ),
 ];
 
-/// The setpoint of the positions that the effort shows.
-fn shown_position(bench: &mut Bench) -> Result<Vec<f64>, String> {
+/// Passes if the effort shows these angles as the setpoint of the positions.
+fn position_is(bench: &mut Bench, angles: &[f64]) -> Got {
     let Joints { position, effort, .. } = bench.fresh()?;
-    Ok(position.iter().zip(effort).map(|(angle, effort)| angle + effort / SMALL).collect())
+    let shown: Vec<f64> = position.iter().zip(effort).map(|(angle, effort)| angle + effort / SMALL).collect();
+    near("the setpoint", &shown, angles, TOLERANCE)?;
+    Ok(list(&shown))
 }
 
-/// The setpoint of the velocities that the effort shows.
-fn shown_velocity(bench: &mut Bench) -> Result<Vec<f64>, String> {
+/// Passes if the effort shows this rate as the setpoint of every velocity.
+fn velocity_is(bench: &mut Bench, rate: f64) -> Got {
     let Joints { velocity, effort, .. } = bench.fresh()?;
-    Ok(velocity.iter().zip(effort).map(|(rate, effort)| rate + effort / SMALL).collect())
+    let shown: Vec<f64> = velocity.iter().zip(effort).map(|(rate, effort)| rate + effort / SMALL).collect();
+    near("the velocity setpoint", &shown, &bench.each(rate), TOLERANCE)?;
+    Ok(list(&shown))
 }
 
 /// Different angles for the joints, so an exchange of joints is visible.
@@ -58,9 +64,7 @@ fn position(bench: &mut Bench) -> Got {
     bench.float(SMALL, 0.0, 0.0)?;
     let angles = angles(bench);
     bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
-    let shown = shown_position(bench)?;
-    near("the setpoint", &shown, &angles, TOLERANCE)?;
-    Ok(list(&shown))
+    position_is(bench, &angles)
 }
 
 fn last_point(bench: &mut Bench) -> Got {
@@ -71,9 +75,7 @@ fn last_point(bench: &mut Bench) -> Got {
         *time = json!(5);
     }
     bench.command(&json!([point(&shifted(&angles, 1.0), &rest), point(&shifted(&angles, -1.0), &rest), last]))?;
-    let shown = shown_position(bench)?;
-    near("the setpoint", &shown, &angles, TOLERANCE)?;
-    Ok(list(&shown))
+    position_is(bench, &angles)
 }
 
 /// With the derivative term alone and a velocity setpoint of 0.4 rad/s.
@@ -84,29 +86,22 @@ fn with_velocity(bench: &mut Bench) -> Result<(), String> {
 
 fn velocity(bench: &mut Bench) -> Got {
     with_velocity(bench)?;
-    let shown = shown_velocity(bench)?;
-    near("the velocity setpoint", &shown, &bench.each(0.4), TOLERANCE)?;
-    Ok(list(&shown))
+    velocity_is(bench, 0.4)
 }
 
 fn no_velocity(bench: &mut Bench) -> Got {
     with_velocity(bench)?;
     bench.command(&json!([{"positions": angles(bench), "time_from_start": {"sec": 0, "nanosec": 0}}]))?;
-    let shown = shown_velocity(bench)?;
-    near("the velocity setpoint", &shown, &bench.each(0.0), TOLERANCE)?;
-    Ok(list(&shown))
+    velocity_is(bench, 0.0)
 }
 
 fn wrong_velocity(bench: &mut Bench) -> Got {
     with_velocity(bench)?;
     let angles = angles(bench);
     bench.command(&json!([point(&angles, &[0.7])]))?;
-    let shown = shown_velocity(bench)?;
-    near("the velocity setpoint", &shown, &bench.each(0.0), TOLERANCE)?;
+    velocity_is(bench, 0.0)?;
     bench.set_gains(SMALL, 0.0, 0.0)?;
-    let shown = shown_position(bench)?;
-    near("the setpoint", &shown, &angles, TOLERANCE)?;
-    Ok(list(&shown))
+    position_is(bench, &angles)
 }
 
 /// Sends a trajectory after a valid one. The valid one must stay active.
@@ -115,17 +110,7 @@ fn stays(bench: &mut Bench, points: &serde_json::Value) -> Got {
     let angles = angles(bench);
     bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
     bench.command(points)?;
-    let shown = shown_position(bench)?;
-    near("the setpoint", &shown, &angles, TOLERANCE)?;
-    Ok(list(&shown))
-}
-
-fn wrong_position(bench: &mut Bench) -> Got {
-    stays(bench, &json!([point(&[0.9], &[0.0])]))
-}
-
-fn no_points(bench: &mut Bench) -> Got {
-    stays(bench, &json!([]))
+    position_is(bench, &angles)
 }
 
 fn while_off(bench: &mut Bench) -> Got {
@@ -134,9 +119,7 @@ fn while_off(bench: &mut Bench) -> Got {
     let angles = angles(bench);
     bench.command(&json!([point(&angles, &bench.each(0.0))]))?;
     bench.enable(true)?;
-    let shown = shown_position(bench)?;
-    near("the setpoint", &shown, &angles, TOLERANCE)?;
-    Ok(list(&shown))
+    position_is(bench, &angles)
 }
 
 fn continuous(bench: &mut Bench) -> Got {
