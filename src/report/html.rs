@@ -15,12 +15,12 @@ const LAST: &str = "work";
 const ABSTRACT: [&str; 5] = ["error", "budget", "stability", "stiff", "scenarios"];
 
 const METHOD: &str = "Sections run in parallel on all cores; sections that measure times run one after the other. \
-     Times are the minimum of repeats after one untimed run, on one thread; whiskers are the quartiles. While the \
+     Times are the minimum of repeats after one untimed run, on one thread. While the \
      clock runs nothing is counted, compared or written. Errors come from separate runs of the same steps. References \
      are Taylor series of order 30 in double-double arithmetic. They start from the Lagrangian and share no formula \
      with the arm's own kernel. Their uncertainty is the distance to a second series of other order and tolerance. The \
-     reference of the 1-DOF service is its closed form. That of the stiff arms is Rodas3 with 32768 steps, checked \
-     against implicit midpoint with as many. Nothing is tuned per method.";
+     reference of the stiff arms is Rodas3 with 32768 steps, checked against implicit midpoint with as many. Nothing \
+     is tuned per method.";
 
 /// The whole page.
 pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {

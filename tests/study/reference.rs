@@ -156,3 +156,25 @@ fn a_reference_knows_far_more_digits_than_a_double() {
     assert!(reference.angle_error(0.5, &[f64::NAN; 3]).is_nan());
     assert_eq!(DoubleDouble::from(1.5).to_f64(), 1.5);
 }
+
+#[test]
+fn thirds_add_up_to_one() {
+    let one = DoubleDouble::ONE;
+    let third = one / DoubleDouble::from(3.0);
+    assert!((third + third + third - one).to_f64().abs() < 1e-31);
+}
+
+#[test]
+fn sine_and_cosine_lie_on_the_unit_circle_and_keep_the_addition_theorem() {
+    // 1e3 rad costs about 1e3 times the last bit, 1e-32.
+    for x in [0.0, 0.3, -1.7, 2.5, 10.0, -1000.0] {
+        let (sin, cos) = DoubleDouble::from(x).sin_cos();
+        let circle = sin * sin + cos * cos - DoubleDouble::ONE;
+        assert!(circle.to_f64().abs() < 1e-31);
+        let (twice_sin, _) = DoubleDouble::from(2.0 * x).sin_cos();
+        let error = twice_sin - DoubleDouble::from(2.0) * sin * cos;
+        assert!(error.to_f64().abs() < 1e-29, "{x}: {error:?}");
+        assert!((sin.to_f64() - x.sin()).abs() < 1e-15);
+        assert!((cos.to_f64() - x.cos()).abs() < 1e-15);
+    }
+}

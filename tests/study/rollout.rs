@@ -200,25 +200,28 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
 
 /// `tests/actors/refusals/rows.txt` has the other refusals.
 #[test]
-fn an_impossible_run_is_refused_by_name() {
+fn a_run_whose_work_is_not_bounded_is_refused() {
     let with = |change: &dyn Fn(&mut RolloutRequest<2>)| {
         let mut request = swing();
         change(&mut request);
         at_once(rollout(request)).unwrap_err().to_string()
     };
     type Row<'a> = (&'a dyn Fn(&mut RolloutRequest<2>), &'a str);
-    let rows: [Row<'_>; 3] = [
-        (
-            &|ask| ask.control.timestep = 0.0,
-            "timestep must be greater than 0, got 0",
-        ),
+    let many = "duration / timestep must be at most 1e7 steps, got inf";
+    let rows: [Row<'_>; 5] = [
+        (&|ask| ask.control.timestep = 0.0, many),
+        (&|ask| ask.duration = f64::INFINITY, many),
         (
             &|ask| ask.duration = f64::NAN,
-            "duration must be finite, got NaN",
+            "duration must be at least the timestep 0.01, got NaN",
         ),
         (
-            &|ask| ask.control.gains.kp[1] = -1.0,
-            "kp must be at least 0, got -1",
+            &|ask| ask.control.timestep = f64::NAN,
+            "duration must be at least the timestep NaN, got 1",
+        ),
+        (
+            &|ask| ask.samples = 1,
+            "samples must be between 2 and 100000, got 1",
         ),
     ];
     for (change, message) in rows {

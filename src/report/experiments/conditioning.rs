@@ -36,53 +36,64 @@ pub struct Lost {
     pub inherent: f64,
 }
 
-/// Digits lost by a 3-link arm of unit lengths whose last link weighs `ratio` times the others, over `count` states.
-pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
-    let arm = Arm::<3>::new([1.0; 3], [1.0, 1.0, ratio], 9.81).ok()?;
-    // A fixed seed makes the report reproducible.
-    let mut random = fastrand::Rng::with_seed(7);
-    let mut any = move || 2.0 * random.f64() - 1.0;
+impl PoseShape {
+    /// This many states of a 3-link arm in such poses, each with efforts \[N m\].
+    pub fn samples(self, count: usize) -> impl Iterator<Item = (State<3>, [f64; 3])> {
+        // A fixed seed makes the report reproducible.
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut any = move || 2.0 * random.f64() - 1.0;
+        let sample = move || {
+            let (second, third) = match self {
+                Self::Bent => (PI * any(), PI * any()),
+                Self::Stretched => (1e-6 * any(), 1e-6 * any()),
+                Self::Folded => (PI - 10_f64.powf(-4.5 + 3.5 * any()), PI * any()),
+            };
+            let state = State {
+                position: [PI * any(), second, third],
+                velocity: [any(), any(), any()],
+            };
+            (state, [10.0 * any(), 10.0 * any(), 10.0 * any()])
+        };
+        std::iter::repeat_with(sample).take(count)
+    }
+}
+
+/// Digits lost by an arm in the worst of these states, under these efforts \[N m\].
+pub fn digits_lost<const N: usize>(
+    arm: &Arm<N>,
+    samples: impl IntoIterator<Item = (State<N>, [f64; N])>,
+) -> Lost {
     let mut worst = Lost {
         recursion: 0.0,
         dense: 0.0,
         inherent: 0.0,
     };
-    for _ in 0..count {
-        let (second, third) = match pose {
-            PoseShape::Bent => (PI * any(), PI * any()),
-            PoseShape::Stretched => (1e-6 * any(), 1e-6 * any()),
-            PoseShape::Folded => (PI - 10_f64.powf(-4.5 + 3.5 * any()), PI * any()),
-        };
-        let state = State {
-            position: [PI * any(), second, third],
-            velocity: [any(), any(), any()],
-        };
-        let tau = [10.0 * any(), 10.0 * any(), 10.0 * any()];
-        let truth = exact_acceleration(&arm, &state, &tau);
+    for (state, tau) in samples {
+        let truth = exact_acceleration(arm, &state, &tau);
         let State { position, velocity } = &state;
-        let found = forward_dynamics(&arm, position, velocity, &tau);
+        let found = forward_dynamics(arm, position, velocity, &tau);
         worst.recursion = lost(&truth, &found).max(worst.recursion);
-        let dense = textbook(&arm, position, velocity, &tau);
+        let dense = textbook(arm, position, velocity, &tau);
         worst.dense = lost(&truth, &dense).max(worst.dense);
         // The worst case of changing one joint alone, and all of them.
-        let changes = (0..=3).map(|turned| {
+        let changes = (0..=N).map(|turned| {
             let mut nudged = state;
             for (i, q) in nudged.position.iter_mut().enumerate() {
-                if turned == i || turned == 3 {
+                if turned == i || turned == N {
                     *q = q.next_up();
                 }
             }
-            let near = exact_acceleration(&arm, &nudged, &tau).map(DoubleDouble::to_f64);
+            let near = exact_acceleration(arm, &nudged, &tau).map(DoubleDouble::to_f64);
             // The neighbour is a whole unit away, so one bit is subtracted for half a unit.
             (lost(&truth, &near) - std::f64::consts::LOG10_2).max(0.0)
         });
         worst.inherent = changes.fold(worst.inherent, f64::max);
     }
-    Some(worst)
+    worst
 }
 
 /// Decimal digits that the worst of `values` has lost.
-pub(super) fn lost<const N: usize>(truth: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
+fn lost<const N: usize>(truth: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
     let scale = largest(truth.iter().map(|value| value.abs().to_f64()));
     let error = largest_difference(truth, values) / scale;
     (error / (0.5 * f64::EPSILON)).log10().max(0.0)

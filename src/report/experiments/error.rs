@@ -1,16 +1,14 @@
 //! Error against cost: the same scenes for every method, each against one reference.
 //!
-//! A [`Scene`] is a [`Task`] of an arm, or of the particle of `/arm_sim/integration_step`, in words.
+//! A [`Scene`] is a [`Task`] of an arm, in words.
 //!
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them.
 
-use super::reference::{DoubleDouble, Law, ReferenceMotion, largest_difference};
-use super::task::{Task, TaskRun};
+use super::reference::{DoubleDouble, Law, ReferenceMotion};
+use super::task::Task;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
-use crate::math::expression::Expression;
 use crate::math::integrator::Method;
-use crate::math::particle::{MAX_STEPS, Particle};
 use crate::math::pid::{Gains, Setpoint};
 use crate::study::beside::Steppable;
 use crate::study::continuous::ContinuousLoop;
@@ -49,10 +47,6 @@ pub struct Scene {
     pub title: &'static str,
     /// How the effort is computed: `none`, `continuous` or `held`.
     pub control: &'static str,
-    /// Unit of its errors.
-    pub unit: &'static str,
-    /// Most steps of one run.
-    pub most_steps: u64,
     /// The largest stable timestep \[s\] of each method that has one, as predicted for the control at its setpoint.
     pub(crate) limits: Vec<(Method, f64)>,
     /// The motion.
@@ -67,7 +61,6 @@ pub fn scenes() -> Vec<Scene> {
         velocity: [10.0, 0.0],
     };
     vec![
-        particle_scene(),
         swing::<2>(
             "swing-2",
             "Free swing, 2 links",
@@ -137,8 +130,6 @@ fn arm_scene<const N: usize>(
         name,
         title,
         control,
-        unit: "rad",
-        most_steps: u64::MAX,
         limits: Vec::new(),
         task: Task {
             duration: ARM_DURATION,
@@ -161,62 +152,5 @@ fn arm_scene<const N: usize>(
                 reference.angle_error(timestep * in_f64(done), angles)
             }),
         },
-    }
-}
-
-const FUNCTION: &str = "cos(2*t)";
-const X0: f64 = 0.5;
-const V0: f64 = -0.25;
-const DURATION: f64 = 8.0;
-
-/// The 1-DOF service, expression and all, against its closed form with 106 bits: `ẍ = cos 2t`, so `x = x₀ + v₀ t + sin²
-/// t / 2`.
-fn particle_scene() -> Scene {
-    let particle = |method, steps| {
-        let function = Expression::parse(FUNCTION).ok()?;
-        Particle::new(function, X0, V0, DURATION / in_f64(steps), steps, method).ok()
-    };
-    let exact = |t: f64| {
-        let real = DoubleDouble::from;
-        let (sin, _) = real(t).sin_cos();
-        real(X0) + real(V0) * real(t) + real(0.5) * sin * sin
-    };
-    Scene {
-        name: "particle",
-        title: "1-DOF service, closed form",
-        control: "none",
-        unit: "m",
-        most_steps: MAX_STEPS,
-        limits: Vec::new(),
-        task: Task {
-            duration: DURATION,
-            // Rounding of a closed form of a few operations at 106 bits.
-            uncertainty: 1e-30,
-            looks: LOOKS,
-            unit: 1,
-            ready: Box::new(move |method, steps| Box::new(particle(method, steps))),
-            distance: Box::new(move |done, steps, place| {
-                let timestep = DURATION / in_f64(steps);
-                largest_difference(&[exact(in_f64(done) * timestep)], place)
-            }),
-        },
-    }
-}
-
-/// A particle with a valid function.
-impl TaskRun for Option<Particle> {
-    fn advance(&mut self, steps: u64) -> u64 {
-        let steps = usize::try_from(steps).unwrap_or(usize::MAX);
-        self.as_mut()
-            .map_or(0, |particle| particle.advance(steps) as u64)
-    }
-
-    fn place(&self) -> &[f64] {
-        let last = self.as_ref().and_then(|it| it.positions().last());
-        last.map_or(&[], std::slice::from_ref)
-    }
-
-    fn evaluations(&self) -> u64 {
-        self.as_ref().map_or(0, Particle::evaluations)
     }
 }

@@ -1,11 +1,10 @@
 //! Stability beyond small deviations: moves of any amplitude, swings of any speed, and deviations from a periodic
 //! swing.
 //!
-//! A move or a swing is run and judged by what becomes of it. Deviations from a periodic swing are followed by the
-//! method's own derivative, step after step around the swing: the eigenvalues of the product are the method's Floquet
-//! multipliers. Two of the true ones are 1 (along the swing, and to the swing of a little more energy). The other
-//! pair says whether a deviation from the swing stays small. Source: Guckenheimer and Holmes, *Nonlinear
-//! Oscillations* (1983), ch. 1.5.
+//! A move or a swing is run and judged by its end. The derivative of the steps of one period says how a deviation from
+//! a periodic swing changes in it. Its eigenvalues are the method's Floquet multipliers. Two of the true ones are 1
+//! (along the swing, and to the swing of a little more energy). The other pair says whether a deviation from the swing
+//! stays small. Source: Guckenheimer and Holmes, *Nonlinear Oscillations* (1983), ch. 1.5.
 //!
 //! **Invariant:** no prediction enters a measurement.
 
@@ -135,25 +134,14 @@ impl PeriodicSwing {
         None
     }
 
-    /// The Floquet multipliers of a method that takes `steps` steps to a period.
-    ///
-    /// The method's derivative is taken along the true swing, which is followed with far smaller steps.
+    /// The Floquet multipliers of a method that takes `steps` steps to a period: the eigenvalues of the derivative of
+    /// these steps.
     pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
-        /// Steps of the swing in one of the method's, and a deviation.
-        const WITHIN: u32 = 32;
         const NUDGE: f64 = 1e-5;
-        let arm = Arm::<2>::default();
         let h = self.period / f64::from(steps);
-        let mut here = self.start;
-        let mut product = Matrix::from_fn(4, |i, j| f64::from(u8::from(i == j)));
-        for _ in 0..steps {
-            let step = |state: &_| state_after(&arm, method, state, &[0.0; 2], h);
-            product = derivative(&here, [NUDGE; 2], step).product(&product);
-            for _ in 0..WITHIN {
-                here = state_after(&arm, Method::Rk4, &here, &[0.0; 2], h / f64::from(WITHIN));
-            }
-        }
-        product.eigenvalues()
+        let step = |state, _| state_after(&Arm::<2>::default(), method, &state, &[0.0; 2], h);
+        let period = |start: &State<2>| (0..steps).fold(*start, step);
+        derivative(&self.start, [NUDGE; 2], period).eigenvalues()
     }
 
     /// The larger modulus of the pair that is not 1 of the true swing: the two farthest from 1.

@@ -23,8 +23,7 @@ pub struct RunOutcome {
     pub timestep: f64,
     /// Evaluations of the dynamics, counted.
     pub evaluations: u64,
-    /// Largest error over all comparisons and joints \[rad\] (\[m\] for a particle); infinite if the run was lost or
-    /// left the finite numbers.
+    /// Largest error over all comparisons and joints \[rad\]; infinite if the run was lost or left the finite numbers.
     pub error: f64,
     /// The last angles, summed \[rad\].
     pub end: f64,
@@ -34,7 +33,7 @@ pub struct RunOutcome {
 pub(super) trait TaskRun {
     /// Takes up to `steps` steps. Returns how many it took before it left the finite numbers.
     fn advance(&mut self, steps: u64) -> u64;
-    /// The joint angles \[rad\], or the particle's position \[m\].
+    /// The joint angles \[rad\].
     fn place(&self) -> &[f64];
     /// Evaluations of the dynamics so far.
     fn evaluations(&self) -> u64;

@@ -94,17 +94,6 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
     };
     let period = seconds(rk4.timestep);
     section.find(format!(
-        "**Against a law that acts at every instant, Euler is off by {} rad and RK4 by {} rad**. The timestep is \
-         {period}, on {REACH}. Both hold their effort for a step. {}.",
-        scientific(euler.total),
-        scientific(rk4.total),
-        if euler.total < 0.9 * rk4.total {
-            "Euler's truncation happens to cancel part of the hold, which makes it no better method"
-        } else {
-            "The hold dominates the error"
-        }
-    ));
-    section.find(format!(
         "**Holding the effort costs {} rad, RK4's truncation {} and rounding {}**. These are errors at a control \
          period of {period}, on {REACH}. The hold is measured against a law that acts at every instant. A better \
          method cannot recover the loss of the control period.",

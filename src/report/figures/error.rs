@@ -10,7 +10,7 @@ use crate::report::experiments::error::{OUTPUTS, REACH, Scene, scenes};
 use crate::report::experiments::task::{LOST, RunOutcome};
 use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, scientific, seconds};
-use crate::report::timing::{Timing, time};
+use crate::report::timing::time;
 use crate::study::matrix::largest;
 
 /// Range of errors for a slope's fit \[rad\]: above it higher orders matter, below it rounding.
@@ -37,7 +37,8 @@ struct Data {
 struct Run {
     method: Method,
     outcome: RunOutcome,
-    timing: Timing,
+    /// The shortest time of its steps \[s\].
+    time: f64,
 }
 
 pub(super) fn make(section: &mut Section) {
@@ -56,7 +57,6 @@ pub(super) fn make(section: &mut Section) {
 impl Data {
     fn new(scene: Scene, halvings: u32, timed: f64) -> Self {
         let steps = (0..=halvings).map(|halving| OUTPUTS << halving);
-        let steps = steps.filter(|steps| *steps <= scene.most_steps);
         let both = steps.flat_map(|steps| Method::ALL.map(|method| (method, steps)));
         let runs = both.map(|(method, steps)| {
             let outcome = scene.task.run(method, steps, LOST);
@@ -94,7 +94,7 @@ impl Data {
     /// Median time of an evaluation \[s\], in runs long enough to time one.
     fn evaluation_time(&self) -> Option<f64> {
         let long = self.runs.iter().filter(|run| run.outcome.steps >= 1000);
-        let times = long.map(|run| run.timing.minimum / run.evaluations());
+        let times = long.map(|run| run.time / run.evaluations());
         let mut times: Vec<f64> = times.collect();
         times.sort_by(f64::total_cmp);
         times.get(times.len() / 2).copied()
@@ -107,11 +107,11 @@ impl Data {
 
 impl Run {
     fn of(scene: &Scene, method: Method, outcome: RunOutcome, timed: f64) -> Self {
-        let timing = time(timed, || scene.task.replay(method, outcome.steps));
+        let time = time(timed, || scene.task.replay(method, outcome.steps));
         Self {
             method,
             outcome,
-            timing,
+            time,
         }
     }
 
@@ -124,15 +124,10 @@ fn of<'a>(data: &'a [Data], name: &str) -> Option<&'a Data> {
     data.iter().find(|data| data.scene.name == name)
 }
 
-/// A panel for each scene. All share the error axis, so that scenes can be compared. `place` returns the x of a run and
-/// its quartiles.
-fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> (f64, Option<(f64, f64)>)) -> Vec<Plot> {
+/// A panel for each scene. All share the error axis, so that scenes can be compared. `place` returns the x of a run.
+fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> f64) -> Vec<Plot> {
     let plot = |data: &Data| {
-        let label = match data.scene.unit {
-            "m" => "largest error [m]",
-            _ => "largest error [rad]",
-        };
-        let y = Axis::log(label, Unit::Number, (LEAST_SHOWN, 10.0));
+        let y = Axis::log("largest error [rad]", Unit::Number, (LEAST_SHOWN, 10.0));
         let mut plot = Plot::new(data.scene.title, x.clone(), y);
         let rounding = Key::line("soft", "rounding: one unit in the last place of 1 rad").dashed();
         let ends = [x.min, x.max].map(|x| (x, f64::EPSILON));
@@ -145,15 +140,10 @@ fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> (f64, Option<(f64, f64
                     evaluations,
                     ..
                 } = run.outcome;
-                let times = [seconds(timestep), seconds(run.timing.minimum)].join(" in ");
-                let (x, spread) = place(run);
-                Point {
-                    x,
-                    // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
-                    y: error.max(LEAST_SHOWN),
-                    spread,
-                    note: format!("dt {times}, {evaluations} evaluations"),
-                }
+                let times = [seconds(timestep), seconds(run.time)].join(" in ");
+                let note = format!("dt {times}, {evaluations} evaluations");
+                // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
+                Point::new(place(run), error.max(LEAST_SHOWN), note)
             });
             Curve::line(Key::of(method), points)
         }))
@@ -163,11 +153,9 @@ fn plots(data: &[Data], x: &Axis, place: impl Fn(&Run) -> (f64, Option<(f64, f64
 
 fn against_time(section: &mut Section, data: &[Data]) {
     let all = data.iter().flat_map(|data| &data.runs);
-    let times = all.map(|run| run.timing.minimum);
+    let times = all.map(|run| run.time);
     let x = Axis::around("time for the whole run", Unit::Seconds, times);
-    let mut plots = plots(data, &x, |run| {
-        (run.timing.minimum, Some(run.timing.quartiles))
-    });
+    let mut plots = plots(data, &x, |run| run.time);
     for (plot, data) in plots.iter_mut().zip(data) {
         plot.above = data.evaluation_time().map(|time| (time, "evaluations"));
     }
@@ -176,8 +164,8 @@ fn against_time(section: &mut Section, data: &[Data]) {
     let title = match (cost(Method::Rk4), cost(Method::Verlet), swing) {
         (Some(rk4), Some(verlet), Some(data)) => format!(
             "An error of 10⁻⁶ rad costs RK4 {} and Verlet {} of computing time for {} s of a free swing",
-            seconds(rk4.timing.minimum),
-            seconds(verlet.timing.minimum),
+            seconds(rk4.time),
+            seconds(verlet.time),
             number(data.scene.task.duration)
         ),
         _ => "Error against time".to_owned(),
@@ -187,12 +175,11 @@ fn against_time(section: &mut Section, data: &[Data]) {
         &title,
         "Arms have the default masses and lengths, and move for 2 s. Free swings start at rest on the horizontal. The \
          whirl starts at (0, 0.5), and its first joint turns at 10 rad/s. Reaches go to (0.8, -0.6) with kp 200, 100 \
-         and kd 30, 12. The particle has ẍ = cos 2t for 8 s. One mark per timestep; each timestep is half of the one \
-         before, and all methods take the same ones. Time is the minimum of repeats; whiskers reach from the first to \
-         the third quartile. Upper scale: evaluations of the dynamics, at the median time of one in that scene. A \
-         cross at the top edge is a run that diverged. The error of a reach is the distance from the loop with a \
-         continuous-time law. The distance from the loop whose law runs once a period is the truncation in the figure \
-         of the error's parts. Each mark's tooltip has its own evaluations.",
+         and kd 30, 12. One mark per timestep; each timestep is half of the one before, and all methods take the same \
+         ones. Time is the minimum of repeats. Upper scale: evaluations of the dynamics, at the median time of one in \
+         that scene. A cross at the top edge is a run that diverged. The error of a reach is the distance from the \
+         loop with a continuous-time law. The distance from the loop whose law runs once a period is the truncation \
+         in the figure of the error's parts. Each mark's tooltip has its own evaluations.",
         &plots,
     );
 }
@@ -201,7 +188,7 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
     let all = data.iter().flat_map(|data| &data.runs);
     let timesteps = all.map(|run| run.outcome.timestep);
     let x = Axis::around("timestep", Unit::Seconds, timesteps);
-    let mut plots = plots(data, &x, |run| (run.outcome.timestep, None));
+    let mut plots = plots(data, &x, |run| run.outcome.timestep);
     for (plot, data) in plots.iter_mut().zip(data) {
         let ends = [plot.y.min, plot.y.max];
         let limits = data.scene.limits.iter().map(|&(method, limit)| {

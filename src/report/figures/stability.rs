@@ -13,7 +13,6 @@ use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
-use crate::study::matrix::largest;
 use crate::study::stability::{
     Sampling, Stepping, largest_timestep, limit_held, limits, step_matrix,
 };
@@ -186,9 +185,8 @@ struct Growth {
     dots: u32,
     /// Largest distance of a dot from its curve, relative to the growth.
     furthest: f64,
-    /// Largest distance between the curves of 1, 10 and 100 steps, for methods of order 2 and more, and their limits.
+    /// Largest distance between the curves of 1, 10 and 100 steps, for methods of order 2 and more.
     apart: f64,
-    limits: Vec<f64>,
 }
 
 fn control_period(section: &mut Section) {
@@ -199,16 +197,7 @@ fn control_period(section: &mut Section) {
         dots,
         furthest,
         apart,
-        limits,
     } = growth;
-    let smallest = limits.iter().copied().fold(f64::INFINITY, f64::min);
-    let spread = largest(limits.into_iter()) / smallest - 1.0;
-    section.claim(
-        "With a held effort midpoint, Verlet and RK4 share one limit of the control period, however many steps it is \
-         cut into (within 0.1 %)",
-        format!("{} % between the smallest and the largest", number(100.0 * spread)),
-        spread <= 1e-3,
-    );
     let (apart, furthest_percent) = (number(100.0 * apart), number(100.0 * furthest));
     section.claim(
         "A deviation of the arm grows per control period as the spectral radius says (within 0.1 %)",
@@ -279,8 +268,6 @@ impl Growth {
                 points.push(Point::new(period, measured, note));
             }
             plot.add(Curve::dots(key, points));
-            self.limits
-                .extend(limit.filter(|_| method != Method::Euler));
         }
         plot
     }

@@ -41,10 +41,7 @@ pub(super) fn make(section: &mut Section) {
             let is_possible = fewest.is_none_or(|fewest| fewest <= in_f64(most));
             let cheapest = || task.fewest(solver, TARGET, (1, most), RESOLUTION);
             let run = is_possible.then(cheapest).flatten();
-            let run = run.map(|run| {
-                let timing = time(timed, || task.replay(solver, run.steps));
-                (run, timing.minimum)
-            });
+            let run = run.map(|run| (run, time(timed, || task.replay(solver, run.steps))));
             let ratio = scene.ratio;
             Cost {
                 ratio,

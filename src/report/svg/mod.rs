@@ -111,8 +111,6 @@ impl Key {
 pub(crate) struct Point {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// From and to, along x.
-    pub(crate) spread: Option<(f64, f64)>,
     /// A note that is not on the axes; often empty.
     pub(crate) note: String,
 }
@@ -122,7 +120,6 @@ impl Point {
         Self {
             x,
             y,
-            spread: None,
             note: note.into(),
         }
     }

@@ -255,13 +255,8 @@ impl Plot {
         };
         let words = [name, &value, &self.x.told(point.x), &point.note];
         let words = words.map(escape).join("; ");
-        let spread = point.spread.map(|(from, to)| {
-            let (from, to) = (self.across(from), self.across(to));
-            format!("<path class=\"spread\" d=\"M{from:.1} {y:.1}H{to:.1}\"/>")
-        });
         let tooltip = words.trim_end_matches("; ");
-        let mark = format!("<path class=\"{class}\" d=\"{path}\"><title>{tooltip}</title></path>");
-        spread.unwrap_or_default() + &mark
+        format!("<path class=\"{class}\" d=\"{path}\"><title>{tooltip}</title></path>")
     }
 
     fn drawn_bars(&self) -> String {

@@ -233,28 +233,3 @@ fn split(a: f64) -> (f64, f64) {
     let hi = big - (big - a);
     (hi, a - hi)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thirds_add_up_to_one() {
-        let third = DoubleDouble::ONE / DoubleDouble::from(3.0);
-        assert!((third + third + third - DoubleDouble::ONE).hi.abs() < 1e-31);
-    }
-
-    #[test]
-    fn sine_and_cosine_lie_on_the_unit_circle_and_keep_the_addition_theorem() {
-        // 1e3 rad costs about 1e3 times the last bit, 1e-32.
-        for x in [0.0, 0.3, -1.7, 2.5, 10.0, -1000.0] {
-            let (sin, cos) = DoubleDouble::from(x).sin_cos();
-            assert!((sin * sin + cos * cos - DoubleDouble::ONE).hi.abs() < 1e-31);
-            let (twice_sin, _) = DoubleDouble::from(2.0 * x).sin_cos();
-            let error = (twice_sin - DoubleDouble::from(2.0) * sin * cos).hi.abs();
-            assert!(error < 1e-29, "{x}: {error:e}");
-            assert!((sin.hi - x.sin()).abs() < 1e-15);
-            assert!((cos.hi - x.cos()).abs() < 1e-15);
-        }
-    }
-}

@@ -77,12 +77,7 @@ fn gravity() -> Observation {
     let start = forward_dynamics(&weak, &[0.0; 2], &[0.0; 2], &[0.0; 2]);
     let fallen = simulation.state().position[0] / (0.5 * start[0] * 100.0);
     let falls = format!("under 1e-12 fallen {fallen:.7} times as expected");
-    let refused = refusal(Arm::new([1.0; 2], [1.0; 2], -9.81), "gravity must be");
-    each([
-        (is_scaled, errors),
-        ((fallen - 1.0).abs() < 1e-6, falls),
-        refused,
-    ])
+    each([(is_scaled, errors), ((fallen - 1.0).abs() < 1e-6, falls)])
 }
 
 fn tiny_steps() -> Observation {
@@ -236,12 +231,6 @@ fn refused() -> Observation {
 /// Stable by the closed forms, for `x'' = -ω² x - 2 z ω x'` with `w = (ω h)²`, `d = 2 z ω h`.
 fn closed_form(method: Method, w: f64, d: f64) -> bool {
     match method {
-        Method::Euler => w < d && w > 2.0 * d - 4.0,
-        Method::Midpoint => {
-            let trace = 2.0 - d + d * d / 2.0 - w;
-            let det = 1.0 - d + d * d / 2.0 - w * d / 2.0 + w * w / 4.0;
-            det < 1.0 && 1.0 + trace + det > 0.0 && 1.0 - trace + det > 0.0
-        }
         Method::Verlet => d < 2.0 && w < 4.0 - 2.0 * d + d * d,
         // |R(s)| of the roots s = -d/2 ± sqrt(d²/4 - w), for Runge-Kutta methods of as many evaluations as their order.
         _ => {

@@ -3,12 +3,9 @@
 //! **Invariant:** random values come from a seed in the source, so a scene does the same every time.
 
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::report::experiments::conditioning::lost;
-use crate::report::experiments::reference::exact_acceleration;
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{largest, largest_difference};
 
@@ -103,16 +100,6 @@ impl Noise {
     pub(super) fn array<const N: usize>(&mut self, scale: f64) -> [f64; N] {
         std::array::from_fn(|_| scale * self.next())
     }
-}
-
-/// Decimal digits that the worst of `states` loses in its joint accelerations, against the same in twice the digits.
-pub(super) fn digits_lost<const N: usize>(arm: &Arm<N>, states: &[State<N>]) -> f64 {
-    let mut noise = Noise::new();
-    largest(states.iter().map(|state| {
-        let effort = noise.array(10.0);
-        let found = forward_dynamics(arm, &state.position, &state.velocity, &effort);
-        lost(&exact_acceleration(arm, state, &effort), &found)
-    }))
 }
 
 /// Two hundred random states around a pose, angles within `spread` \[rad\], rates within 2 rad/s. The first joint turns
