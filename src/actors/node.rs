@@ -328,8 +328,7 @@ impl Respond {
 }
 
 /// A barrier in the mailbox of an actor that informs clients of goals, which answers it after all earlier messages. From
-/// the arm, before it reports that it is at rest and after each message about a goal between steps on request. Also from
-/// `ik_trial`, which so gets all news of goals that the arm sent before the time.
+/// the arm, before it reports that it is at rest and between steps on request, and from `ik_trial`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;

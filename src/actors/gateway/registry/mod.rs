@@ -42,7 +42,6 @@ use crate::actors::node::{Barrier, Interest, Respond};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::memory::{Permit, cover};
 pub use crate::actors::wire::Nodes;
-use crate::options::DEFAULT_CLIENTS;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::names;
@@ -60,6 +59,7 @@ const ENDED_IN_A_ROW: usize = 128;
 pub struct Attach(pub Nodes);
 
 /// The registry actor.
+#[derive(Default)]
 pub struct Registry {
     clients: HashMap<ConnectionId, Client>,
     topics: Topics,
@@ -128,21 +128,8 @@ impl Registry {
     #[must_use]
     pub fn new(gauges: Arc<Gauges>) -> Self {
         Self {
-            clients: HashMap::new(),
-            topics: Topics::default(),
-            directory: Directory::default(),
-            requests: Requests::default(),
-            gone: VecDeque::new(),
-            next_cleanup: None,
-            nodes: Nodes::default(),
-            latched: HashMap::new(),
-            fragmented: Arc::default(),
             gauges,
-            places: Places::of(DEFAULT_CLIENTS),
-            connections_made: 0,
-            tap: None,
-            closed: None,
-            permit: None,
+            ..Self::default()
         }
     }
 

@@ -8,6 +8,7 @@ use tokio::time::Instant;
 
 use crate::actors::gateway::limits::KEPT_PLACES;
 use crate::actors::gateway::messages::Refused;
+use crate::options::DEFAULT_CLIENTS;
 
 /// Shortest time between two warnings.
 const WARNING_INTERVAL: Duration = Duration::from_secs(60);
@@ -19,6 +20,12 @@ pub(crate) struct Places {
     kept: usize,
     refused: u64,
     warned: Option<Instant>,
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self::of(DEFAULT_CLIENTS)
+    }
 }
 
 impl Places {
