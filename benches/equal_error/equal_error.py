@@ -106,7 +106,7 @@ def joints(links, y):
     return np.diff(y[:links], prepend=0.0)
 
 
-def measured(links, system, setting, run, truth):
+def measured(links, system, setting, run, exact):
     """A line in the format of the compiled programs; None once a run takes too long."""
     shortest, runs, begun = math.inf, 0, time.perf_counter()
     while runs < REPEATS or time.perf_counter() - begun < REPEATED:
@@ -114,11 +114,11 @@ def measured(links, system, setting, run, truth):
         began = time.perf_counter()
         end = run()
         shortest = min(shortest, time.perf_counter() - began)
-    error = float(np.abs(joints(links, end) - truth).max()) if np.all(np.isfinite(end)) else math.nan
+    error = float(np.abs(joints(links, end) - exact).max()) if np.all(np.isfinite(end)) else math.nan
     return [links, system, setting, error, shortest]
 
 
-def in_python(links, truth):
+def in_python(links, exact):
     rates, first = compiled(links), start(links)
     rates(0.0, first)
     for method in ("DOP853", "Radau", "LSODA"):
@@ -130,7 +130,7 @@ def in_python(links, truth):
                 found = scipy.integrate.solve_ivp(rates, (0.0, DURATION), first, method=method, rtol=tolerance, atol=tolerance)
                 return found.y[:, -1]
 
-            row = measured(links, f"scipy {method}", tolerance, run, truth)
+            row = measured(links, f"scipy {method}", tolerance, run, exact)
             yield row
             if row[4] > LONGEST:
                 break
@@ -142,7 +142,7 @@ def in_python(links, truth):
             integrator.propagate_until(DURATION)
             return integrator.state.copy()
 
-        yield measured(links, "heyoka Taylor", tolerance, run, truth)
+        yield measured(links, "heyoka Taylor", tolerance, run, exact)
 
 
 @functools.cache
@@ -180,14 +180,14 @@ def main():
         print(f"{links} links: the reference ends at {', '.join(angles)} rad, known to {float(uncertainty):.0e} rad")
         if not float(uncertainty) < UNCERTAINTY:
             faults.append(f"{links} links: the reference is off by {uncertainty} rad")
-        truth = np.array([float(angle) for angle in angles])
+        exact = np.array([float(angle) for angle in angles])
         calls = [[programs[0], "time", str(links)], [programs[1], str(links)], [programs[2], str(links)]]
         for number in range(passes):
             print(f"pass {number + 1} of {passes}", file=sys.stderr)
             rows = []
             for call in calls:
                 rows += csv.reader(subprocess.check_output(call + angles, text=True).splitlines())
-            rows += in_python(links, truth)
+            rows += in_python(links, exact)
             for _, system, setting, error, seconds in rows:
                 key = (links, system, float(setting))
                 before = lines.get(key, (math.nan, math.inf))

@@ -142,10 +142,10 @@ impl<const N: usize> Goals<N> {
     /// Ends the goal, if there is one, in the arm's present state.
     pub(super) fn preempt(&mut self, simulation: &Simulation<N>) -> Option<GoalProgress<N>> {
         let tracked = self.tracked.take()?;
-        let mut judged = tracked.stands(simulation, self.past);
-        judged.outcome = Some(Outcome::Preempted);
-        self.latest = Some(judged);
-        Some(judged)
+        let mut progress = tracked.stands(simulation, self.past);
+        progress.outcome = Some(Outcome::Preempted);
+        self.latest = Some(progress);
+        Some(progress)
     }
 }
 

@@ -62,7 +62,7 @@ pub trait World<const N: usize> {
     fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static);
 
     /// Sends feedback or the end of the goal to its owner.
-    fn tell(&self, judged: GoalProgress<N>);
+    fn tell(&self, progress: GoalProgress<N>);
 
     /// The number of clients and of dropped messages.
     fn clients(&self) -> (u64, u64);

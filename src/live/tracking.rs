@@ -105,8 +105,8 @@ impl<const N: usize, W: World<N>> LiveArm<N, W> {
     pub(super) fn end_goal_for_reset(&mut self) {
         let ended = self.goals.preempt(&self.simulation);
         self.goals.past.end(self.simulation.time());
-        if let Some(judged) = ended {
-            self.world.tell(judged);
+        if let Some(progress) = ended {
+            self.world.tell(progress);
         }
     }
 }

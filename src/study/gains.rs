@@ -35,7 +35,7 @@ pub const MOVES: u32 = 10;
 pub const MAX_STEPS: f64 = 1e6;
 
 /// Duration of a move, in settling times: a settled arm must stay settled.
-const WATCHED: f64 = 1.5;
+const SETTLING_TIMES: f64 = 1.5;
 
 /// Two weights: for springs and integrals, and for damping.
 type Shape = (f64, f64);
@@ -203,7 +203,7 @@ async fn settle<const N: usize>(control: &ControlLoop<N>, settling_time: f64) ->
         let setpoint = run.pid().setpoint().position;
         // The last time at which a joint was off the setpoint.
         let mut off_at = 0.0;
-        while run.time() < WATCHED * settling_time {
+        while run.time() < SETTLING_TIMES * settling_time {
             piece.spend(control.method.evaluations().into()).await;
             let is_moving = run.step();
             let position = &run.state().position;

@@ -103,8 +103,8 @@ struct PoseSearch<const N: usize> {
 impl<const N: usize> PoseSearch<N> {
     async fn run(&mut self) {
         if self.sampling.is_some() {
-            for (_, judged) in grid_poses(self.turns()) {
-                self.judge(&judged);
+            for (_, candidate) in grid_poses(self.turns()) {
+                self.judge(&candidate);
                 pause().await;
             }
             if self.smallest.is_none_or(|limit| limit == 0.0) {
@@ -113,12 +113,12 @@ impl<const N: usize> PoseSearch<N> {
         }
         // The largest growth of every cell at the smallest limit.
         let mut cells: Vec<(PoseCandidate<N>, f64)> = Vec::new();
-        for (cell, judged) in grid_poses(self.turns()) {
-            let growth = self.growth(&judged);
+        for (cell, candidate) in grid_poses(self.turns()) {
+            let growth = self.growth(&candidate);
             match cells.get_mut(cell) {
-                Some(cell) if growth > cell.1 => *cell = (judged, growth),
+                Some(cell) if growth > cell.1 => *cell = (candidate, growth),
                 Some(_) => {}
-                None => cells.push((judged, growth)),
+                None => cells.push((candidate, growth)),
             }
             pause().await;
             if self.is_found() {
@@ -147,11 +147,11 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn judge(&mut self, judged: &PoseCandidate<N>) {
+    fn judge(&mut self, candidate: &PoseCandidate<N>) {
         let Some(sampling) = self.sampling else {
             return;
         };
-        let linear = judged.linear(&self.control);
+        let linear = candidate.linear(&self.control);
         let stepping = Stepping::new(&linear, self.control.method, sampling);
         let passes = self.smallest.is_some_and(|limit| {
             PROBES
@@ -162,31 +162,31 @@ impl<const N: usize> PoseSearch<N> {
             return;
         }
         let modes = Modes::of(&linear);
-        if judged.has_gravity && modes.run_away() {
+        if candidate.has_gravity && modes.run_away() {
             return;
         }
         if let Some(limit) = stepping.search(&modes)
             && self.smallest.is_none_or(|smallest| limit < smallest)
         {
             self.smallest = Some(limit);
-            self.worst = *judged;
+            self.worst = *candidate;
         }
     }
 
     /// Growth at the smallest limit so far, or in continuous time if an unstable pose is sought.
-    fn growth(&mut self, judged: &PoseCandidate<N>) -> f64 {
-        let linear = judged.linear(&self.control);
+    fn growth(&mut self, candidate: &PoseCandidate<N>) -> f64 {
+        let linear = candidate.linear(&self.control);
         let Some(sampling) = self.sampling else {
             let modes = Modes::of(&linear);
             if modes.run_away() {
                 self.smallest = Some(0.0);
-                self.worst = *judged;
+                self.worst = *candidate;
             }
             return modes.growth();
         };
         let growth = Stepping::new(&linear, self.control.method, sampling)
             .growth(self.smallest.unwrap_or(0.0));
-        if growth > NEUTRAL && judged.has_gravity && Modes::of(&linear).run_away() {
+        if growth > NEUTRAL && candidate.has_gravity && Modes::of(&linear).run_away() {
             f64::NEG_INFINITY
         } else {
             growth

@@ -31,7 +31,7 @@ const LONGEST: f64 = 1.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let truth = || -> Vec<f64> {
+    let angles = || -> Vec<f64> {
         arguments[2..]
             .iter()
             .map(|x| x.parse().expect("an angle"))
@@ -40,8 +40,8 @@ fn main() {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["reference", "2"] => reference::<2>(),
         ["reference", "3"] => reference::<3>(),
-        ["time", "2", ..] => all::<2, 4>(&truth()),
-        ["time", "3", ..] => all::<3, 6>(&truth()),
+        ["time", "2", ..] => all::<2, 4>(&angles()),
+        ["time", "3", ..] => all::<3, 6>(&angles()),
         _ => {
             eprintln!("equal-error: usage: reference LINKS | time LINKS Q1 Q2 ...");
             std::process::exit(2);
@@ -65,7 +65,7 @@ fn reference<const N: usize>() {
 
 /// Prints the line of a setting: its error, and the shortest time of its runs. Returns false at the end of the sweep.
 fn line<const N: usize>(
-    truth: &[f64],
+    angles: &[f64],
     system: &str,
     setting: f64,
     mut run: impl FnMut() -> Option<[f64; N]>,
@@ -80,7 +80,7 @@ fn line<const N: usize>(
     }
     let error = end.map_or(f64::NAN, |end| {
         end.iter()
-            .zip(truth)
+            .zip(angles)
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max)
     });
@@ -98,12 +98,12 @@ fn tolerances() -> impl Iterator<Item = f64> {
     (4..=28).map(|half| 10_f64.powf(-f64::from(half) / 2.0))
 }
 
-fn all<const N: usize, const M: usize>(truth: &[f64]) {
+fn all<const N: usize, const M: usize>(angles: &[f64]) {
     let arm = black_box(Arm::<N>::default());
     for method in Method::ALL {
         for steps in steps() {
             let h = black_box(DURATION / steps as f64);
-            let go_on = line(truth, &format!("pendularm {method}"), h, || {
+            let go_on = line(angles, &format!("pendularm {method}"), h, || {
                 let mut state = black_box(start::<N>());
                 for _ in 0..steps {
                     state = state_after(&arm, method, &state, &[0.0; N], h);
@@ -116,7 +116,7 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
         }
     }
     for tolerance in tolerances() {
-        line(truth, "pendularm reference", tolerance, || {
+        line(angles, "pendularm reference", tolerance, || {
             let mut follower = TaylorReference::within(black_box(start::<N>()), tolerance);
             follower
                 .follow(&arm, &[0.0; N], DURATION)
@@ -124,7 +124,7 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
         });
     }
     line(
-        truth,
+        angles,
         "pendularm in twice the digits (twice)",
         1e-32,
         || {
@@ -133,7 +133,7 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
             Some(motion.state(DURATION).position)
         },
     );
-    ode_solvers::<N, M>(truth, &arm);
+    ode_solvers::<N, M>(angles, &arm);
 }
 
 /// The arm as a system of first order: angles, then rates.
@@ -155,14 +155,14 @@ impl<const N: usize, const M: usize> System<f64, SVector<f64, M>> for FirstOrder
     }
 }
 
-fn ode_solvers<const N: usize, const M: usize>(truth: &[f64], arm: &Arm<N>) {
+fn ode_solvers<const N: usize, const M: usize>(angles: &[f64], arm: &Arm<N>) {
     let first = || SVector::<f64, M>::from_fn(|i, _| if i < N { START.0 } else { START.1 });
     let angles = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
     // Both have the same functions, but no common trait.
     macro_rules! sweep {
         ($solver:ident, $name:literal) => {
             for tolerance in tolerances() {
-                line(truth, $name, tolerance, || {
+                line(angles, $name, tolerance, || {
                     let mut solver = $solver::new(
                         FirstOrder(*arm),
                         0.0,

@@ -122,7 +122,7 @@ impl Chain {
     }
 
     /// Whether a `distance` counts as in `reach`.
-    fn judged(&self, reach: Reach, distance: f64) -> Result<(), Outside> {
+    fn check_reach(&self, reach: Reach, distance: f64) -> Result<(), Outside> {
         let slack = BOUNDARY * (self.l1 + self.l2 + self.l3);
         if distance - reach.outer > slack {
             Err(Outside::Beyond)
@@ -144,7 +144,7 @@ impl Chain {
         target: &Target,
     ) -> Result<(), Unreachable> {
         let DVec2 { x, y } = target.position;
-        match self.judged(reach, hypot(end_effector.x, end_effector.y)) {
+        match self.check_reach(reach, hypot(end_effector.x, end_effector.y)) {
             Ok(()) => Ok(()),
             Err(Outside::Beyond) => Err(Unreachable::Beyond {
                 x,
@@ -174,7 +174,7 @@ impl Chain {
         let wrist = end_effector - self.l3 * DVec2::from_angle(phi);
         let distance = hypot(wrist.x, wrist.y);
         let reach = self.wrist_reach();
-        let Err(side) = self.judged(reach, distance) else {
+        let Err(side) = self.check_reach(reach, distance) else {
             return Ok((wrist, wrap(phi)));
         };
         // If no orientation is possible, the error reports that instead.

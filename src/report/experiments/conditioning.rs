@@ -69,12 +69,12 @@ pub fn digits_lost<const N: usize>(
         inherent: 0.0,
     };
     for (state, tau) in samples {
-        let truth = exact_acceleration(arm, &state, &tau);
+        let exact = exact_acceleration(arm, &state, &tau);
         let State { position, velocity } = &state;
         let found = forward_dynamics(arm, position, velocity, &tau);
-        worst.recursion = lost(&truth, &found).max(worst.recursion);
+        worst.recursion = lost(&exact, &found).max(worst.recursion);
         let dense = textbook(arm, position, velocity, &tau);
-        worst.dense = lost(&truth, &dense).max(worst.dense);
+        worst.dense = lost(&exact, &dense).max(worst.dense);
         // The worst case of changing one joint alone, and all of them.
         let changes = (0..=N).map(|turned| {
             let mut nudged = state;
@@ -85,7 +85,7 @@ pub fn digits_lost<const N: usize>(
             }
             let near = exact_acceleration(arm, &nudged, &tau).map(DoubleDouble::to_f64);
             // The neighbour is a whole unit away, so one bit is subtracted for half a unit.
-            (lost(&truth, &near) - std::f64::consts::LOG10_2).max(0.0)
+            (lost(&exact, &near) - std::f64::consts::LOG10_2).max(0.0)
         });
         worst.inherent = changes.fold(worst.inherent, f64::max);
     }
@@ -93,8 +93,8 @@ pub fn digits_lost<const N: usize>(
 }
 
 /// Decimal digits that the worst of `values` has lost.
-fn lost<const N: usize>(truth: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
-    let scale = largest(truth.iter().map(|value| value.abs().to_f64()));
-    let error = largest_difference(truth, values) / scale;
+fn lost<const N: usize>(exact: &[DoubleDouble; N], values: &[f64; N]) -> f64 {
+    let scale = largest(exact.iter().map(|value| value.abs().to_f64()));
+    let error = largest_difference(exact, values) / scale;
     (error / (0.5 * f64::EPSILON)).log10().max(0.0)
 }

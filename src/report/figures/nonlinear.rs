@@ -141,8 +141,9 @@ const UNSTABLE: f64 = 1.001;
 fn floquet(section: &mut Section) {
     /// Amplitudes of the swings \[rad\].
     const SWINGS: [f64; 9] = [0.1, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 1.9, 2.0];
-    let truth = |amplitude| Some(PeriodicSwing::of(amplitude)?.transverse(Method::Rk4, TRUE_STEPS));
-    let multipliers = SWINGS.map(truth);
+    let multiplier_at =
+        |amplitude| Some(PeriodicSwing::of(amplitude)?.transverse(Method::Rk4, TRUE_STEPS));
+    let multipliers = SWINGS.map(multiplier_at);
     let is_unstable = |multiplier: &Option<f64>| multiplier.is_some_and(|it| it > UNSTABLE);
     let first = multipliers.iter().position(is_unstable);
     let ends =
@@ -153,7 +154,7 @@ fn floquet(section: &mut Section) {
         (Some((&(mut stable), &(mut unstable))), Some((last, multiplier))) => {
             for _ in 0..4 {
                 let middle = 0.5 * (stable + unstable);
-                let is_unstable = truth(middle).is_none_or(|it| it > UNSTABLE);
+                let is_unstable = multiplier_at(middle).is_none_or(|it| it > UNSTABLE);
                 *(if is_unstable { &mut unstable } else { &mut stable }) = middle;
             }
             format!(

@@ -32,9 +32,9 @@ const LAST: usize = 4;
 /// Largest ratio of a step to the last one.
 const LONGER: f64 = 1.25;
 
-/// Factors that shorten a step whose last terms are too large; the second one applies if they are [`MUCH`] too large.
+/// Factors that shorten a step whose last terms are too large; the second one applies if they are [`LARGE_EXCESS`] too large.
 const SHORTER: [f64; 2] = [0.95, 0.25];
-const MUCH: f64 = 1e9;
+const LARGE_EXCESS: f64 = 1e9;
 
 /// The arithmetic in which a motion is computed.
 pub(crate) trait Precision: Arithmetic + Default {
@@ -229,7 +229,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         }
         // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
         while excess > 1.0 && step > 0.0 {
-            let (factor, of_terms) = self.shorter[usize::from(excess > MUCH)];
+            let (factor, of_terms) = self.shorter[usize::from(excess > LARGE_EXCESS)];
             step *= factor;
             excess *= of_terms;
         }

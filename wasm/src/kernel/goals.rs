@@ -108,27 +108,27 @@ impl<const N: usize> Kernel<N> {
     }
 
     /// Sends feedback or the end of the active goal.
-    pub(super) fn judge(&mut self, judged: GoalProgress<N>) {
-        let is_active = |active: &ActiveGoal<N>| active.goal.number == judged.number;
+    pub(super) fn judge(&mut self, progress: GoalProgress<N>) {
+        let is_active = |active: &ActiveGoal<N>| active.goal.number == progress.number;
         let world = self.arm.world();
-        match judged.outcome {
+        match progress.outcome {
             None => {
                 if let Some(active) = self.goal.as_ref().filter(|goal| is_active(goal)) {
-                    let feedback = active.goal.feedback(judged.distance, judged.elapsed);
+                    let feedback = active.goal.feedback(progress.distance, progress.elapsed);
                     let topic = Topic::IkFeedback;
                     world.publish(topic, move || messages::publish(topic.name(), &feedback));
                     if active.of_trial {
-                        self.news.push_back((active.clone(), judged));
+                        self.news.push_back((active.clone(), progress));
                     }
                 }
             }
             Some(_) => {
                 if let Some(ended) = self.goal.take_if(|goal| is_active(goal)) {
-                    let result = ended.goal.result(judged.distance, judged.outcome);
+                    let result = ended.goal.result(progress.distance, progress.outcome);
                     let topic = Topic::IkResult;
                     world.publish(topic, move || messages::publish(topic.name(), &result));
                     if ended.of_trial {
-                        self.news.push_back((ended, judged));
+                        self.news.push_back((ended, progress));
                     }
                 }
             }

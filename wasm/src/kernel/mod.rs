@@ -161,8 +161,8 @@ impl<const N: usize> Kernel<N> {
 
     /// Sends all news of goals, and executes the trial's commands.
     fn settle(&mut self) {
-        while let Some(judged) = self.arm.world().next_judged() {
-            self.judge(judged);
+        while let Some(progress) = self.arm.world().next_progress() {
+            self.judge(progress);
         }
         self.advance_trial();
     }

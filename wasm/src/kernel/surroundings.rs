@@ -30,7 +30,7 @@ pub(super) struct Surroundings<const N: usize> {
     clock: Clock,
     subscriptions: RefCell<Vec<Subscription>>,
     frames: RefCell<Vec<u8>>,
-    judged: RefCell<VecDeque<GoalProgress<N>>>,
+    progress: RefCell<VecDeque<GoalProgress<N>>>,
 }
 
 impl<const N: usize> Surroundings<N> {
@@ -39,7 +39,7 @@ impl<const N: usize> Surroundings<N> {
             clock,
             subscriptions: RefCell::default(),
             frames: RefCell::default(),
-            judged: RefCell::default(),
+            progress: RefCell::default(),
         }
     }
 
@@ -95,8 +95,8 @@ impl<const N: usize> Surroundings<N> {
         self.frames.take()
     }
 
-    pub(super) fn next_judged(&self) -> Option<GoalProgress<N>> {
-        self.judged.borrow_mut().pop_front()
+    pub(super) fn next_progress(&self) -> Option<GoalProgress<N>> {
+        self.progress.borrow_mut().pop_front()
     }
 }
 
@@ -113,8 +113,8 @@ impl<const N: usize> World<N> for Surroundings<N> {
         self.deliver(topic, write);
     }
 
-    fn tell(&self, judged: GoalProgress<N>) {
-        self.judged.borrow_mut().push_back(judged);
+    fn tell(&self, progress: GoalProgress<N>) {
+        self.progress.borrow_mut().push_back(progress);
     }
 
     fn clients(&self) -> (u64, u64) {

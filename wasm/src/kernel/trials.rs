@@ -23,20 +23,20 @@ impl<const N: usize> Kernel<N> {
         loop {
             let commands = self.trial.tick(self.arm.pose().simulated);
             self.carry_out(commands);
-            let Some((active, judged)) = self.news.pop_front() else {
+            let Some((active, progress)) = self.news.pop_front() else {
                 return;
             };
             let goal_id = active.goal.id;
-            match judged.outcome {
+            match progress.outcome {
                 None => {
                     self.trial
-                        .feedback(&goal_id, judged.distance, &active.goal.positions);
+                        .feedback(&goal_id, progress.distance, &active.goal.positions);
                 }
                 Some(outcome) => {
                     let conclusion = Conclusion {
                         goal_id,
                         outcome,
-                        final_distance: judged.distance,
+                        final_distance: progress.distance,
                     };
                     let lengths = self.arm.pose().lengths;
                     let target = || sample(&lengths, || self.rng.f64());

@@ -186,14 +186,14 @@ impl<const N: usize> Handler<GoalProgress<N>> for IkAction<N> {
     type Result = ();
 
     /// From the arm. News of a goal that is no longer active are discarded.
-    fn handle(&mut self, judged: GoalProgress<N>, _: &mut Context<Self>) {
-        if judged.outcome.is_some() {
-            self.conclude(&judged);
-        } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&judged)) {
+    fn handle(&mut self, progress: GoalProgress<N>, _: &mut Context<Self>) {
+        if progress.outcome.is_some() {
+            self.conclude(&progress);
+        } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&progress)) {
             if self.feedback_wanted {
-                self.publish(Topic::IkFeedback, goal.feedback(&judged));
+                self.publish(Topic::IkFeedback, goal.feedback(&progress));
             }
-            goal.inform_owner(&judged);
+            goal.inform_owner(&progress);
         }
     }
 }
@@ -219,20 +219,20 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActiveGoal<N> {
-    fn is(&self, judged: &GoalProgress<N>) -> bool {
-        self.goal.number == judged.number
+    fn is(&self, progress: &GoalProgress<N>) -> bool {
+        self.goal.number == progress.number
     }
 
-    fn feedback(&self, judged: &GoalProgress<N>) -> IkFeedback {
-        self.goal.feedback(judged.distance, judged.elapsed)
+    fn feedback(&self, progress: &GoalProgress<N>) -> IkFeedback {
+        self.goal.feedback(progress.distance, progress.elapsed)
     }
 
-    fn result(&self, judged: &GoalProgress<N>) -> IkResult {
-        self.goal.result(judged.distance, judged.outcome)
+    fn result(&self, progress: &GoalProgress<N>) -> IkResult {
+        self.goal.result(progress.distance, progress.outcome)
     }
 
-    fn status(&self, judged: &GoalProgress<N>) -> GoalStatus {
-        match judged.outcome {
+    fn status(&self, progress: &GoalProgress<N>) -> GoalStatus {
+        match progress.outcome {
             Some(Outcome::Reached) => GoalStatus::Succeeded,
             _ => self.if_preempted,
         }
@@ -254,19 +254,19 @@ impl<const N: usize> ActiveGoal<N> {
     }
 
     /// Informs its owner of feedback or of its end.
-    fn inform_owner(&self, judged: &GoalProgress<N>) {
+    fn inform_owner(&self, progress: &GoalProgress<N>) {
         match &self.owner {
             None => {}
-            Some(GoalOwner::Client(client)) => match judged.outcome {
-                None => client.feed_back(self.feedback(judged)),
-                Some(_) => client.conclude(self.result(judged), self.status(judged)),
+            Some(GoalOwner::Client(client)) => match progress.outcome {
+                None => client.feed_back(self.feedback(progress)),
+                Some(_) => client.conclude(self.result(progress), self.status(progress)),
             },
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalReport {
                 goal_id: self.goal.id.clone(),
-                distance: judged.distance,
+                distance: progress.distance,
                 positions: self.goal.positions,
-                pose: judged.pose,
-                outcome: judged.outcome,
+                pose: progress.pose,
+                outcome: progress.outcome,
             }),
         }
     }
@@ -369,14 +369,14 @@ impl<const N: usize> IkAction<N> {
     }
 
     /// Publishes the result of the goal and removes it. Does nothing if another goal is active.
-    fn conclude(&mut self, judged: &GoalProgress<N>) {
-        let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
+    fn conclude(&mut self, progress: &GoalProgress<N>) {
+        let Some(goal) = self.active.take_if(|goal| goal.is(progress)) else {
             return;
         };
         if self.result_wanted {
-            self.publish(Topic::IkResult, goal.result(judged));
+            self.publish(Topic::IkResult, goal.result(progress));
         }
-        goal.inform_owner(judged);
+        goal.inform_owner(progress);
     }
 
     fn publish(&self, topic: Topic, message: impl Serialize + Send + 'static) {

@@ -45,7 +45,7 @@ pub struct ArmSim<const N: usize> {
     /// The actors that inform clients of goals, which get barriers.
     pub(super) owners: Vec<Recipient<Barrier>>,
     /// Feedback of the goal that has been sent and not yet arrived.
-    pub(super) underway: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
+    pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -71,7 +71,7 @@ impl<const N: usize> ArmSim<N> {
             commander: None,
             study: None,
             owners: Vec::new(),
-            underway: None,
+            feedback_sent: None,
         }
     }
 

@@ -101,14 +101,14 @@ impl<const N: usize> ArmSim<N> {
     /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry would
     /// get it faster than it delivers it. Then the remaining requests continue, one after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
-        let underway = self.underway.take();
-        self.is_stepping = underway.is_some() || !self.steps.is_empty();
+        let feedback_sent = self.feedback_sent.take();
+        self.is_stepping = feedback_sent.is_some() || !self.steps.is_empty();
         if !self.is_stepping {
             return;
         }
         let owners = self.owners.clone();
         let others = async move {
-            let Some(progress) = underway else {
+            let Some(progress) = feedback_sent else {
                 return tokio::task::yield_now().await;
             };
             // An owner that has ended publishes nothing.
@@ -132,7 +132,7 @@ impl<const N: usize> ArmSim<N> {
         }
         let (stepped, progress) = self.arm.take_row(&mut steps.asked);
         if let (Some(progress), Some(owner)) = (progress, &self.arm.world.owner) {
-            self.underway = Some(Box::pin(owner.send(progress)));
+            self.feedback_sent = Some(Box::pin(owner.send(progress)));
         }
         match stepped {
             Some(stepped) => steps.reply.conclude(Ok(stepped)),

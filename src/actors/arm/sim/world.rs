@@ -40,9 +40,9 @@ impl<const N: usize> World<N> for ArmWorld<N> {
         self.publish.do_send(Publish { topic, frame });
     }
 
-    fn tell(&self, judged: GoalProgress<N>) {
+    fn tell(&self, progress: GoalProgress<N>) {
         if let Some(owner) = &self.owner {
-            owner.do_send(judged);
+            owner.do_send(progress);
         }
     }
 

@@ -31,7 +31,7 @@ pub(super) struct Outgoing {
     /// Start of the time in which responses have waited without a break.
     responses_since: Option<Instant>,
     /// Guards of messages that were not offered to the socket yet. Their publishers wait.
-    underway: Vec<Done>,
+    being_written: Vec<Done>,
 }
 
 impl Outgoing {
@@ -46,7 +46,7 @@ impl Outgoing {
             backlog: Arc::default(),
             progress: now,
             responses_since: None,
-            underway: Vec::new(),
+            being_written: Vec::new(),
         }
     }
 
@@ -59,7 +59,7 @@ impl Outgoing {
 
     /// Adds a topic message, or a series of messages.
     pub(super) fn accept(&mut self, topic: Option<&Arc<str>>, frame: Bytes, done: Option<Done>) {
-        self.underway.extend(done);
+        self.being_written.extend(done);
         let now = Instant::now().into_std();
         self.counting_dropped(|outbox| match topic {
             Some(topic) => outbox.push(topic, frame, now),
@@ -177,6 +177,6 @@ impl Outgoing {
         if self.backlog.load(Ordering::Relaxed) != waiting {
             self.backlog.store(waiting, Ordering::Relaxed);
         }
-        self.underway.clear();
+        self.being_written.clear();
     }
 }

@@ -44,7 +44,7 @@ pub(super) struct WebSocket<S> {
     /// The kind of the message that the next write continues, if there is one.
     unfinished: Option<Data>,
     /// Bytes of frames that the library has queued and not written.
-    underway: usize,
+    unflushed: usize,
     /// The close reason for the peer.
     close_reason: (CloseCode, &'static str),
     /// The close frame has been queued.
@@ -67,7 +67,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
             socket: socket.await,
             spent: None,
             unfinished: None,
-            underway: 0,
+            unflushed: 0,
             close_reason: (CloseCode::Away, "shutting down"),
             is_closing: false,
         }
@@ -149,11 +149,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
     ) -> Poll<io::Result<usize>> {
         // Otherwise waiting pongs would fill the buffer for the message.
         ready!(self.poll_flush(cx))?;
-        if self.underway == 0 {
-            self.underway = self.put_frames(frames)?;
+        if self.unflushed == 0 {
+            self.unflushed = self.put_frames(frames)?;
             ready!(self.poll_flush(cx))?;
         }
-        Poll::Ready(Ok(std::mem::take(&mut self.underway)))
+        Poll::Ready(Ok(std::mem::take(&mut self.unflushed)))
     }
 
     fn put_frames<'a>(&mut self, frames: impl Iterator<Item = &'a Bytes>) -> io::Result<usize> {
