@@ -100,9 +100,9 @@ doc: ## Build the documentation; any warning fails
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
-report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"; KEEP=1 updates docs/report/
+report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"; KEEP=1 counts instructions anew and updates docs/report/
 	@echo "make report: report/index.html"
-	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
+	@[ -z "$(KEEP)" ] || bash scripts/measure-work.sh report
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
 	@[ -z "$(KEEP)" ] || python3 scripts/keep-report.py report
 

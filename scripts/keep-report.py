@@ -22,7 +22,7 @@ def main():
     if sys.argv[1] == "--check":
         summary = json.loads((KEPT / "report.json").read_text())
         kept = {file.name for file in KEPT.iterdir()}
-        if kept != {"README.md", "report.json", *PICTURES}:
+        if kept != {"README.md", "report.json", "work.csv", *PICTURES}:
             sys.exit(f"keep-report: {KEPT.relative_to(ROOT)} holds {sorted(kept)}")
         stale = [paper for paper in PAPERS if paper.read_text() != filled(paper.read_text(), summary)]
         for paper in stale:
@@ -45,8 +45,11 @@ def keep(report):
     size = sum((report / name).stat().st_size for name in ["report.json", *PICTURES])
     if size > MOST:
         sys.exit(f"keep-report: {size} bytes, and docs/report/ has room for {MOST}")
+    # Without Valgrind nothing was counted anew.
+    counts = next(folder / "work.csv" for folder in [report, KEPT] if (folder / "work.csv").exists()).read_bytes()
     shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(parents=True)
+    (KEPT / "work.csv").write_bytes(counts)
     for name in PICTURES:
         shutil.copy(report / name, KEPT)
     summary = json.loads((report / "report.json").read_text())
@@ -60,7 +63,7 @@ def keep(report):
         f"Made by `make report KEEP=1` with pendularm {summary['machine']['version']} on {facts['Processor']}, {facts['Cores']} cores, "
         f"load {load} at the start.{look}",
         "The page, all twelve figures and their numbers as CSV are made by the same command in `report/`. Kept here: "
-        "the sentences and tables as [report.json](report.json), and three pictures: "
+        "the sentences and tables as [report.json](report.json), the counts of instructions as [work.csv](work.csv), and three pictures: "
         + ", ".join(f"[{name.removesuffix('.svg')}]({name})" for name in PICTURES) + ".",
     ]
     for section in summary["sections"]:

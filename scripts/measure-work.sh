@@ -29,7 +29,10 @@ instructions() { # command...: instructions executed
     valgrind --tool=callgrind --callgrind-out-file=/dev/null "$@" 2>&1 >/dev/null | awk '/Collected/ { print $NF }'
 }
 
-echo "name,value,unit" >"$scratch/work.csv"
+{
+    echo "# $("$program" --version | awk '{ print $1, $2 }') on $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)"
+    echo "name,value,unit"
+} >"$scratch/work.csv"
 put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
 count_step() { # name, count, program that takes a count last...: instructions of a step, without the start

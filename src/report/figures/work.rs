@@ -1,9 +1,10 @@
 //! Work that a scene does not need, and the check that it is left out.
 //!
 //! Instructions, allocations and the server's own work are counted by `scripts/measure-work.sh`, which writes them to
-//! `work.csv` next to the page. A missing count is shown as not measured.
+//! `work.csv` next to the page. Without that file the counts of the kept report are shown. A missing count is shown as
+//! not measured.
 //!
-//! **Invariant:** every number was counted for this report.
+//! **Invariant:** every number was counted, with the version in the caption.
 
 use std::collections::HashMap;
 
@@ -28,16 +29,28 @@ const STEPS: [&str; 14] = [
     "particle-rk4-cosine",
 ];
 
+/// The counts of the kept report. The first line has the version and the processor.
+const KEPT: &str = include_str!("../../../docs/report/work.csv");
+
 /// Counts by their names in `scripts/measure-work.sh`.
-struct Measured(HashMap<String, f64>);
+struct Measured {
+    counts: HashMap<String, f64>,
+    /// The version and the processor.
+    with: String,
+}
 
 pub(super) fn make(section: &mut Section) {
-    let text = std::fs::read_to_string(section.out.join("work.csv")).unwrap_or_default();
-    let counts = text.lines().skip(1).filter_map(|line| {
+    let new = std::fs::read_to_string(section.out.join("work.csv"));
+    let text = new.unwrap_or_else(|_| KEPT.to_owned());
+    let counts = text.lines().filter_map(|line| {
         let (name, rest) = line.split_once(',')?;
         Some((name.to_owned(), rest.split(',').next()?.parse().ok()?))
     });
-    let measured = Measured(counts.collect());
+    let with = text.lines().find_map(|line| line.strip_prefix("# "));
+    let measured = Measured {
+        counts: counts.collect(),
+        with: with.unwrap_or_default().to_owned(),
+    };
     measured.figure(section);
     section.table(&measured.table());
     measured.findings(section);
@@ -73,7 +86,7 @@ const BELOW: &str = include_str!("below.txt");
 
 impl Measured {
     fn count(&self, name: &str) -> Option<f64> {
-        self.0.get(name).copied()
+        self.counts.get(name).copied()
     }
 
     /// The cell of a count and its detail.
@@ -83,7 +96,7 @@ impl Measured {
             return Cell::default();
         }
         let Some(count) = self.count(name) else {
-            return Cell::new("not measured in this run").class("soft");
+            return Cell::new("not measured").class("soft");
         };
         let (factor, unit) = unit(name);
         let whole = unit == "instructions";
@@ -136,7 +149,10 @@ impl Measured {
         section.figure(
             "left-out",
             "Work of a step and of the server, scene by scene",
-            &format!("Instructions by callgrind. {allocations}"),
+            &format!(
+                "Instructions by callgrind, counted with {}. {allocations}",
+                self.with
+            ),
             &[
                 Plot::bars("Instructions per step", "c1", counts),
                 Plot::bars("The server: million instructions per second", "c3", server),
