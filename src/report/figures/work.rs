@@ -231,7 +231,24 @@ impl Measured {
 
 #[cfg(test)]
 mod tests {
-    use super::{BELOW, LEFT_OUT, columns};
+    use super::{BELOW, KEPT, LEFT_OUT, STEPS, columns};
+
+    #[test]
+    fn every_count_of_the_tables_is_kept() {
+        let named = |told: &str| told.split(": ").next().unwrap().to_owned();
+        let saved = LEFT_OUT
+            .lines()
+            .skip(1)
+            .flat_map(|line| [columns(line)[2], columns(line)[3]]);
+        let below = BELOW.lines().map(|line| columns(line)[1]);
+        for name in saved.chain(below).chain(STEPS).map(named) {
+            let is_kept = KEPT
+                .lines()
+                .any(|line| line.starts_with(&format!("{name},")));
+            assert!(name.is_empty() || is_kept, "{name}");
+        }
+        assert!(KEPT.starts_with("# pendularm "), "with which version");
+    }
 
     #[test]
     fn every_line_has_the_columns_of_its_table() {
