@@ -327,8 +327,8 @@ impl Respond {
     }
 }
 
-/// A barrier in the mailbox of an actor that informs clients of goals, which answers it after all earlier messages. From
-/// the arm, before it reports that it is at rest and between steps on request, and from `ik_trial`.
+/// A barrier in the mailbox of an actor that informs clients of goals, which answers it after all earlier messages.
+/// From the arm, before it reports that it is at rest and between steps on request, and from `ik_trial`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;

@@ -100,7 +100,7 @@ pub struct Honest {
     pub published: BTreeMap<u64, u64>,
     /// Bytes of frames that are sent with the next one, in one write.
     together: Vec<u8>,
-    /// The number of sent frames, and the number of those that have certainly been handled.
+    /// The number of sent frames, and how many of them have certainly been handled.
     pub frames: u64,
     pub handled: u64,
     /// Answers that it has to give as a provider, each with its time and its frame.

@@ -188,7 +188,7 @@ fn flood(
         for _ in 0..count {
             let attack = attacks[rng.usize(..attacks.len())];
             let clients = (attack.cast)();
-            // In an attack, clients that do not read come first, and those that flood come last.
+            // In an attack the deaf clients are first in the list, and the flooding clients are last.
             cast.extend_from_slice(&clients[clients.len().saturating_sub(AT_ONCE / count)..]);
         }
         let over = (Instant::now() + Duration::from_millis(rng.u64(500..4000))).min(ends);

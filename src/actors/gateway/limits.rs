@@ -82,7 +82,7 @@ pub(super) const READ_BYTES: usize = 32 * KIB;
 pub(super) const WRITE_BYTES: usize = 64 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
-/// Frames of a chunk after which the reader yields.
+/// Frames of a chunk, and deliveries of their messages, after which the reader yields.
 pub(super) const FRAMES_IN_A_ROW: usize = 32;
 /// Time and bytes for which a refused client's input is discarded, so that it can read the reason. Closing a socket
 /// with unread input resets it.

@@ -32,7 +32,8 @@ const LAST: usize = 4;
 /// Largest ratio of a step to the last one.
 const LONGER: f64 = 1.25;
 
-/// Factors that shorten a step whose last terms are too large; the second one applies if they are [`LARGE_EXCESS`] too large.
+/// Factors that shorten a step whose last terms are too large. The second one applies if they are more than
+/// [`LARGE_EXCESS`] times too large.
 const SHORTER: [f64; 2] = [0.95, 0.25];
 const LARGE_EXCESS: f64 = 1e9;
 

@@ -1,4 +1,4 @@
-//! Arguments that are no text, and random ones. `tests/wire/command/rows.txt` has those that are refused by name.
+//! Arguments that are not text, and random arguments. `tests/wire/command/rows.txt` has refusals that name the argument.
 
 #[cfg(unix)]
 use std::ffi::OsString;

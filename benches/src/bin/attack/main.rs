@@ -100,7 +100,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Plays all selected attacks. Returns the names of those that missed a bar.
+/// Plays all selected attacks. Returns the names of the attacks that missed a bar.
 fn run(plan: &Plan) -> Result<Vec<&'static str>, String> {
     let mut missed = Vec::new();
     println!("{}", plan.bars);

@@ -192,18 +192,11 @@ impl<const N: usize> ArmSim<N> {
     /// Answers after all news of goals have been published. The owner of a goal publishes them, and none may
     /// follow the answer that the arm is at rest.
     pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
-        let owners = self.owners.iter();
-        let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();
-        if asked.is_empty() {
+        if self.owners.is_empty() {
             return answer();
         }
-        let passed = async move {
-            for one in asked {
-                // An owner that has ended publishes nothing.
-                let _ = one.await;
-            }
-        };
-        ctx.spawn(passed.into_actor(self).map(move |(), _, _| answer()));
+        let passed = pass_barriers(&self.owners).into_actor(self);
+        ctx.spawn(passed.map(move |(), _, _| answer()));
     }
 
     /// Requests the limit of the active loop, if it is needed. `study` predicts it on its workers.
@@ -218,5 +211,16 @@ impl<const N: usize> ArmSim<N> {
         ctx.spawn(answer.map(move |answer, node, _| {
             node.arm.keep_limit(control, answer.ok().flatten());
         }));
+    }
+}
+
+/// Sends a barrier to each of these actors, and waits until all have answered.
+pub(super) fn pass_barriers(owners: &[Recipient<Barrier>]) -> impl Future<Output = ()> + use<> {
+    let asked: Vec<_> = owners.iter().map(|owner| owner.send(Barrier)).collect();
+    async move {
+        for one in asked {
+            // An owner that has ended publishes nothing.
+            let _ = one.await;
+        }
     }
 }

@@ -8,10 +8,10 @@
 
 use actix::prelude::*;
 
-use super::node::ArmSim;
+use super::node::{ArmSim, pass_barriers};
 use super::orders;
 use super::waiting::Steps;
-use crate::actors::node::{Barrier, Call, ShutDown, Unserved};
+use crate::actors::node::{Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;
 use crate::protocol::catalog::{Direction, Node, Service, Topic};
@@ -98,8 +98,8 @@ impl<const N: usize> Handler<Call<Step<N>>> for ArmSim<N> {
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry would
-    /// get it faster than it delivers it. Then the remaining requests continue, one after the other.
+    /// Yields to all other messages, and waits until the goal's feedback has been published. Otherwise the registry
+    /// would get it faster than it delivers it. Then the remaining requests continue, one after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
         let feedback_sent = self.feedback_sent.take();
         self.is_stepping = feedback_sent.is_some() || !self.steps.is_empty();
@@ -111,11 +111,8 @@ impl<const N: usize> ArmSim<N> {
             let Some(progress) = feedback_sent else {
                 return tokio::task::yield_now().await;
             };
-            // An owner that has ended publishes nothing.
             let _ = progress.await;
-            for owner in owners {
-                let _ = owner.send(Barrier).await;
-            }
+            pass_barriers(&owners).await;
         };
         ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
             if let Some(next) = arm.steps.pop_front() {

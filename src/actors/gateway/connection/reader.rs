@@ -291,7 +291,7 @@ impl ClientReader {
             }
             if let Some(room) = &mut self.room {
                 let Poll::Ready(permit) = room.as_mut().poll(cx) else {
-                    // The end of its stream is behind bytes that are not read before.
+                    // The end of the stream comes after bytes that are not read without a permit.
                     ready!(self.poll_gone(connection.ends, None, cx));
                     return Poll::Ready(Err(ClientLost::Gone));
                 };
