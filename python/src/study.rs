@@ -151,8 +151,7 @@ pub(crate) fn rollout<'py>(
     reference: Flag,
     control_period: Real,
 ) -> PyResult<Held<'py, PyDict>> {
-    let duration = fields::number("duration", duration, Bound::Positive)?;
-    let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+    let (duration, timestep) = (duration.read("duration")?, timestep.read("timestep")?);
     let samples = samples.read("samples")?;
     let reference = reference.read("reference")?;
     let period = read_period(control_period)?;

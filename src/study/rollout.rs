@@ -22,7 +22,7 @@ use crate::math::count::{in_f64, steps_in, whole};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
 use crate::math::pid::Pid;
-use crate::math::shown::shown_against;
+use crate::math::shown::{Shown, shown_against};
 use crate::math::simulation::{Divergence, Held, Hold, Simulation};
 
 /// Most steps of one run: a few seconds of one core, or up to two minutes with a reference under control.
@@ -49,6 +49,14 @@ pub struct RolloutRequest<const N: usize> {
 /// Why a request is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RolloutError {
+    /// A time that is infinite, NaN or not positive.
+    #[error("{field} must be finite and greater than 0, got {}", Shown(*.value))]
+    NotPositive {
+        /// `duration` or `timestep`.
+        field: &'static str,
+        /// The given time \[s\].
+        value: f64,
+    },
     /// Less than one step.
     #[error(
         "duration must be at least the timestep {}, got {}",
@@ -76,12 +84,16 @@ impl<const N: usize> RolloutRequest<N> {
     /// The number of steps that is nearest to the duration.
     ///
     /// # Errors
-    /// A duration of no step or of too many, or a number of samples that is out of bounds.
+    /// A time that is not positive, a duration of no step or of too many, or a number of samples that is out of bounds.
     pub fn steps(&self) -> Result<u64, RolloutError> {
         let (duration, timestep) = (self.duration, self.control.timestep);
+        for (field, value) in [("duration", duration), ("timestep", timestep)] {
+            if !value.is_finite() || value <= 0.0 {
+                return Err(RolloutError::NotPositive { field, value });
+            }
+        }
         let steps = steps_in(duration, timestep);
-        // NaN is no number of steps.
-        if steps.is_nan() || steps < 1.0 {
+        if steps < 1.0 {
             return Err(RolloutError::TooShort { duration, timestep });
         }
         let steps = steps.round();

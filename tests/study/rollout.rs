@@ -207,17 +207,30 @@ fn a_run_whose_work_is_not_bounded_is_refused() {
         at_once(rollout(request)).unwrap_err().to_string()
     };
     type Row<'a> = (&'a dyn Fn(&mut RolloutRequest<2>), &'a str);
-    let many = "duration / timestep must be at most 1e7 steps, got inf";
-    let rows: [Row<'_>; 5] = [
-        (&|ask| ask.control.timestep = 0.0, many),
-        (&|ask| ask.duration = f64::INFINITY, many),
+    let rows: [Row<'_>; 7] = [
+        (
+            &|ask| ask.control.timestep = 0.0,
+            "timestep must be finite and greater than 0, got 0",
+        ),
+        (
+            &|ask| (ask.duration, ask.control.timestep) = (-1.0, -0.01),
+            "duration must be finite and greater than 0, got -1",
+        ),
+        (
+            &|ask| ask.duration = f64::INFINITY,
+            "duration must be finite and greater than 0, got inf",
+        ),
         (
             &|ask| ask.duration = f64::NAN,
-            "duration must be at least the timestep 0.01, got NaN",
+            "duration must be finite and greater than 0, got NaN",
         ),
         (
             &|ask| ask.control.timestep = f64::NAN,
-            "duration must be at least the timestep NaN, got 1",
+            "timestep must be finite and greater than 0, got NaN",
+        ),
+        (
+            &|ask| ask.control.timestep = 1e-300,
+            "duration / timestep must be at most 1e7 steps, got 1e300",
         ),
         (
             &|ask| ask.samples = 1,
