@@ -14,6 +14,9 @@ mod connection;
 mod encodings;
 mod endings;
 mod exchanges;
+#[cfg(feature = "web")]
+#[path = "../support/folder.rs"]
+mod folder;
 mod ik;
 mod ik_action;
 mod ik_trial;

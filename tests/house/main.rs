@@ -17,6 +17,9 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
+#[cfg(unix)]
+#[path = "../support/folder.rs"]
+mod folder;
 mod imports;
 mod limits;
 #[path = "../support/papers.rs"]

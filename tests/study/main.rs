@@ -22,6 +22,9 @@ mod equilibrium;
 mod error;
 mod experiments;
 mod fewest;
+#[cfg(feature = "report")]
+#[path = "../support/folder.rs"]
+mod folder;
 #[path = "../support/json.rs"]
 mod json;
 mod matrix;

@@ -1,26 +1,11 @@
 //! `pendularm report`: files, resuming, refusals. Their contents are tested in the study.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use pendularm::report::{ReportOptions, run};
 
-/// A directory that is removed after the test.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("pendularm-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        Self(path)
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use crate::folder::Folder;
 
 fn quick(out: &Path, only: &[&str]) -> ReportOptions {
     ReportOptions {
@@ -32,8 +17,9 @@ fn quick(out: &Path, only: &[&str]) -> ReportOptions {
 
 #[test]
 fn a_section_leaves_page_figures_and_numbers() {
-    let scratch = Scratch::new("files");
-    let page = run(&quick(&scratch.0, &["conditioning"])).unwrap();
+    let folder = Folder::new("report-files");
+    let out = folder.join("out");
+    let page = run(&quick(&out, &["conditioning"])).unwrap();
     let html = fs::read_to_string(page).unwrap();
     assert!(html.contains("<svg class=\"plot\""));
     // Self-contained: nothing is fetched, nothing is run.
@@ -41,26 +27,26 @@ fn a_section_leaves_page_figures_and_numbers() {
         assert!(!html.contains(fetched), "{fetched}");
     }
     for file in ["conditioning.csv", "conditioning.svg", "report.json"] {
-        assert!(scratch.0.join(file).exists(), "{file}");
+        assert!(out.join(file).exists(), "{file}");
     }
-    let svg = fs::read_to_string(scratch.0.join("conditioning.svg")).unwrap();
+    let svg = fs::read_to_string(out.join("conditioning.svg")).unwrap();
     assert!(
         svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("<style>")
     );
     // Three poses, three ways of solving, 19 mass ratios, and the head.
-    let csv = fs::read_to_string(scratch.0.join("conditioning.csv")).unwrap();
+    let csv = fs::read_to_string(out.join("conditioning.csv")).unwrap();
     assert_eq!(csv.lines().count(), 3 * 3 * 19 + 1);
 }
 
 /// Sections are made in parallel, and appear in their order.
 #[test]
 fn several_sections_are_made_and_shown_in_their_order() {
-    let scratch = Scratch::new("several");
-    let page = run(&quick(&scratch.0, &["scenarios", "conditioning", "drift"])).unwrap();
+    let out = Folder::new("report-several");
+    let page = run(&quick(&out, &["scenarios", "conditioning", "drift"])).unwrap();
     let html = fs::read_to_string(page).unwrap();
     let at = |name: &str| html.find(&format!("<section id=\"{name}\">")).unwrap();
     assert!(at("scenarios") < at("drift") && at("drift") < at("conditioning"));
-    let report = fs::read_to_string(scratch.0.join("report.json")).unwrap();
+    let report = fs::read_to_string(out.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     for section in report["sections"].as_array().unwrap() {
         for verdict in section["verdicts"].as_array().unwrap() {
@@ -71,29 +57,29 @@ fn several_sections_are_made_and_shown_in_their_order() {
 
 #[test]
 fn a_section_made_anew_keeps_the_others() {
-    let scratch = Scratch::new("resume");
-    run(&quick(&scratch.0, &["conditioning"])).unwrap();
-    let first = fs::read_to_string(scratch.0.join("sections/conditioning.json")).unwrap();
-    let page = run(&quick(&scratch.0, &["drift"])).unwrap();
+    let out = Folder::new("report-resume");
+    run(&quick(&out, &["conditioning"])).unwrap();
+    let first = fs::read_to_string(out.join("sections/conditioning.json")).unwrap();
+    let page = run(&quick(&out, &["drift"])).unwrap();
     let html = fs::read_to_string(page).unwrap();
     assert!(
         html.contains("<section id=\"conditioning\">") && html.contains("<section id=\"drift\">")
     );
-    let kept = fs::read_to_string(scratch.0.join("sections/conditioning.json")).unwrap();
+    let kept = fs::read_to_string(out.join("sections/conditioning.json")).unwrap();
     assert_eq!(first, kept);
 }
 
 /// Made by another version, or cut: the command must refuse it and not leave it out silently.
 #[test]
 fn an_unreadable_kept_section_is_reported_with_its_file() {
-    let scratch = Scratch::new("unreadable");
-    let kept = scratch.0.join("sections/drift.json");
+    let out = Folder::new("report-unreadable");
+    let kept = out.join("sections/drift.json");
     fs::create_dir_all(kept.parent().unwrap()).unwrap();
     fs::write(&kept, "{}").unwrap();
-    let error = run(&quick(&scratch.0, &["conditioning"])).unwrap_err();
+    let error = run(&quick(&out, &["conditioning"])).unwrap_err();
     let said = error.to_string();
     assert!(said.contains(kept.to_str().unwrap()), "{said}");
     assert!(said.contains("missing field"), "{said}");
     // The refusal comes before any section is made, which takes minutes.
-    assert!(!scratch.0.join("sections/conditioning.json").exists());
+    assert!(!out.join("sections/conditioning.json").exists());
 }

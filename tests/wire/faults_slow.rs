@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::arm::{stamp, state};
 use crate::common::{Client, PATIENCE, Runtime, provide};
+use crate::folder::Folder;
 use pendularm::actors::gateway::limits::MAX_MEMORY;
 use serde_json::{Value, json};
 
@@ -80,7 +81,8 @@ fn a_wall_clock_that_jumps_changes_nothing() {
         .find(|library| library.exists())
         .expect("libfaketime is installed: apt-get install libfaketime");
     let library = library.to_str().unwrap();
-    let file = std::env::temp_dir().join(format!("pendularm-clock-{}", std::process::id()));
+    let folder = Folder::new("clock");
+    let file = folder.join("offset");
     std::fs::write(&file, "+0\n").unwrap();
     let runtime = Runtime::under(&format!(
         "export LD_PRELOAD={library} FAKETIME_TIMESTAMP_FILE={} FAKETIME_NO_CACHE=1 DONT_FAKE_MONOTONIC=1",

@@ -6,12 +6,11 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread;
 
 use crate::common::{Client, Logged, end, program, signal};
-use crate::web_client::folder;
+use crate::folder::Folder;
 use pendularm::logging::{LINE_BYTES, QUEUE_LINES};
 use serde_json::{Value, json};
 
@@ -34,10 +33,10 @@ const HOSTILE: [&str; 14] = [
 ];
 
 /// The program, logging everything in this format, and its folder.
-fn talkative(name: &str, format: &str) -> (Logged, PathBuf) {
-    let folder = folder(name);
+fn talkative(name: &str, format: &str) -> (Logged, Folder) {
+    let folder = Folder::new(name);
     let mut command = program();
-    command.current_dir(&folder).args(["--log-format", format]);
+    command.current_dir(&*folder).args(["--log-format", format]);
     (Logged::at("trace", command, Stdio::null()), folder)
 }
 
@@ -189,7 +188,7 @@ fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it
         for frame in listener.kept.iter().chain([&status]) {
             assert!(!frame.to_string().contains("forged"), "{frame}");
         }
-        let entries: Vec<_> = fs::read_dir(&folder).unwrap().collect();
+        let entries: Vec<_> = fs::read_dir(&*folder).unwrap().collect();
         assert!(entries.is_empty(), "{entries:?}");
         let log = end_of(runtime);
         if format == "text" {

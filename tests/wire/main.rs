@@ -31,6 +31,8 @@ mod diagnostics;
 mod faults_files;
 mod faults_slow;
 mod faults_threads;
+#[path = "../support/folder.rs"]
+mod folder;
 mod hostile_log;
 mod http;
 mod launch;

@@ -4,18 +4,12 @@
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::common::{Client, Logged, Runtime, program, signal};
+use crate::folder::Folder;
 use serde_json::{Value, json};
-
-/// The name of a missing file for this test.
-fn file(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mishaps-{name}"));
-    let _ = fs::remove_file(&path);
-    path
-}
 
 fn shell(prelude: &str) -> Command {
     let mut shell = Command::new("sh");
@@ -39,7 +33,8 @@ fn every_signal_that_ends_a_process_by_default_ends_the_program_in_order_and_its
     for name in [
         "HUP", "QUIT", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT",
     ] {
-        let path = file(&format!("{name}.mcap"));
+        let folder = Folder::new(&format!("signal-{name}"));
+        let path = folder.join("run.mcap");
         let mut runtime = Runtime::hearing_all(&["--record", path.to_str().unwrap()]);
         let mut client = runtime.connect();
         client.subscribe("/joint_states");
@@ -83,7 +78,8 @@ fn signals_of_failed_writes_and_harmless_signals_affect_no_client() {
 #[cfg(feature = "record")]
 #[test]
 fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_served() {
-    let path = file("limited.mcap");
+    let folder = Folder::new("limited-record");
+    let path = folder.join("run.mcap");
     let arguments = ["--record", path.to_str().unwrap()];
     let mut runtime = Runtime::under_with("ulimit -f 160", &arguments);
     let mut client = runtime.connect();
@@ -111,7 +107,8 @@ fn a_record_beyond_the_limit_of_file_sizes_ends_with_an_error_and_clients_are_se
 
 #[test]
 fn a_log_beyond_the_limit_of_file_sizes_affects_no_client() {
-    let path = file("limited.log");
+    let folder = Folder::new("limited-log");
+    let path = folder.join("log");
     let prelude = format!("ulimit -f 1 && exec 2>'{}'", path.display());
     let mut runtime = Runtime::under_with(&prelude, &["--log", "trace"]);
     for _ in 0..20 {
@@ -139,7 +136,8 @@ fn clients_are_served_even_if_standard_output_fails() {
             Stdio::from(File::options().write(true).open("/dev/full").unwrap()),
         )
     };
-    let limited = format!("ulimit -f 0 && exec >'{}'", file("limited.txt").display());
+    let folder = Folder::new("limited-output");
+    let limited = format!("ulimit -f 0 && exec >'{}/out'", folder.display());
     let nothing = || (None, Stdio::null());
     for ((reader, stdout), command, says) in [
         (full_pipe(), program(), None),

@@ -1,7 +1,7 @@
 //! Records of the built program: complete files, incomplete files, and missing ones.
 
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
@@ -13,12 +13,7 @@ use pendularm::record::{
 use serde_json::{Value, json};
 
 use crate::common::{PATIENCE, Runtime, signal};
-use crate::web_client;
-
-/// An empty folder of this test's own.
-pub(super) fn folder(name: &str) -> PathBuf {
-    web_client::folder(&format!("record-{name}"))
-}
+use crate::folder::Folder;
 
 pub(super) fn passages(file: &Path) -> (Vec<RecordedMessage>, RecordEnding) {
     let mut recording = Recording::new(File::open(file).unwrap());
@@ -58,7 +53,8 @@ pub(super) fn end(mut runtime: Runtime) {
 
 #[test]
 fn a_run_is_recorded_whole_and_replayed() {
-    let file = folder("whole").join("run.mcap");
+    let folder = Folder::new("record-whole");
+    let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--links", "3", "--seed", "5", "--record", text(&file)]);
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));
@@ -88,7 +84,8 @@ fn a_run_is_recorded_whole_and_replayed() {
 /// As rosbag2 reads it: with the metadata record of that name and no metadata in it, policies are numbers.
 #[test]
 fn each_channel_has_the_quality_of_service_that_rosbag2_plays_it_with() {
-    let file = folder("qos").join("run.mcap");
+    let folder = Folder::new("record-qos");
+    let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);
     let mut client = runtime.connect();
     client.ask("/arm_sim/pause", json!({"data": true}));
@@ -149,7 +146,8 @@ fn each_channel_has_the_quality_of_service_that_rosbag2_plays_it_with() {
 
 #[test]
 fn a_record_of_another_version_is_replayed_with_a_note() {
-    let file = folder("version").join("run.mcap");
+    let folder = Folder::new("record-version");
+    let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
@@ -181,7 +179,8 @@ fn a_record_of_another_version_is_replayed_with_a_note() {
 
 #[test]
 fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
-    let file = folder("killed").join("run.mcap");
+    let folder = Folder::new("record-killed");
+    let file = folder.join("run.mcap");
     let mut runtime = Runtime::with(&["--record", text(&file)]);
     let mut client = runtime.connect();
     client.ask("/pid_controller/enable", json!({"data": true}));
@@ -205,10 +204,11 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
 
 #[test]
 fn a_difference_is_reported_with_its_step_and_by_the_exit_status() {
-    let file = folder("differs").join("run.mcap");
+    let folder = Folder::new("record-differs");
+    let file = folder.join("run.mcap");
     let settings = RunSettings { links: 2, seed: 0 };
     let mut writer = McapWriter::new(File::create(&file).unwrap(), &settings).unwrap();
-    let runtime_file = folder("differs-from").join("run.mcap");
+    let runtime_file = folder.join("from.mcap");
     let runtime = Runtime::with(&["--record", text(&runtime_file)]);
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
@@ -253,7 +253,7 @@ fn a_difference_is_reported_with_its_step_and_by_the_exit_status() {
 
 #[test]
 fn an_unusable_record_is_refused_with_the_files_name() {
-    let folder = folder("refused");
+    let folder = Folder::new("record-refused");
     let there = folder.join("there.mcap");
     fs::write(&there, "precious").unwrap();
     let (status, said) = run(&[
@@ -285,7 +285,7 @@ fn an_unusable_record_is_refused_with_the_files_name() {
 
 #[test]
 fn a_folder_that_is_none_is_refused_at_the_start() {
-    let folder = folder("no-folder");
+    let folder = Folder::new("record-no-folder");
     let file = folder.join("file");
     fs::write(&file, "").unwrap();
     for none in [&folder.join("missing"), &file] {
@@ -299,7 +299,7 @@ fn a_folder_that_is_none_is_refused_at_the_start() {
 
 #[test]
 fn clients_record_into_the_operators_folder_and_nowhere_else() {
-    let folder = folder("service");
+    let folder = Folder::new("record-service");
     let runtime = Runtime::with(&["--record-dir", text(&folder)]);
     let mut client = runtime.connect();
     let nothing = client.call("/recorder/stop", json!({}));
@@ -316,7 +316,7 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
             "{name:?}: {status}"
         );
     }
-    assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+    assert_eq!(fs::read_dir(&*folder).unwrap().count(), 0);
 
     let begun = client.ask("/recorder/start", json!({"name": "lesson-1"}));
     assert_eq!(begun["file"], "lesson-1.mcap");
@@ -348,7 +348,8 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
 
 #[test]
 fn without_a_folder_clients_neither_begin_nor_end_a_record() {
-    let file = folder("operators").join("run.mcap");
+    let folder = Folder::new("record-operators");
+    let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);
     let mut client = runtime.connect();
     for service in ["/recorder/start", "/recorder/stop"] {
@@ -362,7 +363,7 @@ fn without_a_folder_clients_neither_begin_nor_end_a_record() {
 
 #[test]
 fn the_operators_record_is_not_ended_by_a_client() {
-    let folder = folder("operators-and-clients");
+    let folder = Folder::new("record-operators-and-clients");
     let file = folder.join("operators.mcap");
     let runtime = Runtime::with(&["--record", text(&file), "--record-dir", text(&folder)]);
     let mut client = runtime.connect();

@@ -6,11 +6,12 @@ use pendularm::record::{Content, INPUTS, McapWriter, RecordEntry, RunSettings};
 use serde_json::{Value, json};
 
 use crate::common::Runtime;
-use crate::record::{end, folder, passages, run, text};
+use crate::folder::Folder;
+use crate::record::{end, passages, run, text};
 
 #[test]
 fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
-    let folder = folder("short");
+    let folder = Folder::new("record-short");
     let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);
     runtime
@@ -39,7 +40,7 @@ fn an_empty_record_and_one_that_was_cut_early_are_named_as_such() {
 /// Hostile texts in a file: within a note, as a method, as an input, as a topic, as a file's name.
 #[test]
 fn texts_of_a_record_are_escaped_and_cut() {
-    let folder = folder("\u{1b}[31m-\u{202e}crafted");
+    let folder = Folder::new("record-\u{1b}[31m-\u{202e}crafted");
     let file = folder.join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&file)]);
     runtime
@@ -106,6 +107,7 @@ fn texts_of_a_record_are_escaped_and_cut() {
             !said.contains(acts) && said.lines().count() == 1,
             "{index}: {said:?}"
         );
-        assert!(said.contains("crafted/run.mcap: "), "{index}: {said}");
+        let is_named = said.contains("crafted-") && said.contains("/run.mcap: ");
+        assert!(is_named, "{index}: {said}");
     }
 }

@@ -1,8 +1,7 @@
 //! Requests over HTTP: missing heads, and unread answers.
 
-use std::path::PathBuf;
-
 use super::*;
+use crate::folder::Folder;
 use pendularm::web::Site;
 use pendularm::web::access::Access;
 use pendularm::web::report::{FILES, MAX_FILE};
@@ -22,14 +21,13 @@ async fn rest(stream: &mut (impl AsyncRead + Unpin)) -> String {
 }
 
 /// A report of one file, `a.csv`, which is sparse on the disk. Returns its folder and its path.
-fn report_of(test: &str, length: u64) -> (PathBuf, Arc<Admission>) {
-    let folder = std::env::temp_dir().join(format!("pendularm-{test}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+fn report_of(test: &str, length: u64) -> (Folder, Arc<Admission>) {
+    let folder = Folder::new(test);
     let file = std::fs::File::create(folder.join("a.csv")).unwrap();
     file.set_len(length).unwrap();
     let admission = Admission {
         token: None,
-        site: Site::new(Access::default(), folder.clone(), &[]),
+        site: Site::new(Access::default(), folder.to_path_buf(), &[]),
         ..Admission::default()
     };
     (folder, Arc::new(admission))
@@ -67,7 +65,7 @@ fn clients_that_take_no_byte_of_a_file_keep_others_from_files_for_a_time_only() 
             head.starts_with("TTP/1.1 200 ") && head.contains(&length),
             "{head}"
         );
-        std::fs::remove_dir_all(&folder).unwrap();
+        drop(folder);
     });
 }
 
@@ -81,7 +79,7 @@ fn a_file_of_a_report_that_is_too_long_is_refused() {
         let answer = rest(&mut stream).await;
         assert!(answer.starts_with("HTTP/1.1 503 "), "{answer}");
         assert!(answer.contains("longer than 4194304 bytes"), "{answer}");
-        std::fs::remove_dir_all(&folder).unwrap();
+        drop(folder);
     });
 }
 

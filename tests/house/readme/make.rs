@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-#[cfg(unix)]
-use std::path::Path;
 use std::process::Command;
 
 use super::{codes, printed};
+#[cfg(unix)]
+use crate::folder::Folder;
 use crate::papers::{table, text};
 use crate::tree::{files_in, root, rust_files};
 
@@ -168,14 +168,13 @@ fn make_alone_shows_the_help() {
 #[test]
 fn make_run_runs_a_program_that_is_there_where_there_is_no_cargo() {
     use std::os::unix::fs::symlink;
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("make-run");
-    let _ = fs::remove_dir_all(&target);
-    fs::create_dir_all(target.join("release")).unwrap();
+    let target = Folder::new("make-run");
+    fs::create_dir(target.join("release")).unwrap();
     let run = || {
         Command::new("make")
             .args(["run", "CARGO=/nowhere/cargo", "ARGS=--version"])
             .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .env("CARGO_TARGET_DIR", &target)
+            .env("CARGO_TARGET_DIR", &*target)
             .env_remove("MAKEFLAGS")
             .env_remove("MAKELEVEL")
             .output()

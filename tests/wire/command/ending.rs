@@ -9,6 +9,7 @@ use std::process::{Command, Output, Stdio};
 use std::thread;
 
 use crate::common::{self, Runtime};
+use crate::folder::Folder;
 
 /// Every command that needs a server, with its arguments.
 const COMMANDS: [&[&str]; 15] = [
@@ -249,14 +250,13 @@ fn completions_know_every_command_and_a_shell_can_read_them() {
 /// Like the package builds and the Python wheel.
 #[test]
 fn an_installation_has_program_and_completions() {
-    let prefix = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install");
-    let _ = fs::remove_dir_all(&prefix);
+    let prefix = Folder::new("install");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/install.sh");
     let mut install = Command::new("bash");
     install
         .arg(script)
         .arg(env!("CARGO_BIN_EXE_pendularm"))
-        .arg(&prefix);
+        .arg(&*prefix);
     assert!(install.status().unwrap().success());
     for file in [
         "bin/pendularm",

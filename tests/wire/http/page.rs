@@ -5,7 +5,8 @@ use std::path::Path;
 use std::process::Stdio;
 
 use crate::common::{Logged, Runtime, program};
-use crate::web_client::{folder, get, handshake, try_handshake};
+use crate::folder::Folder;
+use crate::web_client::{get, handshake, try_handshake};
 use pendularm::web::page::ASSETS;
 
 #[test]
@@ -42,7 +43,7 @@ fn the_page_and_its_files_are_served_with_their_types() {
 
 #[test]
 fn pages_of_the_named_origins_may_frame_the_page_and_its_report_and_no_others() {
-    let folder = folder("framed");
+    let folder = Folder::new("framed");
     std::fs::write(folder.join("index.html"), "report").unwrap();
     let folder = folder.to_str().unwrap();
     let named = "https://Class.example,http://localhost:8000";

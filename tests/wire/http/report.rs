@@ -5,11 +5,12 @@ use std::fs;
 use std::process::Command;
 
 use crate::common::Runtime;
-use crate::web_client::{folder, get};
+use crate::folder::Folder;
+use crate::web_client::get;
 
 #[test]
 fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
-    let folder = folder("report");
+    let folder = Folder::new("report");
     fs::write(folder.join("index.html"), "<h1>report</h1>").unwrap();
     fs::create_dir(folder.join("data")).unwrap();
     fs::write(folder.join("data/error.csv"), "h,e\n").unwrap();
@@ -42,7 +43,7 @@ fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
 
 #[test]
 fn a_report_larger_than_a_socket_holds_arrives_whole() {
-    let folder = folder("large");
+    let folder = Folder::new("large");
     let text: String = (0..500_000).map(|line| format!("{line}\n")).collect();
     fs::write(folder.join("large.txt"), &text).unwrap();
     let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
@@ -87,7 +88,7 @@ const PATHS: [&str; 32] = [
 
 #[test]
 fn no_path_leads_out_of_the_reports_folder() {
-    let outside = folder("outside");
+    let outside = Folder::new("outside");
     let inside = outside.join("inside");
     fs::create_dir(&inside).unwrap();
     fs::write(outside.join("secret.txt"), "secret\n").unwrap();
@@ -103,7 +104,7 @@ fn no_path_leads_out_of_the_reports_folder() {
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink(outside.join("secret.txt"), inside.join("link.txt")).unwrap();
-        std::os::unix::fs::symlink(&outside, inside.join("up")).unwrap();
+        std::os::unix::fs::symlink(&*outside, inside.join("up")).unwrap();
         std::os::unix::fs::symlink("loop.txt", inside.join("loop.txt")).unwrap();
         std::os::unix::fs::symlink("/etc/passwd", inside.join("passwd.txt")).unwrap();
     }
@@ -136,7 +137,7 @@ fn no_path_leads_out_of_the_reports_folder() {
 #[cfg(unix)]
 #[test]
 fn a_pipe_in_the_reports_folder_blocks_no_client() {
-    let folder = folder("pipe");
+    let folder = Folder::new("pipe");
     let made = Command::new("mkfifo").arg(folder.join("a.txt")).status();
     if !made.is_ok_and(|status| status.success()) {
         return;
