@@ -30,9 +30,9 @@ page: ## Write pendularm.html (or OUT=), the page in one file without a server; 
 	@echo "make page: $(or $(OUT),pendularm.html)"
 	@CARGO="$(CARGO)" bash scripts/page.sh "$(or $(OUT),pendularm.html)"
 
-# Tests of the wire wait more than they compute, so twice as many run as there are processors. The library's own tests
-# compute little, so they are built without optimising, in a sixth of the time. `cargo test` runs the same tests.
-test: export RUST_TEST_THREADS := $(or $(RUST_TEST_THREADS),$(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN)))))
+# Tests of the wire wait more than they compute, so four times as many run as there are processors. The library's own
+# tests compute little, so they are built without optimising, in a sixth of the time. `cargo test` runs the same tests.
+test: export RUST_TEST_THREADS := $(or $(RUST_TEST_THREADS),$(shell echo $$((4 * $$(getconf _NPROCESSORS_ONLN)))))
 test: ## Run every test that needs only Rust, except slow ones
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) --config profile.dev.package.pendularm.opt-level=0 test --locked --lib

@@ -1,19 +1,9 @@
 //! Parts that the tests of HTTP and WebSocket share: requests as bytes, and answers taken apart.
 
-use std::fs;
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::path::{Path, PathBuf};
 
 use crate::common::PATIENCE;
-
-/// A folder of one test's own, below the build's.
-pub fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
 
 /// An answer over HTTP.
 #[derive(Debug)]
