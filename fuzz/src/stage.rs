@@ -13,20 +13,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::arm::sim::{AddBarrier, ArmSim};
+use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Interest, Publish};
+use pendularm::actors::nodes::start_in_this_thread;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
-use pendularm::actors::ros::rosapi::RosapiNode;
-use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
-use pendularm::math::arm::Arm;
-use pendularm::math::pid::Gains;
+use pendularm::actors::wire::{Caller, Nodes, Route, ServiceCall, TopicMessage};
+use pendularm::options::Links;
 use pendularm::protocol::catalog::{self, Direction, Service, Topic};
 use pendularm::protocol::messages;
 use pendularm::protocol::op::fields::Fields;
@@ -100,9 +96,16 @@ impl Stage {
         Self::raised(admission, memory, |_, _, _| {}).await
     }
 
-    /// A gateway with the runtime's own nodes. Computations, which have threads of their own, are left to the one node.
+    /// A gateway with the runtime's own nodes. Computations, which need other threads, are left to the one node.
     pub async fn with_arm(admission: Admission, memory: Memory) -> Self {
-        Self::raised(admission, memory, start_nodes).await
+        Self::raised(admission, memory, |registry, gauges, nodes| {
+            let workers = WorkerPool::without_threads();
+            start_in_this_thread(Links::Two, registry, gauges, &workers, 1, nodes);
+            nodes
+                .services
+                .retain(|service, _| !service.is_computation());
+        })
+        .await
     }
 
     async fn raised(
@@ -115,21 +118,23 @@ impl Stage {
         let node_state = Rc::new(NodeState::default());
         let node = Node(Rc::clone(&node_state)).start();
         let mut nodes = Nodes::default();
+        start(&registry, &gauges, &mut nodes);
         let rosapi = catalog::Rosapi::ALL.into_iter().map(Service::Rosapi);
         for service in Service::ALL.into_iter().chain(rosapi) {
             let node = node.clone();
-            let route = Box::new(move |call| node.do_send(Called(call)));
-            nodes.services.insert(service, route);
+            let route =
+                || -> Route<ServiceCall> { Box::new(move |call| node.do_send(Called(call))) };
+            nodes.services.entry(service).or_insert_with(route);
         }
         for topic in Topic::ALL {
             if topic.direction() == Direction::Subscribed {
-                let route = Box::new(|_| ());
-                nodes.listeners.insert(topic, route);
+                let route = || -> Route<TopicMessage> { Box::new(|_| ()) };
+                nodes.listeners.entry(topic).or_insert_with(route);
             } else {
-                nodes.publishers.insert(topic, node.clone().recipient());
+                let publisher = nodes.publishers.entry(topic);
+                publisher.or_insert_with(|| node.clone().recipient());
             }
         }
-        start(&registry, &gauges, &mut nodes);
         registry.send(Attach(nodes)).await.expect("a registry");
         Self {
             registry,
@@ -185,35 +190,6 @@ impl Stage {
             frame: frame.into(),
         });
     }
-}
-
-/// All nodes of `actors/runtime.rs`, on one thread.
-fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Nodes) {
-    let arm = ArmSim::<2>::new(
-        Arm::default(),
-        Gains::default(),
-        registry.clone().recipient(),
-        Arc::clone(gauges),
-    )
-    .start();
-    ArmSim::attach(&arm, nodes);
-    arm.do_send(AddBarrier(registry.clone().recipient()));
-    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
-    RosapiNode::attach(&rosapi, nodes);
-    let ik = Ik::<2>::new(arm.clone().recipient()).start();
-    Ik::attach(&ik, nodes);
-    let tracker = GoalTracker::of(&arm);
-    let action = IkAction::<2>::new(ik.recipient(), tracker, registry.clone().recipient()).start();
-    IkAction::attach(&action, nodes);
-    let goals = GoalClient {
-        send: action.clone().recipient(),
-        cancel: action.clone().recipient(),
-        barrier: action.recipient(),
-    };
-    let rng = fastrand::Rng::with_seed(1);
-    let trial =
-        IkTrial::<2>::new(arm.recipient(), goals, registry.clone().recipient(), rng).start();
-    IkTrial::attach(&trial, nodes);
 }
 
 /// The node.

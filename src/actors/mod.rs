@@ -25,6 +25,7 @@ pub mod arm;
 pub mod compute;
 pub mod gateway;
 pub mod node;
+pub mod nodes;
 pub mod panics;
 #[cfg(feature = "record")]
 pub mod recorder;

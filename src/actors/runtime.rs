@@ -18,13 +18,7 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::time::{Instant, sleep, timeout_at};
 
 use super::signals::Signals;
-use crate::actors::arm::follow::{PathArm, PathFollower};
-use crate::actors::arm::ik::Ik;
-use crate::actors::arm::ik_action::{GoalTracker, IkAction};
-use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
-use crate::actors::arm::sim::{AddBarrier, ArmSim, SetLimitPredictor};
-use crate::actors::compute::integration::Integration;
-use crate::actors::compute::study::Study;
+use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
 use crate::actors::gateway::files;
@@ -33,14 +27,13 @@ use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
 use crate::actors::gateway::unbound;
 use crate::actors::node::ShutDown;
+use crate::actors::nodes;
 use crate::actors::panics::contain;
 #[cfg(feature = "record")]
 use crate::actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::lower_priority;
-use crate::actors::ros::rosapi::RosapiNode;
 use crate::actors::ros::rosout::Rosout;
-use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -148,8 +141,6 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         &workers,
         &mut nodes,
     );
-    let integration = Integration::new(workers.clone()).start();
-    Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function.
     let _ = registry.send(Attach(nodes)).await;
     #[cfg(feature = "record")]
@@ -239,7 +230,7 @@ impl NodeEnds {
     }
 }
 
-/// The arm and the nodes that depend on its number of links.
+/// The arm on its thread, and all nodes.
 fn start_nodes<const N: usize>(
     options: &Options,
     seed: u64,
@@ -258,43 +249,9 @@ where
     let arm = ArmSim::<N>::start_in_arbiter(&arm_thread.handle(), move |_| {
         ArmSim::new(Arm::default(), Gains::default(), publish, gauges).with_period(period)
     });
-    ArmSim::attach(&arm, nodes);
-    arm.do_send(AddBarrier(registry.clone().recipient()));
-    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
-    RosapiNode::attach(&rosapi, nodes);
+    let busy = nodes::start_nodes(&arm, registry, workers, seed, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
-
-    let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient());
-    let frames = frames.start();
-    TfRepublisher::attach(&frames, nodes);
-
-    let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
-    Study::attach(&study, nodes);
-    arm.do_send(SetLimitPredictor(study.recipient()));
-
-    let publish = registry.clone().recipient();
-    let ik = Ik::<N>::new(arm.clone().recipient()).start();
-    Ik::attach(&ik, nodes);
-    let follower = PathFollower::new(PathArm::of(&arm)).start();
-    PathFollower::attach(&follower, nodes);
-    let tracker = GoalTracker::of(&arm);
-    let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
-    IkAction::attach(&action, nodes);
-    let busy = vec![
-        arm.clone().recipient(),
-        action.clone().recipient(),
-        follower.recipient(),
-        frames.recipient(),
-    ];
-    let goals = GoalClient {
-        send: action.clone().recipient(),
-        cancel: action.clone().recipient(),
-        barrier: action.recipient(),
-    };
-    let rng = fastrand::Rng::with_seed(seed);
-    let trial = IkTrial::<N>::new(arm.clone().recipient(), goals, publish, rng).start();
-    IkTrial::attach(&trial, nodes);
     #[cfg(feature = "record")]
     let recorder = {
         let folder = options.record.folder.clone();

@@ -18,6 +18,7 @@ use pendularm::actors::arm::sim::{ArmPose, Pose};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::node::Barrier;
 use pendularm::actors::node::{Call, Interest, Publish};
+use pendularm::actors::nodes::start_goal_nodes;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
 use pendularm::math::trial::Changes;
@@ -266,7 +267,7 @@ fn no_timer_runs_without_a_goal_a_trial_or_a_subscriber() {
         let arm = SilentArm.start();
         let tracker = SilentArm::tracker(&arm);
         let (action, trial) =
-            crate::nodes::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
+            start_goal_nodes::<2>(arm.recipient(), tracker, &registry, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = connect(&registry, &gauges);
         client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;

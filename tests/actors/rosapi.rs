@@ -10,8 +10,9 @@ use pendularm::actors::wire::Nodes;
 use pendularm::protocol::catalog::{self, Service};
 use serde_json::json;
 
-use crate::nodes::{start_nodes, start_whole};
+use crate::nodes::start_whole;
 use crate::virtual_time::{Gateway, WIDE};
+use pendularm::actors::nodes::start_arm;
 
 #[test]
 fn every_service_that_is_listed_is_served() {
@@ -19,11 +20,11 @@ fn every_service_that_is_listed_is_served() {
         let gateway = Gateway::bare().await;
         let mut nodes = Nodes::default();
         let pool = WorkerPool::without_threads();
-        let started = start_nodes::<2>(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
+        let arm = start_arm::<2>(&gateway.registry, &gateway.gauges, &pool, 1, &mut nodes);
         #[cfg(feature = "record")]
         {
             let registry = gateway.registry.clone().recipient();
-            let recorder = Recorder::new(started.arm.recipient(), registry, None, 1).start();
+            let recorder = Recorder::new(arm.recipient(), registry, None, 1).start();
             Recorder::attach(&recorder, &mut nodes);
         }
         let questions = catalog::Rosapi::ALL.map(Service::Rosapi);

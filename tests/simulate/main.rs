@@ -43,9 +43,6 @@ mod hostile;
 #[allow(dead_code, reason = "the fuzz targets use its other parts too")]
 mod json;
 mod model;
-#[path = "../support/nodes.rs"]
-#[allow(dead_code, reason = "the tests of the actors use its other parts too")]
-mod nodes;
 mod pipe;
 mod plan;
 mod play;

@@ -8,19 +8,18 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use actix::prelude::*;
-use pendularm::actors::arm::sim::SetLimitPredictor;
 use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::nodes::start_in_this_thread;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::resources::work_clock;
-use pendularm::math::pid::Gains;
+use pendularm::options::Links;
 use tokio::io::{DuplexStream, duplex};
 use tokio::time::sleep;
 
 use crate::court::Court;
-use crate::nodes::start_nodes;
 use crate::pipe::{Fate, MEANT, Pipe};
 
 /// The cost of a query of the work clock. A turn of the arm has room for a dozen of them, and a slice for three.
@@ -68,8 +67,8 @@ impl World {
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let pool = WorkerPool::without_threads();
         let mut nodes = Nodes::default();
-        let start = if links == 2 { start::<2> } else { start::<3> };
-        start(&registry, &gauges, &pool, seed, &mut nodes);
+        let links = if links == 2 { Links::Two } else { Links::Three };
+        start_in_this_thread(links, &registry, &gauges, &pool, seed, &mut nodes);
         registry.send(Attach(nodes)).await.expect("a registry");
         Self {
             registry,
@@ -156,20 +155,4 @@ impl Computation for Trap {
     }
 
     fn refuse(&mut self, _: &str) {}
-}
-
-/// Everything that `actors/runtime.rs` starts, in one thread.
-fn start<const N: usize>(
-    registry: &Addr<Registry>,
-    gauges: &Arc<Gauges>,
-    pool: &WorkerPool,
-    seed: u64,
-    nodes: &mut Nodes,
-) where
-    Gains<N>: Default,
-{
-    let started = start_nodes::<N>(registry, gauges, pool, seed, nodes);
-    started
-        .arm
-        .do_send(SetLimitPredictor(started.study.recipient()));
 }

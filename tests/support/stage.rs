@@ -8,7 +8,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::nodes::{Started, start_whole};
+use crate::nodes::start_whole;
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{
@@ -57,7 +57,7 @@ where
     pub async fn with_seed(seed: u64) -> Self {
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges)).start();
-        let Started { arm, pool, .. } = start_whole(&registry, &gauges, seed).await;
+        let (arm, pool) = start_whole(&registry, &gauges, seed).await;
         Self {
             registry,
             arm,

@@ -142,7 +142,7 @@ impl World {
     {
         let gateway = Gateway::bare().await;
         let (registry, gauges) = (&gateway.registry, &gateway.gauges);
-        work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.pool);
+        work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
         Self::at(gateway, N, KeptCalls::default())
     }
 

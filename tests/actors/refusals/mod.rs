@@ -77,7 +77,7 @@ where
 {
     let gateway = Gateway::bare().await;
     let (registry, gauges) = (&gateway.registry, &gateway.gauges);
-    work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.pool);
+    work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
     let mut client = gateway.connect(WIDE);
     call(&mut client, "/arm_sim/pause", "{\"data\":true}").await;
     call(&mut client, "/arm_sim/reset", "{}").await;

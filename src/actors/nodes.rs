@@ -1,0 +1,115 @@
+//! Starts the nodes of an arm and connects them, for the program, its tests and its fuzz targets alike.
+//!
+//! Only the arm's thread and the nodes of the process, such as the recorder, are left to the caller.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+
+use super::arm::follow::{PathArm, PathFollower};
+use super::arm::ik::Ik;
+use super::arm::ik_action::{GoalTracker, IkAction};
+use super::arm::ik_trial::{GoalClient, IkTrial};
+use super::arm::sim::{AddBarrier, ArmPose, ArmSim, SetLimitPredictor};
+use super::compute::integration::Integration;
+use super::compute::study::Study;
+use super::compute::workers::WorkerPool;
+use super::gateway::registry::Registry;
+use super::node::ShutDown;
+use super::resources::gauges::Gauges;
+use super::ros::rosapi::RosapiNode;
+use super::ros::tf_web::TfRepublisher;
+use super::wire::Nodes;
+use crate::math::arm::Arm;
+use crate::math::pid::Gains;
+use crate::options::Links;
+
+/// Starts an arm of that size and all nodes around it in this thread. It is not generic, because a generic one would be
+/// compiled again, with all nodes, in every crate that uses it.
+pub fn start_in_this_thread(
+    links: Links,
+    registry: &Addr<Registry>,
+    gauges: &Arc<Gauges>,
+    workers: &WorkerPool,
+    seed: u64,
+    nodes: &mut Nodes,
+) {
+    match links {
+        Links::Two => drop(start_arm::<2>(registry, gauges, workers, seed, nodes)),
+        Links::Three => drop(start_arm::<3>(registry, gauges, workers, seed, nodes)),
+    }
+}
+
+/// Starts an arm with default parameters and gains, and all nodes around it, in this thread.
+pub fn start_arm<const N: usize>(
+    registry: &Addr<Registry>,
+    gauges: &Arc<Gauges>,
+    workers: &WorkerPool,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> Addr<ArmSim<N>>
+where
+    Gains<N>: Default,
+{
+    let publish = registry.clone().recipient();
+    let gauges = Arc::clone(gauges);
+    let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();
+    start_nodes(&arm, registry, workers, seed, nodes);
+    arm
+}
+
+/// Starts all nodes around `arm` in this thread and attaches them, with the arm, to `nodes`. `seed` is that of the
+/// trials' targets. Returns the nodes that have running work for clients.
+pub fn start_nodes<const N: usize>(
+    arm: &Addr<ArmSim<N>>,
+    registry: &Addr<Registry>,
+    workers: &WorkerPool,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> Vec<Recipient<ShutDown>> {
+    ArmSim::attach(arm, nodes);
+    arm.do_send(AddBarrier(registry.clone().recipient()));
+    let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
+    RosapiNode::attach(&rosapi, nodes);
+    let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient()).start();
+    TfRepublisher::attach(&frames, nodes);
+    let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
+    Study::attach(&study, nodes);
+    arm.do_send(SetLimitPredictor(study.recipient()));
+    let integration = Integration::new(workers.clone()).start();
+    Integration::attach(&integration, nodes);
+    let follower = PathFollower::new(PathArm::of(arm)).start();
+    PathFollower::attach(&follower, nodes);
+    let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));
+    let (action, _) = start_goal_nodes(pose, tracker, registry, seed, nodes);
+    vec![
+        arm.clone().recipient(),
+        action.recipient(),
+        follower.recipient(),
+        frames.recipient(),
+    ]
+}
+
+/// Starts the nodes `ik`, `ik_action` and `ik_trial` around the arm of these recipients. Returns the last two.
+pub fn start_goal_nodes<const N: usize>(
+    pose: Recipient<ArmPose<N>>,
+    tracker: GoalTracker<N>,
+    registry: &Addr<Registry>,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> (Addr<IkAction<N>>, Addr<IkTrial<N>>) {
+    let publish = || registry.clone().recipient();
+    let ik = Ik::<N>::new(pose.clone()).start();
+    Ik::attach(&ik, nodes);
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        barrier: action.clone().recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(seed);
+    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
+    IkTrial::attach(&trial, nodes);
+    (action, trial)
+}
