@@ -2,7 +2,7 @@
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes, one for the arm, a few
 //! workers for long requests, and one that waits for signals. The gateway starts a few more for its long work. The log
-//! and a record have one each. Only this file chooses the thread of a node and depends on the number of links.
+//! and a record have one each. Only this file chooses the thread of a node.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
