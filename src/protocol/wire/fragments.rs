@@ -5,7 +5,6 @@
 //!
 //! **Invariant:** at most one unfinished message is stored, of at most [`MAX_FRAME`] bytes, for at most [`MAX_AGE`].
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -14,10 +13,6 @@ use serde::Serialize;
 use super::frame::start_of;
 use crate::protocol::limits::MAX_FRAME;
 
-/// Pieces of one message: each of a longest frame's has a kilobyte.
-pub const MAX_PIECES: usize = 4096;
-/// Bytes of a piece besides its text: its table entry and the allocator's overhead.
-pub const PIECE_BYTES: usize = 128;
 /// Longest time for all pieces of a message: longer than on the slowest usable network.
 pub const MAX_AGE: Duration = Duration::from_secs(60);
 
@@ -37,17 +32,16 @@ pub struct Piece {
 /// Why a piece is refused. The pieces of its message are then discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FragmentError {
-    /// The piece's number is too large.
-    #[error("fragment: num must be less than total, got {num} of {total}")]
-    NoSuchPiece {
+    /// Another piece is next, or there is no such piece.
+    #[error("fragment: num must be {due} and less than total, got {num} of {total}")]
+    NotDue {
+        /// The number of the next piece.
+        due: usize,
         /// The piece.
         num: usize,
         /// The number of pieces.
         total: usize,
     },
-    /// Too many pieces.
-    #[error("fragment: total must be at most {MAX_PIECES}, got {0}")]
-    TooMany(usize),
     /// The number of pieces has changed.
     #[error("fragment: total must stay {before}, got {now}")]
     Changed {
@@ -73,85 +67,67 @@ struct Incomplete {
     id: String,
     began: Instant,
     total: usize,
-    pieces: BTreeMap<usize, String>,
-    /// Bytes of these.
-    bytes: usize,
-}
-
-/// A message with all its pieces. Joining megabytes of them takes milliseconds.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Complete {
-    pieces: BTreeMap<usize, String>,
-    bytes: usize,
-}
-
-impl Complete {
-    /// Bytes of the whole text.
-    #[must_use]
-    pub const fn bytes(&self) -> usize {
-        self.bytes
-    }
-
-    /// The whole text.
-    #[must_use]
-    pub fn text(self) -> String {
-        let mut text = String::with_capacity(self.bytes);
-        text.extend(self.pieces.into_values());
-        text
-    }
+    /// The number of pieces so far.
+    count: usize,
+    /// Their text.
+    text: String,
 }
 
 impl Fragments {
-    /// Takes a piece. Returns the message with its last missing piece. A repeated piece counts once.
+    /// Takes the next piece of a message. Returns the whole text with its last piece.
     ///
     /// # Errors
-    /// [`FragmentError`] if the piece exceeds a bound, with the first bytes of the message, if its first piece has
-    /// arrived.
+    /// [`FragmentError`] if the piece is not the next one or exceeds a bound, with the first bytes of the message.
     pub fn take(
         &mut self,
         piece: Piece,
         now: Instant,
-    ) -> Result<Option<Complete>, (FragmentError, Vec<u8>)> {
-        let Piece {
-            id,
-            data,
-            num,
-            total,
-        } = piece;
+    ) -> Result<Option<String>, (FragmentError, Vec<u8>)> {
         self.forget_old(now);
-        let before = self.message.take().filter(|one| one.id == id);
+        let before = self.message.take().filter(|one| one.id == piece.id);
         let mut message = before.unwrap_or_else(|| Incomplete {
-            id,
+            id: piece.id,
             began: now,
-            total,
-            pieces: BTreeMap::new(),
-            bytes: 0,
+            total: piece.total,
+            count: 0,
+            text: String::new(),
         });
-        if let Err(why) = message.check(num, total, data.len()) {
-            let first = message.pieces.remove(&0);
-            let first = first.or_else(|| Some(data).filter(|_| num == 0));
-            return Err((why, start_of(first.unwrap_or_default().as_bytes())));
+        let Incomplete { total, count, .. } = message;
+        let length = message.text.len() + piece.data.len();
+        let why = if total != piece.total {
+            let (before, now) = (total, piece.total);
+            Some(FragmentError::Changed { before, now })
+        } else if piece.num != count || count >= total {
+            let (due, num) = (count, piece.num);
+            Some(FragmentError::NotDue { due, num, total })
+        } else {
+            Some(FragmentError::TooLong).filter(|_| length > MAX_FRAME)
+        };
+        if let Some(why) = why {
+            if count == 0 && piece.num == 0 {
+                message.text = piece.data;
+            }
+            return Err((why, start_of(message.text.as_bytes())));
         }
-        message.bytes += data.len();
-        if let Some(before) = message.pieces.insert(num, data) {
-            message.bytes -= before.len();
+        if length > message.text.capacity() {
+            // Doubled, but never beyond the longest message.
+            let wanted = length.max(2 * message.text.len()).min(MAX_FRAME);
+            message.text.reserve_exact(wanted - message.text.len());
         }
-        if message.pieces.len() < total {
-            self.message = Some(message);
-            return Ok(None);
+        message.text += &piece.data;
+        message.count += 1;
+        if message.count == total {
+            return Ok(Some(message.text));
         }
-        Ok(Some(Complete {
-            bytes: message.bytes,
-            pieces: message.pieces,
-        }))
+        self.message = Some(message);
+        Ok(None)
     }
 
-    /// Bytes of memory that this takes: pieces without text take some too, and so does an id.
+    /// Bytes of memory that this takes.
     #[must_use]
     pub fn allocated(&self) -> usize {
-        self.message.as_ref().map_or(0, |one| {
-            one.bytes + one.id.len() + PIECE_BYTES * (1 + one.pieces.len())
-        })
+        let message = self.message.as_ref();
+        message.map_or(0, |one| one.text.capacity() + one.id.len())
     }
 
     /// When the unfinished message began.
@@ -164,25 +140,6 @@ impl Fragments {
     pub fn forget_old(&mut self, now: Instant) {
         let is_young = |one: &Incomplete| now.saturating_duration_since(one.began) <= MAX_AGE;
         self.message = self.message.take().filter(is_young);
-    }
-}
-
-impl Incomplete {
-    /// Whether there is room for a piece of that number and length.
-    fn check(&self, num: usize, total: usize, length: usize) -> Result<(), FragmentError> {
-        let before = self.total;
-        let replaced = self.pieces.get(&num).map_or(0, String::len);
-        if num >= total {
-            Err(FragmentError::NoSuchPiece { num, total })
-        } else if total > MAX_PIECES {
-            Err(FragmentError::TooMany(total))
-        } else if before != total {
-            Err(FragmentError::Changed { before, now: total })
-        } else if self.bytes - replaced + length > MAX_FRAME {
-            Err(FragmentError::TooLong)
-        } else {
-            Ok(())
-        }
     }
 }
 
@@ -270,38 +227,19 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_that_comes_twice_takes_the_room_of_the_first() {
-        let half = "x".repeat(MAX_FRAME / 2);
-        let (mut fragments, now) = (Fragments::default(), Instant::now());
-        for _ in 0..3 {
-            assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
-        }
-        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
-        assert_eq!(whole.map(Complete::text), Some(half.repeat(2)));
-        assert_eq!(fragments.allocated(), 0);
-    }
-
-    #[test]
-    fn a_fragment_beyond_a_bound_is_refused_with_its_message() {
+    fn a_piece_out_of_order_or_beyond_a_bound_is_refused_with_its_message() {
         let now = Instant::now();
         let mut fragments = Fragments::default();
+        let not_due = |due, num, total| FragmentError::NotDue { due, num, total };
         for (bad, why) in [
             (
                 piece("a", 1, 3, "y"),
                 FragmentError::Changed { before: 2, now: 3 },
             ),
-            (
-                piece("a", 2, 2, "y"),
-                FragmentError::NoSuchPiece { num: 2, total: 2 },
-            ),
-            (
-                piece("b", 0, 0, "y"),
-                FragmentError::NoSuchPiece { num: 0, total: 0 },
-            ),
-            (
-                piece("b", 0, MAX_PIECES + 1, "y"),
-                FragmentError::TooMany(MAX_PIECES + 1),
-            ),
+            (piece("a", 0, 2, "y"), not_due(1, 0, 2)),
+            (piece("a", 2, 2, "y"), not_due(1, 2, 2)),
+            (piece("b", 1, 2, "y"), not_due(0, 1, 2)),
+            (piece("b", 0, 0, "y"), not_due(0, 0, 0)),
             (
                 piece("a", 1, 2, &"x".repeat(MAX_FRAME)),
                 FragmentError::TooLong,
@@ -312,8 +250,23 @@ mod tests {
             assert_eq!(refused, Err(why));
             assert_eq!((fragments.allocated(), fragments.began()), (0, None));
         }
-        let most = fragments.take(piece("a", 0, MAX_PIECES, "x"), now);
-        assert_eq!(most, Ok(None));
+    }
+
+    /// As many bytes as a frame may have, in pieces of any length.
+    #[test]
+    fn pieces_take_at_most_the_memory_of_the_longest_frame() {
+        for pieces in [2, 3, 1000, 4096] {
+            let (mut fragments, now) = (Fragments::default(), Instant::now());
+            let data = "x".repeat(MAX_FRAME / pieces);
+            for num in 0..pieces - 1 {
+                let taken = fragments.take(piece("a", num, pieces, &data), now);
+                assert_eq!(taken, Ok(None));
+                assert!(fragments.allocated() <= MAX_FRAME + 1);
+            }
+            let whole = fragments.take(piece("a", pieces - 1, pieces, &data), now);
+            assert_eq!(whole, Ok(Some(data.repeat(pieces))));
+            assert_eq!(fragments.allocated(), 0);
+        }
     }
 
     #[test]
@@ -321,15 +274,14 @@ mod tests {
         let now = Instant::now();
         let mut fragments = Fragments::default();
         fragments.take(piece("a", 0, 2, "one"), now).unwrap();
-        assert_eq!(fragments.allocated(), 3 + 1 + 2 * PIECE_BYTES);
         fragments.forget_old(now + MAX_AGE);
         assert_eq!(fragments.began(), Some(now));
         fragments.forget_old(now + MAX_AGE + Duration::from_nanos(1));
         assert_eq!(fragments.began(), None);
         fragments.take(piece("a", 0, 2, "one"), now).unwrap();
         fragments.take(piece("b", 0, 2, "{"), now).unwrap();
-        assert_eq!(fragments.take(piece("a", 1, 2, "two"), now), Ok(None));
-        assert_eq!(fragments.take(piece("b", 1, 2, "}"), now), Ok(None));
+        let whole = fragments.take(piece("b", 1, 2, "}"), now).unwrap();
+        assert_eq!(whole.as_deref(), Some("{}"));
     }
 
     /// Characters of one to four bytes, split at every size, give the same text when joined.
@@ -358,7 +310,7 @@ mod tests {
                 };
                 whole = fragments.take(piece, Instant::now()).unwrap();
             }
-            assert_eq!(whole.map(Complete::text).as_deref(), Some(&*text));
+            assert_eq!(whole.as_deref(), Some(&*text));
         }
     }
 }

@@ -664,8 +664,8 @@ impl Performer {
                 return Ok((under_id(op::read_start(&start, &why), id), 0));
             }
         };
-        let length = whole.bytes();
-        let whole = read_frame(length, move || read_message(whole.text().as_bytes())).await?;
+        let length = whole.len();
+        let whole = read_frame(length, move || read_message(whole.as_bytes())).await?;
         let whole = match whole.op {
             Ok(Op::Fragment(_)) => Incoming {
                 id,
