@@ -85,11 +85,6 @@ pub trait Asker<T>: Send {
         self.answer(Ok(answer), None);
     }
 
-    /// The client that sent the question; `None` if it was a node.
-    fn client(&self) -> Option<ConnectionId> {
-        None
-    }
-
     /// Whether the caller has disconnected.
     fn is_gone(&self) -> bool {
         false
@@ -125,12 +120,6 @@ impl<T> Reply<T> {
             asker: Some(Box::new(asker)),
             done,
         }
-    }
-
-    /// The client that sent the question; `None` if it was a node.
-    #[must_use]
-    pub fn client(&self) -> Option<ConnectionId> {
-        self.asker.as_ref().and_then(|asker| asker.client())
     }
 
     /// Whether the caller has disconnected.
@@ -238,37 +227,8 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// A frame for clients, written already or to be written by the registry. So the arm's thread does not have to
-/// write it.
-pub enum FrameOut {
-    /// The encoded frame.
-    Written(Bytes),
-    /// Writes it.
-    Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
-}
-
-impl FrameOut {
-    /// A frame that the registry writes.
-    #[must_use]
-    pub fn unwritten(write: impl FnOnce() -> Bytes + Send + 'static) -> Self {
-        Self::Unwritten(Box::new(write))
-    }
-
-    /// The encoded frame.
-    #[must_use]
-    pub fn write(self) -> Bytes {
-        match self {
-            Self::Written(frame) => frame,
-            Self::Unwritten(write) => write(),
-        }
-    }
-}
-
-impl From<Bytes> for FrameOut {
-    fn from(frame: Bytes) -> Self {
-        Self::Written(frame)
-    }
-}
+/// Writes a frame for clients. The registry calls it, so the arm's thread does not have to write.
+pub type FrameOut = Box<dyn FnOnce() -> Bytes + Send>;
 
 /// A message on a topic. From the node that owns it.
 #[derive(Message)]
@@ -284,7 +244,7 @@ impl Publish {
     /// The message of `make`, which the registry calls and encodes.
     #[must_use]
     pub fn made<M: Serialize>(topic: Topic, make: impl FnOnce() -> M + Send + 'static) -> Self {
-        let frame = FrameOut::unwritten(move || messages::publish(topic.name(), &make()));
+        let frame = Box::new(move || messages::publish(topic.name(), &make()));
         Self { topic, frame }
     }
 }
@@ -319,7 +279,7 @@ impl Respond {
         let write = move || messages::status(level, &msg, id.as_ref());
         Self {
             connection,
-            frame: FrameOut::unwritten(write),
+            frame: Box::new(write),
             service: None,
             status: Some(level),
             done: None,

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use actix::prelude::*;
 use pendularm::actors::arm::sim::SetLimitPredictor;
-use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::gauges::Gauges;
@@ -134,7 +134,7 @@ impl World {
 
     /// A computation without an owner that panics.
     pub fn submit_panic(&self) {
-        self.pool.submit(RUNTIME, Box::new(Trap));
+        self.pool.submit(Box::new(Trap));
     }
 
     /// Bytes held for all clients together.

@@ -11,7 +11,7 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use super::answering::answer;
-use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Unserved};
 use crate::actors::wire::Nodes;
@@ -76,8 +76,7 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
     fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
         let (answer, answered) = oneshot::channel();
         let answer = Some(answer);
-        self.workers
-            .submit(RUNTIME, Box::new(Limiting { control, answer }));
+        self.workers.submit(Box::new(Limiting { control, answer }));
         Box::pin(async move { answered.await.ok() })
     }
 }
