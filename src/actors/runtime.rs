@@ -23,7 +23,6 @@ use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
 use crate::actors::arm::sim::{AddBarrier, ArmSim, SetLimitPredictor};
-use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
@@ -148,8 +147,6 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         &workers,
         &mut nodes,
     );
-    let integration = Integration::new(workers.clone()).start();
-    Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function.
     let _ = registry.send(Attach(nodes)).await;
     #[cfg(feature = "record")]

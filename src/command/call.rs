@@ -74,7 +74,7 @@ impl TypedValue {
         }
         if *absolute(name) == *MOVING {
             let enable = Service::Enable.name();
-            if let Ok(false) = session.member(enable, &json!({}), "data").await {
+            if let Ok(false) = session.ask(enable, &json!({}), "data").await {
                 print_error(&format_args!(
                     "the controller is off, so the arm does not move there; to switch it on: pendularm service call \
                      {enable} '{{data: true}}'"
@@ -166,7 +166,8 @@ pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Sessio
         "action" => "action_servers".to_owned(),
         other => format!("{other}s"),
     };
-    let names: Vec<String> = session.ask(&question, &json!({}), &question).await?;
+    let service = format!("{PREFIX}{question}");
+    let names: Vec<String> = session.ask(&service, &json!({}), &question).await?;
     let name = match verb {
         GraphVerb::List { show_types } => return list(kind, names, *show_types, session).await,
         GraphVerb::Info { name } => name,
@@ -188,17 +189,16 @@ pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Sessio
 }
 
 async fn list(kind: &str, names: Vec<String>, show_types: bool, session: &mut Session) -> Outcome {
-    let mut entries = Vec::new();
     for name in names {
-        entries.push(if show_types && kind != "node" {
+        if show_types && kind != "node" {
             let type_name = session.type_of(kind, &name, None).await?;
-            let text = format!("{name} [{type_name}]");
-            (json!({"name": name, "type": type_name}), text)
+            let json = json!({"name": name, "type": type_name});
+            session.show_line(&json, &format!("{name} [{type_name}]"))?;
         } else {
-            (json!({"name": name}), name)
-        });
+            session.show_line(&json!({"name": name}), &name)?;
+        }
     }
-    session.show_list(&entries)
+    Ok(())
 }
 
 pub(super) async fn run_service(verb: &ServiceVerb, session: &mut Session) -> Outcome {

@@ -72,15 +72,13 @@ impl ParameterName {
 pub(super) async fn run(verb: &ParamVerb, session: &mut Session) -> Outcome {
     match verb {
         ParamVerb::List => {
-            let names: Vec<String> = session.ask("get_param_names", &json!({}), "names").await?;
-            let entry = |full: &String| {
+            let list = Service::Rosapi(Rosapi::GetParamNames).name();
+            let names: Vec<String> = session.ask(list, &json!({}), "names").await?;
+            names.iter().try_for_each(|full| {
                 let (node, name) = full.split_once(':').unwrap_or(("", full));
-                (
-                    json!({"node": node, "name": name}),
-                    format!("{node} {name}"),
-                )
-            };
-            session.show_list(&names.iter().map(entry).collect::<Vec<_>>())
+                let json = json!({"node": node, "name": name});
+                session.show_line(&json, &format!("{node} {name}"))
+            })
         }
         ParamVerb::Get(parameter) => {
             let name = json!({"name": parameter.full()});

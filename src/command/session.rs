@@ -22,6 +22,7 @@ use super::values::{json_line, write_yaml};
 use crate::address;
 use crate::output::print_error;
 use crate::protocol::catalog::rosapi::PREFIX;
+use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::names::{are_same, same_type};
 use crate::protocol::op::token::Token;
 use crate::value::{ValueReader, needed, within};
@@ -222,19 +223,8 @@ impl Session {
         }
     }
 
-    /// One member of the answer of a rosapi service.
-    pub(super) async fn ask<T: DeserializeOwned>(
-        &mut self,
-        question: &str,
-        args: &Value,
-        member: &str,
-    ) -> Outcome<T> {
-        let service = format!("{PREFIX}{question}");
-        self.member(&service, args, member).await
-    }
-
     /// One member of the answer of a service.
-    pub(super) async fn member<T: DeserializeOwned>(
+    pub(super) async fn ask<T: DeserializeOwned>(
         &mut self,
         service: &str,
         args: &Value,
@@ -255,7 +245,11 @@ impl Session {
         given: Option<&str>,
     ) -> Outcome<String> {
         let known: String = self
-            .ask(&format!("{kind}_type"), &json!({kind: name}), "type")
+            .ask(
+                &format!("{PREFIX}{kind}_type"),
+                &json!({kind: name}),
+                "type",
+            )
             .await?;
         match given {
             Some(given) if known.is_empty() => Ok(given.to_owned()),
@@ -269,8 +263,9 @@ impl Session {
     /// Subscribes to a topic that exists or whose type is given.
     pub(super) async fn subscribe(&mut self, topic: &str, given: Option<&str>) -> Outcome {
         let type_name = self.type_of("topic", topic, given).await?;
+        let list = Service::Rosapi(Rosapi::Topics).name();
         let topics: Vec<String> = match type_name.is_empty() {
-            true => self.ask("topics", &json!({}), "topics").await?,
+            true => self.ask(list, &json!({}), "topics").await?,
             false => vec![topic.to_owned()],
         };
         if !topics.iter().any(|one| are_same(one, topic)) {
@@ -301,12 +296,11 @@ impl Session {
         }
     }
 
-    /// Prints a line for each entry of a list: the object, or the same as text.
-    pub(super) fn show_list(&self, entries: &[(Value, String)]) -> Outcome {
-        let line = |(object, text): &(Value, String)| match self.is_json {
-            true => format!("{object}\n"),
-            false => plain(text) + "\n",
-        };
-        print(&entries.iter().map(line).collect::<String>())
+    /// Prints a line: the JSON, or the same as text.
+    pub(super) fn show_line(&self, json: &Value, text: &str) -> Outcome {
+        match self.is_json {
+            true => print(&format!("{json}\n")),
+            false => print(&(plain(text) + "\n")),
+        }
     }
 }

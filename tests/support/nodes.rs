@@ -10,7 +10,6 @@ use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
 use pendularm::actors::arm::sim::{AddBarrier, ArmPose, ArmSim};
-use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::{Attach, Registry};
@@ -70,7 +69,6 @@ where
     PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
     let study = Study::new(arm.clone().recipient(), pool.clone()).start();
     Study::attach(&study, nodes);
-    Integration::attach(&Integration::new(pool.clone()).start(), nodes);
     let rosapi = RosapiNode::new(registry.clone().recipient(), arm.clone().recipient()).start();
     RosapiNode::attach(&rosapi, nodes);
     let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();
