@@ -6,13 +6,11 @@
 //! numbers their value, and control characters in texts are escaped.
 
 use std::io::{BufWriter, Write};
-use std::str::Chars;
 
+use serde_json::Value;
 use serde_json::value::RawValue;
-use serde_json::{Map, Value};
-use yaml_rust2::Yaml;
 use yaml_rust2::parser::{Event, Parser};
-use yaml_rust2::scanner::TScalarStyle;
+use yaml_rust2::{Yaml, YamlLoader};
 
 use super::output::{CommandError, Outcome};
 use crate::protocol::limits::MAX_NESTING;
@@ -26,77 +24,65 @@ use crate::protocol::wire::text::acts;
 pub fn read(text: &str) -> Outcome<Value> {
     // JSON has its own reader, because in YAML a pair of `\u` escapes is not one character.
     serde_json::from_str(text).or_else(|_| {
-        read_yaml(&mut Parser::new_from_str(text)).map_err(|why| {
+        read_yaml(text).map_err(|why| {
             CommandError::Usage(format!("VALUE cannot be read as JSON or YAML: {why}"))
         })
     })
 }
 
-type Events<'a> = Parser<Chars<'a>>;
-
-fn next(events: &mut Events<'_>) -> Result<Event, String> {
-    let next = events.next_token().map_err(|error| error.to_string())?;
-    Ok(next.0)
-}
-
-fn read_yaml(events: &mut Events<'_>) -> Result<Value, String> {
-    next(events)?;
-    if next(events)? == Event::StreamEnd {
-        return Ok(Value::Null);
-    }
-    let first = next(events)?;
-    let value = read_node(events, first, 0)?;
-    next(events)?;
-    match next(events)? {
-        Event::StreamEnd => Ok(value),
+fn read_yaml(text: &str) -> Result<Value, String> {
+    check_yaml(text)?;
+    let mut documents = YamlLoader::load_from_str(text).map_err(|error| error.to_string())?;
+    match (documents.pop(), documents.pop()) {
+        (None, _) => Ok(Value::Null),
+        (Some(document), None) => to_json(document),
         _ => Err("it must be one document, not several".to_owned()),
     }
 }
 
-/// Reads the value that begins with the event `first`.
-fn read_node(events: &mut Events<'_>, first: Event, depth: usize) -> Result<Value, String> {
-    if depth > MAX_NESTING {
-        return Err(format!("it is nested more than {MAX_NESTING} deep"));
-    }
-    match first {
-        Event::Scalar(text, TScalarStyle::Plain, _, None) => read_plain(text),
-        Event::Scalar(text, _, _, None) => Ok(text.into()),
-        Event::SequenceStart(_, None) => {
-            let mut items = Vec::new();
-            loop {
-                match next(events)? {
-                    Event::SequenceEnd => return Ok(items.into()),
-                    item => items.push(read_node(events, item, depth + 1)?),
-                }
+/// Refuses values that the library would load without a bound: it copies the value of every alias, and its stack grows
+/// with the depth.
+fn check_yaml(text: &str) -> Result<(), String> {
+    let mut events = Parser::new_from_str(text);
+    let mut depth = 0;
+    loop {
+        match events.next_token().map_err(|error| error.to_string())?.0 {
+            Event::StreamEnd => return Ok(()),
+            Event::SequenceStart(_, None) | Event::MappingStart(_, None) => depth += 1,
+            Event::SequenceEnd | Event::MappingEnd => depth -= 1,
+            Event::Alias(_)
+            | Event::Scalar(.., Some(_))
+            | Event::SequenceStart(..)
+            | Event::MappingStart(..) => {
+                return Err("aliases (*name) and tags (!name) are not supported".to_owned());
             }
+            _ => {}
         }
-        Event::MappingStart(_, None) => {
-            let mut members = Map::new();
-            loop {
-                let name = match next(events)? {
-                    Event::MappingEnd => return Ok(members.into()),
-                    Event::Scalar(name, ..) => name,
-                    _ => return Err("the name of a member must be a text".to_owned()),
-                };
-                let member = next(events)?;
-                members.insert(name, read_node(events, member, depth + 1)?);
-            }
+        if depth > MAX_NESTING {
+            return Err(format!("it is nested more than {MAX_NESTING} deep"));
         }
-        _ => Err("aliases (*name) and tags (!name) are not supported".to_owned()),
     }
 }
 
-fn read_plain(text: String) -> Result<Value, String> {
-    Ok(match Yaml::from_str(&text) {
-        Yaml::Null => Value::Null,
+fn to_json(value: Yaml) -> Result<Value, String> {
+    Ok(match value {
         Yaml::Boolean(value) => value.into(),
         Yaml::Integer(value) => value.into(),
-        number @ Yaml::Real(_) => {
-            let number = number.as_f64().filter(|number| number.is_finite());
-            let refusal = || format!("{text} is not a JSON number");
-            number.ok_or_else(refusal)?.into()
+        Yaml::String(text) => text.into(),
+        Yaml::Array(items) => items.into_iter().map(to_json).collect::<Result<_, _>>()?,
+        Yaml::Hash(members) => {
+            let named = |(name, value)| match name {
+                Yaml::String(name) | Yaml::Real(name) => Ok((name, to_json(value)?)),
+                Yaml::Integer(name) => Ok((name.to_string(), to_json(value)?)),
+                _ => Err("the name of a member must be a text".to_owned()),
+            };
+            Value::Object(members.into_iter().map(named).collect::<Result<_, _>>()?)
         }
-        _ => text.into(),
+        Yaml::Real(number) => match Yaml::Real(number.clone()).as_f64() {
+            Some(value) if value.is_finite() => value.into(),
+            _ => return Err(format!("{number} is not a JSON number")),
+        },
+        _ => Value::Null,
     })
 }
 
