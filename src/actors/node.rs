@@ -80,7 +80,7 @@ pub trait Asker<T>: Send {
     /// Sends the one answer. The guard of the call, if there is one, is sent with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Takes the one answer, and writes its response on the present thread: it may have megabytes.
+    /// Takes the one answer, and writes its response on the present thread.
     fn answer_here(self: Box<Self>, answer: T) {
         self.answer(Ok(answer), None);
     }
@@ -146,19 +146,14 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Answers and ends the call, after all its effects. One message has both.
+    /// Answers and ends the call, after all its effects. One message has both. The registry writes the response.
     pub fn conclude(mut self, answer: T) {
         let done = self.done.take();
         self.send(Ok(answer), done);
     }
 
-    /// Answers. The call ends when this value is dropped.
+    /// Answers. The response is written on the present thread. The call ends when this value is dropped.
     pub fn answer(&mut self, answer: T) {
-        self.send(Ok(answer), None);
-    }
-
-    /// Answers; the response is written on the present thread, because it may have megabytes.
-    pub fn answer_here(&mut self, answer: T) {
         if let Some(asker) = self.take() {
             asker.answer_here(answer);
         }

@@ -69,7 +69,7 @@ impl TypedValue {
             _ => Rosapi::ActionGoalDetails,
         };
         if let Some(layout) = asked_type(part, &type_name) {
-            check_fields(layout.fields, &value)
+            check(layout.fields, &value, "")
                 .map_err(|why| CommandError::Usage(format!("{name} has {why}")))?;
         }
         if *absolute(name) == *MOVING {
@@ -288,21 +288,16 @@ async fn follow(action: &str, session: &mut Session) -> Outcome {
     }
 }
 
-/// Refuses a value with fields that its type does not have.
-fn check_fields(fields: &[Field], value: &Value) -> Result<(), String> {
-    let Value::Array(items) = value else {
-        return check(fields, value, "");
-    };
-    // A list has the values of all fields in order.
-    let names = fields.iter().map(|field| field.name.to_owned());
-    let named = names.zip(items.iter().cloned()).collect();
-    check(fields, &Value::Object(named), "")
-}
-
 /// Refuses the first member of `value`, at `path`, that is not one of the fields.
 fn check(fields: &[Field], value: &Value, path: &str) -> Result<(), String> {
     let has = |name: &str| fields.iter().find(|field| field.name == name);
     match value {
+        // As the whole value, a list has the values of all fields in order.
+        Value::Array(items) if path.is_empty() => {
+            let names = fields.iter().map(|field| field.name.to_owned());
+            let named = names.zip(items.iter().cloned()).collect();
+            check(fields, &Value::Object(named), path)
+        }
         Value::Array(items) => (0..)
             .zip(items)
             .try_for_each(|(at, item)| check(fields, item, &format!("{path}[{at}]"))),

@@ -46,7 +46,7 @@ impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
                 self.has_room = true;
             } else if let Some(answer) = self.work.advance(work_clock::reading) {
                 // Megabytes take a worker some tenths of a second, in which it does nothing else.
-                reply.answer_here(answer);
+                reply.answer(answer);
                 self.reply = None;
                 break;
             }
