@@ -82,10 +82,11 @@ fn end(outcome: Result<(), CommandError>) -> ExitCode {
     let Err(error) = outcome else {
         return ExitCode::SUCCESS;
     };
-    if !matches!(error, CommandError::Closed) {
+    let status = error.status();
+    if status != 0 {
         print_error(&error);
     }
-    ExitCode::from(error.status())
+    ExitCode::from(status)
 }
 
 /// Replays a record and prints the result.

@@ -114,7 +114,7 @@ fn check(input: &[u8]) {
 /// machine.
 fn admission(settings: u8) -> Admission {
     let is_set = |bit: u8| settings & bit != 0;
-    let token = is_set(1).then(|| Token::new(TOKEN).expect("a token"));
+    let token = is_set(1).then(|| Token::read(TOKEN).expect("a token"));
     let named = Authority::parse("arm.example:80").expect("a host");
     let access = Access {
         token: token.clone(),

@@ -187,7 +187,7 @@ impl Stage {
         let frame = messages::publish(topic.name(), &msg);
         self.registry.do_send(Publish {
             topic,
-            frame: frame.into(),
+            frame: Box::new(move || frame),
         });
     }
 }

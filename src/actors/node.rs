@@ -80,14 +80,9 @@ pub trait Asker<T>: Send {
     /// Sends the one answer. The guard of the call, if there is one, is sent with it.
     fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
 
-    /// Takes the one answer, and writes its response on the present thread: it may have megabytes.
+    /// Takes the one answer, and writes its response on the present thread.
     fn answer_here(self: Box<Self>, answer: T) {
         self.answer(Ok(answer), None);
-    }
-
-    /// The client that sent the question; `None` if it was a node.
-    fn client(&self) -> Option<ConnectionId> {
-        None
     }
 
     /// Whether the caller has disconnected.
@@ -127,12 +122,6 @@ impl<T> Reply<T> {
         }
     }
 
-    /// The client that sent the question; `None` if it was a node.
-    #[must_use]
-    pub fn client(&self) -> Option<ConnectionId> {
-        self.asker.as_ref().and_then(|asker| asker.client())
-    }
-
     /// Whether the caller has disconnected.
     #[must_use]
     pub fn caller_is_gone(&self) -> bool {
@@ -157,19 +146,14 @@ impl<T> Reply<T> {
         }
     }
 
-    /// Answers and ends the call, after all its effects. One message has both.
+    /// Answers and ends the call, after all its effects. One message has both. The registry writes the response.
     pub fn conclude(mut self, answer: T) {
         let done = self.done.take();
         self.send(Ok(answer), done);
     }
 
-    /// Answers. The call ends when this value is dropped.
+    /// Answers. The response is written on the present thread. The call ends when this value is dropped.
     pub fn answer(&mut self, answer: T) {
-        self.send(Ok(answer), None);
-    }
-
-    /// Answers; the response is written on the present thread, because it may have megabytes.
-    pub fn answer_here(&mut self, answer: T) {
         if let Some(asker) = self.take() {
             asker.answer_here(answer);
         }
@@ -238,37 +222,8 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// A frame for clients, written already or to be written by the registry. So the arm's thread does not have to
-/// write it.
-pub enum FrameOut {
-    /// The encoded frame.
-    Written(Bytes),
-    /// Writes it.
-    Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
-}
-
-impl FrameOut {
-    /// A frame that the registry writes.
-    #[must_use]
-    pub fn unwritten(write: impl FnOnce() -> Bytes + Send + 'static) -> Self {
-        Self::Unwritten(Box::new(write))
-    }
-
-    /// The encoded frame.
-    #[must_use]
-    pub fn write(self) -> Bytes {
-        match self {
-            Self::Written(frame) => frame,
-            Self::Unwritten(write) => write(),
-        }
-    }
-}
-
-impl From<Bytes> for FrameOut {
-    fn from(frame: Bytes) -> Self {
-        Self::Written(frame)
-    }
-}
+/// Writes a frame for clients. The registry calls it, so the arm's thread does not have to write.
+pub type FrameOut = Box<dyn FnOnce() -> Bytes + Send>;
 
 /// A message on a topic. From the node that owns it.
 #[derive(Message)]
@@ -284,7 +239,7 @@ impl Publish {
     /// The message of `make`, which the registry calls and encodes.
     #[must_use]
     pub fn made<M: Serialize>(topic: Topic, make: impl FnOnce() -> M + Send + 'static) -> Self {
-        let frame = FrameOut::unwritten(move || messages::publish(topic.name(), &make()));
+        let frame = Box::new(move || messages::publish(topic.name(), &make()));
         Self { topic, frame }
     }
 }
@@ -319,7 +274,7 @@ impl Respond {
         let write = move || messages::status(level, &msg, id.as_ref());
         Self {
             connection,
-            frame: FrameOut::unwritten(write),
+            frame: Box::new(write),
             service: None,
             status: Some(level),
             done: None,

@@ -11,7 +11,6 @@ use super::arm::ik::Ik;
 use super::arm::ik_action::{GoalTracker, IkAction};
 use super::arm::ik_trial::{GoalClient, IkTrial};
 use super::arm::sim::{AddBarrier, ArmPose, ArmSim, SetLimitPredictor};
-use super::compute::integration::Integration;
 use super::compute::study::Study;
 use super::compute::workers::WorkerPool;
 use super::gateway::registry::Registry;
@@ -76,8 +75,6 @@ pub fn start_nodes<const N: usize>(
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
     arm.do_send(SetLimitPredictor(study.recipient()));
-    let integration = Integration::new(workers.clone()).start();
-    Integration::attach(&integration, nodes);
     let follower = PathFollower::new(PathArm::of(arm)).start();
     PathFollower::attach(&follower, nodes);
     let (pose, tracker) = (arm.clone().recipient(), GoalTracker::of(arm));

@@ -1,35 +1,105 @@
-//! `pendularm service call` and `pendularm action send_goal`.
+//! `list` and `info` for topics, services, actions and nodes; `pendularm service call` and `pendularm action send_goal`.
 //!
-//! **Invariant:** the command waits for the end of its goal. A signal cancels the goal first.
+//! **Invariant:** `info` works only for names that the runtime lists. A value has only fields of its type; an unknown type
+//! may have any. The command waits for the end of its goal. A signal cancels the goal first.
 
-use clap::Subcommand;
+use std::io;
+
+use clap::{Args, Subcommand};
+use serde_json::value::RawValue;
 use serde_json::{Value, json};
 #[cfg(unix)]
 use tokio::signal::unix;
 #[cfg(windows)]
 use tokio::signal::windows;
 
-use super::arguments::TypedValue;
-use super::graph::{self, GraphVerb};
-use super::output::{CommandError, raw};
-use super::session::{RuntimeOptions, Session};
+use super::output::{CommandError, Outcome};
+use super::session::Session;
+use super::values::read;
 use crate::output::print_error;
-use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::names::absolute;
+use crate::protocol::catalog::rosapi::PREFIX;
+use crate::protocol::catalog::{Field, Rosapi, Service, Topic, types};
+use crate::protocol::names::{absolute, are_same};
+use crate::protocol::ros::rosapi::asked_type;
 
-/// The statuses of `action_msgs/msg/GoalStatus`, by their numbers.
-const STATUSES: [&str; 7] = [
-    "UNKNOWN",
-    "ACCEPTED",
-    "EXECUTING",
-    "CANCELING",
-    "SUCCEEDED",
-    "CANCELED",
-    "ABORTED",
-];
+/// The refusal of a value in several arguments.
+pub(crate) const UNQUOTED: &str = "\
+    an argument in YAML or JSON came as several words: put quotes around all of it, such as '{data: true}'";
+
+/// Fields of ROS 1 that the runtime also reads, each with the field of ROS 2 beside it.
+const ROS_1: [(&str, &str); 3] = [("secs", "sec"), ("nsecs", "nanosec"), ("seq", "stamp")];
 
 /// The topic that moves the arm while the controller is on. For a goal the runtime sends the warning itself.
 const MOVING: &str = Topic::JointTrajectory.name();
+
+/// A type and a value of that type, both optional.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct TypedValue {
+    /// Its type, as pkg/Name; optional, and checked if given
+    #[arg(value_name = "TYPE")]
+    type_name: Option<String>,
+    /// The value, in JSON or YAML; {} by default
+    value: Option<String>,
+}
+
+impl TypedValue {
+    /// Reads the value for a topic, a service or an action, and checks it against its type. Returns the type too, empty
+    /// if it is unknown.
+    pub(super) async fn checked(
+        &self,
+        kind: &str,
+        name: &str,
+        session: &mut Session,
+    ) -> Outcome<(String, Value)> {
+        let in_type = |one: char| one.is_alphanumeric() || "_/".contains(one);
+        let is_type = |text: &&str| text.contains('/') && text.chars().all(in_type);
+        let first = self.type_name.as_deref();
+        let type_name = first.filter(is_type);
+        let text = match (&self.value, type_name) {
+            (Some(_), None) => return Err(CommandError::Usage(UNQUOTED.to_owned())),
+            (Some(value), Some(_)) => value,
+            (None, None) => first.unwrap_or("{}"),
+            (None, Some(_)) => "{}",
+        };
+        let value = read(text)?;
+        let type_name = session.type_of(kind, name, type_name).await?;
+        let part = match kind {
+            "topic" => Rosapi::MessageDetails,
+            "service" => Rosapi::ServiceRequestDetails,
+            _ => Rosapi::ActionGoalDetails,
+        };
+        if let Some(layout) = asked_type(part, &type_name) {
+            check(layout.fields, &value, "")
+                .map_err(|why| CommandError::Usage(format!("{name} has {why}")))?;
+        }
+        if *absolute(name) == *MOVING {
+            let enable = Service::Enable.name();
+            if let Ok(false) = session.ask(enable, &json!({}), "data").await {
+                print_error(&format_args!(
+                    "the controller is off, so the arm does not move there; to switch it on: pendularm service call \
+                     {enable} '{{data: true}}'"
+                ));
+            }
+        }
+        Ok((type_name, value))
+    }
+}
+
+/// The verbs for topics, services, actions and nodes.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum GraphVerb {
+    /// List their names
+    List {
+        /// Show the types (nodes have none)
+        #[arg(short = 't', long)]
+        show_types: bool,
+    },
+    /// Describe one: the type and the nodes of a topic, service or action; the topics and services of a node
+    Info {
+        /// Its name, with or without the leading slash
+        name: String,
+    },
+}
 
 /// The verbs of services.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
@@ -81,71 +151,109 @@ waits for its end. The second one ends the command. Exit status: 0 for SUCCEEDED
     },
 }
 
-pub(super) async fn run_service(
-    verb: &ServiceVerb,
-    runtime: &RuntimeOptions,
-) -> Result<(), CommandError> {
+/// The services of rosapi whose answers describe one of that kind.
+fn questions(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "topic" => &["topic_type", "publishers", "subscribers"],
+        "service" => &["service_type", "service_node"],
+        "action" => &["action_type"],
+        _ => &["node_details"],
+    }
+}
+
+pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Session) -> Outcome {
+    let question = match kind {
+        "action" => "action_servers".to_owned(),
+        other => format!("{other}s"),
+    };
+    let service = format!("{PREFIX}{question}");
+    let names: Vec<String> = session.ask(&service, &json!({}), &question).await?;
+    let name = match verb {
+        GraphVerb::List { show_types } => return list(kind, names, *show_types, session).await,
+        GraphVerb::Info { name } => name,
+    };
+    if !names.iter().any(|one| are_same(one, name)) {
+        return Err(CommandError::Refused(format!(
+            "there is no {kind} {name}; `pendularm {kind} list` lists all"
+        )));
+    }
+    let mut members = Vec::new();
+    for question in questions(kind) {
+        let service = format!("{PREFIX}{question}");
+        let answer = session.call(&service, &json!({kind: name})).await?;
+        let inside = answer.get().strip_prefix('{');
+        members.extend(inside.and_then(|inside| Some(inside.strip_suffix('}')?.to_owned())));
+    }
+    let description = RawValue::from_string(format!("{{{}}}", members.join(",")))?;
+    session.show(&description, "")
+}
+
+async fn list(kind: &str, names: Vec<String>, show_types: bool, session: &mut Session) -> Outcome {
+    for name in names {
+        if show_types && kind != "node" {
+            let type_name = session.type_of(kind, &name, None).await?;
+            let json = json!({"name": name, "type": type_name});
+            session.show_line(&json, &format!("{name} [{type_name}]"))?;
+        } else {
+            session.show_line(&json!({"name": name}), &name)?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) async fn run_service(verb: &ServiceVerb, session: &mut Session) -> Outcome {
     match verb {
-        ServiceVerb::Graph(verb) => graph::run(verb, "service", &mut runtime.open().await?).await,
+        ServiceVerb::Graph(verb) => run_graph(verb, "service", session).await,
         ServiceVerb::Call { service, args } => {
-            let (type_name, args) = args.read()?;
-            let mut session = runtime.open().await?;
-            session.check("service", service, type_name, &args).await?;
+            let (_, args) = args.checked("service", service, session).await?;
             let values = session.call(service, &args).await?;
             session.show(&values, "")
         }
     }
 }
 
-pub(super) async fn run_action(
-    verb: &ActionVerb,
-    runtime: &RuntimeOptions,
-) -> Result<(), CommandError> {
+pub(super) async fn run_action(verb: &ActionVerb, session: &mut Session) -> Outcome {
     match verb {
-        ActionVerb::Graph(verb) => graph::run(verb, "action", &mut runtime.open().await?).await,
+        ActionVerb::Graph(verb) => run_graph(verb, "action", session).await,
         ActionVerb::SendGoal {
             action,
             goal,
             feedback,
         } => {
-            let (type_name, goal) = goal.read()?;
-            let mut session = runtime.open().await?;
-            session.check("action", action, type_name, &goal).await?;
+            let (_, goal) = goal.checked("action", action, session).await?;
             let goal = json!({"op": "send_action_goal", "id": "goal", "action": action, "args": goal,
                 "feedback": feedback});
             session.send(&goal).await?;
-            follow(action, &mut session).await
+            follow(action, session).await
         }
     }
 }
 
-/// The signals that end a command.
+/// SIGINT and SIGTERM.
 #[cfg(unix)]
-fn signals() -> std::io::Result<(unix::Signal, unix::Signal)> {
-    let hear = unix::signal;
-    Ok((
-        hear(unix::SignalKind::interrupt())?,
-        hear(unix::SignalKind::terminate())?,
-    ))
+fn signals() -> io::Result<(unix::Signal, unix::Signal)> {
+    let terminate = unix::signal(unix::SignalKind::terminate())?;
+    Ok((unix::signal(unix::SignalKind::interrupt())?, terminate))
 }
 
-/// The console events that end a command on Windows.
+/// Ctrl-C and Ctrl-Break.
 #[cfg(windows)]
-fn signals() -> std::io::Result<(windows::CtrlC, windows::CtrlBreak)> {
+fn signals() -> io::Result<(windows::CtrlC, windows::CtrlBreak)> {
     Ok((windows::ctrl_c()?, windows::ctrl_break()?))
 }
 
 /// Waits for the end of a goal. The first signal cancels it, the second ends the command.
-async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError> {
+async fn follow(action: &str, session: &mut Session) -> Outcome {
     let cancel = json!({"op": "cancel_action_goal", "id": "goal", "action": action});
-    let (mut interrupt, mut terminate) = signals()?;
+    let (mut interrupt, mut terminate) = signals().map_err(CommandError::system)?;
     let mut is_canceled = false;
     loop {
         let said = tokio::select! {
             said = session.receive() => said?,
             _ = async { tokio::select! { _ = interrupt.recv() => {}, _ = terminate.recv() => {} } } => {
                 if is_canceled {
-                    return Err(CommandError::refused("ended before the result of the goal"));
+                    let why = "ended before the result of the goal";
+                    return Err(CommandError::Refused(why.to_owned()));
                 }
                 is_canceled = true;
                 session.send(&cancel).await?;
@@ -155,19 +263,24 @@ async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError>
         let values = said.values.as_ref().map_or("null", |values| values.get());
         match said.op.as_str() {
             "action_feedback" => {
-                session.show(&raw(format!("{{\"feedback\":{values}}}"))?, "---\n")?;
+                let feedback = RawValue::from_string(format!("{{\"feedback\":{values}}}"))?;
+                session.show(&feedback, "---\n")?;
                 session.await_next();
             }
             "action_result" if !said.result => return Err(said.refusal(action)),
             "action_result" => {
-                let status = said.status_number();
-                let status = status.and_then(|number| STATUSES.get(number));
-                let status = status.unwrap_or(&"UNKNOWN");
+                // The final statuses of `action_msgs/msg/GoalStatus`.
+                let status = match said.status_number() {
+                    Some(4) => "SUCCEEDED",
+                    Some(5) => "CANCELED",
+                    Some(6) => "ABORTED",
+                    _ => "UNKNOWN",
+                };
                 let end = format!("{{\"result\":{values},\"status\":\"{status}\"}}");
-                session.show(&raw(end)?, "---\n")?;
-                return match *status {
+                session.show(&RawValue::from_string(end)?, "---\n")?;
+                return match status {
                     "SUCCEEDED" => Ok(()),
-                    other => Err(CommandError::refused(&format!("the goal ended as {other}"))),
+                    other => Err(CommandError::Refused(format!("the goal ended as {other}"))),
                 };
             }
             _ => {}
@@ -175,37 +288,49 @@ async fn follow(action: &str, session: &mut Session) -> Result<(), CommandError>
     }
 }
 
-impl Session {
-    /// Checks a value against the type of its topic, service or action, before it is sent. Returns the type. Warns if
-    /// the value moves the arm through the controller, which is off.
-    pub(super) async fn check(
-        &mut self,
-        kind: &str,
-        name: &str,
-        type_name: Option<&str>,
-        value: &Value,
-    ) -> Result<String, CommandError> {
-        let known = self.type_of(kind, name, type_name).await?;
-        let layout = match kind {
-            "topic" => "message_details",
-            "service" => "service_request_details",
-            _ => "action_goal_details",
-        };
-        self.check_fields(name, layout, &known, value).await?;
-        if *absolute(name) == *MOVING {
-            let enable = Service::Enable.name();
-            let is_off = match self.call(enable, &json!({})).await {
-                Err(CommandError::Refused(_)) => false,
-                values => serde_json::from_str(values?.get())
-                    .is_ok_and(|values: Value| values.get("data") == Some(&Value::Bool(false))),
-            };
-            if is_off {
-                print_error(&format_args!(
-                    "the controller is off, so the arm does not move there; to switch it on: pendularm service call \
-                     {enable} '{{data: true}}'"
-                ));
-            }
+/// Refuses the first member of `value`, at `path`, that is not one of the fields.
+fn check(fields: &[Field], value: &Value, path: &str) -> Result<(), String> {
+    let has = |name: &str| fields.iter().find(|field| field.name == name);
+    match value {
+        // As the whole value, a list has the values of all fields in order.
+        Value::Array(items) if path.is_empty() => {
+            let names = fields.iter().map(|field| field.name.to_owned());
+            let named = names.zip(items.iter().cloned()).collect();
+            check(fields, &Value::Object(named), path)
         }
-        Ok(known)
+        Value::Array(items) => (0..)
+            .zip(items)
+            .try_for_each(|(at, item)| check(fields, item, &format!("{path}[{at}]"))),
+        Value::Object(members) => members.iter().try_for_each(|(name, member)| {
+            let path = format!("{path}.{name}");
+            match has(name) {
+                Some(field) => types::find(field.element().0)
+                    .map_or(Ok(()), |layout| check(layout.fields, member, &path)),
+                None if ROS_1
+                    .iter()
+                    .any(|(old, new)| old == name && has(new).is_some()) =>
+                {
+                    Ok(())
+                }
+                None => Err(unknown_field(fields, name, &path)),
+            }
+        }),
+        Value::String(text) if text.contains(':') => Err(unknown_field(fields, text, text)),
+        _ => Ok(()),
     }
+}
+
+/// The refusal of a field. In YAML, a name and a value without a space after the colon are one name.
+fn unknown_field(fields: &[Field], name: &str, path: &str) -> String {
+    let mut known: Vec<&str> = fields.iter().map(|field| field.name).collect();
+    if known.is_empty() {
+        known.push("none");
+    }
+    let (path, known) = (path.trim_start_matches('.'), known.join(", "));
+    let hint = name.replacen(':', ": ", 1);
+    let hint = match hint == name {
+        true => String::new(),
+        false => format!(". Put a space after the colon: {{{hint}}}"),
+    };
+    format!("unknown field {path:?}; known fields: {known}{hint}")
 }

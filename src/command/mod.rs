@@ -4,22 +4,19 @@
 //!
 //! **Invariant:** no answer, closed pipe or signal makes a command panic. The exit status shows how it ended.
 
-pub mod arguments;
 mod call;
-mod graph;
 mod output;
 mod parameters;
 mod session;
 mod topic;
-pub mod yaml;
+pub mod values;
 
 use clap::{Args, Subcommand};
 use tokio::runtime::Builder;
 
-pub(crate) use self::arguments::UNQUOTED;
-use self::call::{ActionVerb, ServiceVerb};
-use self::graph::GraphVerb;
-pub use self::output::CommandError;
+pub(crate) use self::call::UNQUOTED;
+use self::call::{ActionVerb, GraphVerb, ServiceVerb};
+pub use self::output::{CommandError, Outcome};
 use self::parameters::ParamVerb;
 use self::session::RuntimeOptions;
 use self::topic::TopicVerb;
@@ -62,30 +59,27 @@ pub struct Subject<V: Subcommand> {
     verb: V,
 }
 
-/// Runs a command and prints its result. Values are read before it connects, so a wrong one changes nothing.
+/// Connects, runs a command and prints its result.
 ///
 /// # Errors
 /// [`CommandError`], which has the exit status.
-pub fn run(subject: &CommandSubject) -> Result<(), CommandError> {
-    let system = Builder::new_current_thread().enable_all().build()?;
-    system.block_on(async {
+pub fn run(subject: &CommandSubject) -> Outcome {
+    let (CommandSubject::Topic(Subject { runtime, .. })
+    | CommandSubject::Service(Subject { runtime, .. })
+    | CommandSubject::Action(Subject { runtime, .. })
+    | CommandSubject::Node(Subject { runtime, .. })
+    | CommandSubject::Param(Subject { runtime, .. })
+    | CommandSubject::Diagnostics(runtime)) = subject;
+    let system = Builder::new_current_thread().enable_all().build();
+    system.map_err(CommandError::system)?.block_on(async {
+        let session = &mut runtime.open().await?;
         match subject {
-            CommandSubject::Topic(Subject { runtime, verb }) => topic::run(verb, runtime).await,
-            CommandSubject::Service(Subject { runtime, verb }) => {
-                call::run_service(verb, runtime).await
-            }
-            CommandSubject::Action(Subject { runtime, verb }) => {
-                call::run_action(verb, runtime).await
-            }
-            CommandSubject::Node(Subject { runtime, verb }) => {
-                graph::run(verb, "node", &mut runtime.open().await?).await
-            }
-            CommandSubject::Param(Subject { runtime, verb }) => {
-                parameters::run(verb, runtime).await
-            }
-            CommandSubject::Diagnostics(runtime) => {
-                parameters::diagnostics(&mut runtime.open().await?).await
-            }
+            CommandSubject::Topic(topic) => topic::run(&topic.verb, session).await,
+            CommandSubject::Service(service) => call::run_service(&service.verb, session).await,
+            CommandSubject::Action(action) => call::run_action(&action.verb, session).await,
+            CommandSubject::Node(node) => call::run_graph(&node.verb, "node", session).await,
+            CommandSubject::Param(param) => parameters::run(&param.verb, session).await,
+            CommandSubject::Diagnostics(_) => parameters::diagnostics(session).await,
         }
     })
 }

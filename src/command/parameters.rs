@@ -6,11 +6,12 @@
 
 use clap::{Args, Subcommand};
 use serde::Deserialize;
+use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::arguments::read;
-use super::output::{CommandError, plain, print, raw};
-use super::session::{RuntimeOptions, Session};
+use super::output::{CommandError, Outcome, plain, print};
+use super::session::Session;
+use super::values::read;
 use crate::protocol::catalog::{Rosapi, Service, Topic};
 use crate::protocol::ros::parameters::NO_SUCH;
 
@@ -68,38 +69,32 @@ impl ParameterName {
     }
 }
 
-pub(super) async fn run(verb: &ParamVerb, runtime: &RuntimeOptions) -> Result<(), CommandError> {
+pub(super) async fn run(verb: &ParamVerb, session: &mut Session) -> Outcome {
     match verb {
         ParamVerb::List => {
-            let mut session = runtime.open().await?;
-            let names: Vec<String> = session.ask("get_param_names", &json!({}), "names").await?;
-            let entry = |full: &String| {
+            let list = Service::Rosapi(Rosapi::GetParamNames).name();
+            let names: Vec<String> = session.ask(list, &json!({}), "names").await?;
+            names.iter().try_for_each(|full| {
                 let (node, name) = full.split_once(':').unwrap_or(("", full));
-                (
-                    json!({"node": node, "name": name}),
-                    format!("{node} {name}"),
-                )
-            };
-            session.show_list(&names.iter().map(entry).collect::<Vec<_>>())
+                let json = json!({"node": node, "name": name});
+                session.show_line(&json, &format!("{node} {name}"))
+            })
         }
         ParamVerb::Get(parameter) => {
-            let mut session = runtime.open().await?;
             let name = json!({"name": parameter.full()});
-            let answer = call(&mut session, Rosapi::GetParam, &name).await?;
+            let answer = call(session, Rosapi::GetParam, &name).await?;
             // JSON within JSON.
             match serde_json::from_str::<String>(&answer.value) {
                 Ok(text) if !session.is_json => {
                     let lines: Vec<String> = text.split('\n').map(plain).collect();
                     print(&(lines.join("\n") + "\n"))
                 }
-                _ => session.show(&raw(answer.value)?, ""),
+                _ => session.show(&RawValue::from_string(answer.value)?, ""),
             }
         }
         ParamVerb::Set { parameter, value } => {
             let args = json!({"name": parameter.full(), "value": read(value)?.to_string()});
-            call(&mut runtime.open().await?, Rosapi::SetParam, &args)
-                .await
-                .map(drop)
+            call(session, Rosapi::SetParam, &args).await.map(drop)
         }
     }
 }
@@ -113,23 +108,17 @@ struct ParameterAnswer {
     value: String,
 }
 
-async fn call(
-    session: &mut Session,
-    question: Rosapi,
-    args: &Value,
-) -> Result<ParameterAnswer, CommandError> {
-    let service = Service::Rosapi(question).name();
-    let values = session.call(service, args).await?;
-    let answer: ParameterAnswer = serde_json::from_str(values.get())
-        .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;
+async fn call(session: &mut Session, question: Rosapi, args: &Value) -> Outcome<ParameterAnswer> {
+    let values = session.call(Service::Rosapi(question).name(), args).await?;
+    let answer: ParameterAnswer = serde_json::from_str(values.get())?;
     match answer.reason.as_str() {
         _ if answer.successful => Ok(answer),
         // The message names the command and the node.
-        NO_SUCH => Err(CommandError::refused(&format!(
+        NO_SUCH => Err(CommandError::Refused(format!(
             "there is no parameter {}; `pendularm param list` lists all",
             args["name"]
         ))),
-        other => Err(CommandError::refused(other)),
+        _ => Err(CommandError::Refused(answer.reason)),
     }
 }
 
@@ -153,11 +142,10 @@ struct Detail {
     value: String,
 }
 
-pub(super) async fn diagnostics(session: &mut Session) -> Result<(), CommandError> {
+pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
     session.subscribe(TOPIC, None).await?;
     let message = session.message(TOPIC).await?;
-    let Diagnostics { status } = serde_json::from_str(message.get())
-        .map_err(|error| CommandError::refused(&format!("{TOPIC} said: {error}")))?;
+    let Diagnostics { status } = serde_json::from_str(message.get())?;
     match session.is_json {
         true => session.show(&message, "")?,
         false => print(&status.iter().map(page).collect::<String>())?,
@@ -165,7 +153,7 @@ pub(super) async fn diagnostics(session: &mut Session) -> Result<(), CommandErro
     match status.iter().find(|part| part.level != 0) {
         None => Ok(()),
         Some(DiagnosedPart { name, message, .. }) => {
-            Err(CommandError::refused(&format!("{name}: {message}")))
+            Err(CommandError::Refused(format!("{name}: {message}")))
         }
     }
 }

@@ -7,14 +7,13 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde_json::json;
-use serde_json::value::RawValue;
+use serde_json::value::{RawValue, to_raw_value};
 use tokio::time::{Instant, sleep_until};
 
-use super::arguments::TypedValue;
-use super::graph::{self, GraphVerb};
-use super::output::{CommandError, print, raw};
-use super::session::{RuntimeOptions, Session, read_positive};
-use super::yaml::json_line;
+use super::call::{GraphVerb, TypedValue, run_graph};
+use super::output::{CommandError, Outcome, print};
+use super::session::{Session, read_positive};
+use super::values::json_line;
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::value::{ValueReader, within};
 
@@ -102,19 +101,20 @@ fn read_count(text: &str) -> Result<usize, String> {
     within(&(1..=1_000_000), "a whole number", text)
 }
 
-pub(super) async fn run(verb: &TopicVerb, runtime: &RuntimeOptions) -> Result<(), CommandError> {
+pub(super) async fn run(verb: &TopicVerb, session: &mut Session) -> Outcome {
     match verb {
-        TopicVerb::Graph(verb) => graph::run(verb, "topic", &mut runtime.open().await?).await,
+        TopicVerb::Graph(verb) => run_graph(verb, "topic", session).await,
         TopicVerb::Echo {
             source,
             field,
             once,
             times,
         } => {
-            let mut session = source.subscribe(runtime).await?;
+            let SubscribedTopic { topic, type_name } = source;
+            session.subscribe(topic, type_name.as_deref()).await?;
             let mut left = times.or(once.then_some(1));
             while left != Some(0) {
-                let message = session.message(&source.topic).await?;
+                let message = session.message(topic).await?;
                 let shown = field
                     .as_ref()
                     .map_or(Ok(&*message), |field| part(&message, field))?;
@@ -124,7 +124,9 @@ pub(super) async fn run(verb: &TopicVerb, runtime: &RuntimeOptions) -> Result<()
             Ok(())
         }
         TopicVerb::Hz { source, window } => {
-            measure(&source.topic, *window, source.subscribe(runtime).await?).await
+            let SubscribedTopic { topic, type_name } = source;
+            session.subscribe(topic, type_name.as_deref()).await?;
+            measure(topic, *window, session).await
         }
         TopicVerb::Pub {
             topic,
@@ -134,18 +136,8 @@ pub(super) async fn run(verb: &TopicVerb, runtime: &RuntimeOptions) -> Result<()
             rate,
         } => {
             let times = times.or(once.then_some(1));
-            publish(topic, message, times, *rate, runtime).await
+            publish(topic, message, times, *rate, session).await
         }
-    }
-}
-
-impl SubscribedTopic {
-    async fn subscribe(&self, runtime: &RuntimeOptions) -> Result<Session, CommandError> {
-        let mut session = runtime.open().await?;
-        session
-            .subscribe(&self.topic, self.type_name.as_deref())
-            .await?;
-        Ok(session)
     }
 }
 
@@ -160,10 +152,10 @@ fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandEr
         members.get(step).copied()
     };
     let part = path.split(['.', '[']).try_fold(message, step);
-    part.ok_or_else(|| CommandError::refused(&format!("the message has no {path}")))
+    part.ok_or_else(|| CommandError::Refused(format!("the message has no {path}")))
 }
 
-async fn measure(topic: &str, window: usize, mut session: Session) -> Result<(), CommandError> {
+async fn measure(topic: &str, window: usize, session: &mut Session) -> Outcome {
     let mut spans = VecDeque::new();
     session.message(topic).await?;
     let mut last = Instant::now();
@@ -207,18 +199,16 @@ async fn publish(
     message: &TypedValue,
     times: Option<usize>,
     rate: f64,
-    runtime: &RuntimeOptions,
-) -> Result<(), CommandError> {
-    let (type_name, message) = message.read()?;
-    let mut session = runtime.open().await?;
-    let known = session.check("topic", topic, type_name, &message).await?;
-    let mut advertise = json!({"op": "advertise", "topic": topic});
-    if let (false, Some(members)) = (known.is_empty(), advertise.as_object_mut()) {
-        members.insert("type".to_owned(), known.into());
-    }
+    session: &mut Session,
+) -> Outcome {
+    let (type_name, message) = message.checked("topic", topic, session).await?;
+    let advertise = match &*type_name {
+        "" => json!({"op": "advertise", "topic": topic}),
+        name => json!({"op": "advertise", "topic": topic, "type": name}),
+    };
     session.send(&advertise).await?;
     let publish = json!({"op": "publish", "topic": topic, "msg": message});
-    let spelled = raw(message.to_string())?;
+    let spelled = to_raw_value(&message)?;
     let period = Duration::from_secs_f64(rate.recip());
     let mut due = Instant::now();
     for count in 1.. {

@@ -5,8 +5,6 @@
 //!
 //! **Invariant:** every refusal is one line with the name of the option or variable and the value.
 
-mod values;
-
 use std::env;
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
@@ -20,22 +18,17 @@ use clap::{Args, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
 use tracing::level_filters::LevelFilter;
 
-use self::values::{
-    read_bind, read_clients, read_level, read_log_format, read_period, read_seed, read_token,
-};
-#[cfg(feature = "web")]
-use self::values::{read_frame, read_host, read_origin, read_switch};
+use crate::address;
 #[cfg(feature = "cli")]
 use crate::command::{CommandSubject, UNQUOTED};
 use crate::logging::LogFormat;
 use crate::plan::PlanOptions;
 pub use crate::protocol::limits::{DEFAULT_CLIENTS, MAX_CLIENTS};
 use crate::protocol::op::token::Token;
-use crate::protocol::wire::text::shortened;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
 pub use crate::value::Links;
-use crate::value::{ValueReader, read_links};
+use crate::value::{ValueReader, needed, one_of, read_links, within};
 #[cfg(feature = "web")]
 use crate::web::{DEFAULT_REPORT, authority::Authority};
 
@@ -57,9 +50,6 @@ An option overrides its environment variable. An empty variable counts as unset.
 Exit status: 0 after a signal that asks it to end (SIGINT, SIGTERM, SIGHUP), 2 for a bad option or variable, 1 for any
 other failure.";
 
-/// Longest refusal \[characters\].
-const MAX_REFUSAL: usize = 1000;
-
 /// All options of the server.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Options {
@@ -74,14 +64,16 @@ pub struct Options {
     pub bind: SocketAddr,
     /// Clients served at once, at most 4096; a few of these places are kept for HTTP and WebSocket
     #[arg(long, env = "ARM_SIM_CLIENTS", value_name = "N")]
-    #[arg(default_value_t = DEFAULT_CLIENTS, value_parser = ValueReader(read_clients))]
+    #[arg(default_value_t = DEFAULT_CLIENTS)]
+    #[arg(value_parser = ValueReader(|text| within(&(1..=MAX_CLIENTS), "a whole number", text)))]
     pub clients: usize,
     /// Control period in seconds; 0 for every step
     #[arg(long, env = "ARM_SIM_CONTROL_PERIOD", value_name = "SECONDS")]
     #[arg(default_value = "0", value_parser = ValueReader(read_period))]
     pub control_period: f64,
     /// Seed for repeatable targets of timed trials; by default it is new at every start
-    #[arg(long, env = "ARM_SIM_SEED", value_name = "N", value_parser = ValueReader(read_seed))]
+    #[arg(long, env = "ARM_SIM_SEED", value_name = "N")]
+    #[arg(value_parser = ValueReader(|text| within(&(0..=u64::MAX), "a whole number", text)))]
     pub seed: Option<u64>,
     /// Level of the log on standard error: off, error, warn, info, debug or trace
     #[arg(long, env = "ARM_SIM_LOG", value_name = "LEVEL")]
@@ -89,10 +81,11 @@ pub struct Options {
     pub log: LevelFilter,
     /// Format of the log: text, or json for one object per line
     #[arg(long, env = "ARM_SIM_LOG_FORMAT", value_name = "FORMAT")]
-    #[arg(default_value = "text", value_parser = ValueReader(read_log_format))]
+    #[arg(default_value = "text")]
+    #[arg(value_parser = ValueReader(|text| one_of(&[("text", LogFormat::Text), ("json", LogFormat::Json)], text)))]
     pub log_format: LogFormat,
     /// Secret token of at least 16 characters; prefer the variable, because other users can see options
-    #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(read_token))]
+    #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(Token::read))]
     pub token: Option<Token>,
     /// Options of records.
     #[cfg(feature = "record")]
@@ -130,17 +123,14 @@ pub struct WebOptions {
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
     pub origins: Vec<Box<str>>,
     /// Allow a WebSocket only to the runtime's own page and to --allow-origin, as with a token
-    #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "SWITCH")]
+    #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "BOOL")]
     #[arg(default_value = "false")]
     #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
-    #[arg(value_parser = ValueReader(read_switch))]
+    #[arg(value_parser = ValueReader(|text| needed(text.parse::<bool>().ok(), "true or false", text)))]
     pub strict_origin: bool,
     /// Origins of pages that may show the page and the report in a frame, separated by commas
-    #[arg(
-        long = "allow-frame",
-        env = "ARM_SIM_ALLOW_FRAME",
-        value_name = "ORIGINS"
-    )]
+    #[arg(long = "allow-frame", env = "ARM_SIM_ALLOW_FRAME")]
+    #[arg(value_name = "ORIGINS")]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame))]
     pub frames: Vec<Box<str>>,
     /// Folder of the report at /report/
@@ -211,7 +201,7 @@ impl From<clap::Error> for UsageError {
             ErrorKind::ValueValidation | ErrorKind::InvalidValue => "",
             _ => "; --help lists all commands and options",
         };
-        Self(shortened(&(words.join(" ") + hint), MAX_REFUSAL))
+        Self(words.join(" ") + hint)
     }
 }
 
@@ -290,4 +280,60 @@ fn prepared(command: Command, serves: bool) -> Command {
     // A subject without a verb is refused in one line, like every error.
     let command = command.arg_required_else_help(false);
     command.mut_subcommands(|subcommand| prepared(subcommand, true))
+}
+
+fn read_bind(text: &str) -> Result<SocketAddr, String> {
+    let address = address::read(text).and_then(|text| match text.strip_prefix("localhost:") {
+        Some(port) => Some(SocketAddr::from((Ipv4Addr::LOCALHOST, port.parse().ok()?))),
+        None => text.parse().ok(),
+    });
+    let needs = "localhost or an IP address, a port, or both, such as 127.0.0.1:9095 or [::1]:9095";
+    needed(address, needs, text)
+}
+
+fn read_period(text: &str) -> Result<f64, String> {
+    let period = text.parse().ok();
+    let period = period.filter(|period: &f64| period.is_finite() && *period >= 0.0);
+    needed(period, "a time in seconds, at least 0", text)
+}
+
+fn read_level(text: &str) -> Result<LevelFilter, String> {
+    let level = text.parse().ok();
+    // `tracing` also accepts numbers and capitals.
+    let level = level.filter(|level: &LevelFilter| level.to_string() == text);
+    needed(level, "off, error, warn, info, debug or trace", text)
+}
+
+#[cfg(feature = "web")]
+fn read_host(text: &str) -> Result<Authority, String> {
+    let needs = "host names, with or without a port, separated by commas";
+    needed(Authority::parse(text.trim()), needs, text)
+}
+
+#[cfg(feature = "web")]
+fn read_origin(text: &str) -> Result<Box<str>, String> {
+    let origin = text.trim().to_ascii_lowercase();
+    let in_scheme = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'-' | b'.');
+    let is_origin = match origin.split_once("://") {
+        Some(("file", "")) => true,
+        Some((scheme, host)) => {
+            !scheme.is_empty() && scheme.bytes().all(in_scheme) && Authority::parse(host).is_some()
+        }
+        None => origin == "null",
+    };
+    let needs = "origins, such as https://example.org, null or file://, separated by commas";
+    needed(is_origin.then(|| origin.into()), needs, text)
+}
+
+/// The origin of a page that may show this one in a frame. A browser compares scheme, host and port, so it needs a
+/// host.
+#[cfg(feature = "web")]
+fn read_frame(text: &str) -> Result<Box<str>, String> {
+    let origin = text.trim().to_ascii_lowercase();
+    let host = ["http://", "https://"]
+        .iter()
+        .find_map(|scheme| origin.strip_prefix(scheme));
+    let is_page = host.and_then(Authority::parse).is_some();
+    let needs = "origins of web pages, such as https://example.org, separated by commas";
+    needed(is_page.then(|| origin.into()), needs, text)
 }

@@ -4,17 +4,14 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::askers::{PATIENCE, PoolBench};
+use crate::study::study;
 use crate::system::in_real_time;
-use pendularm::actors::compute::integration::{Integration, IntegrationStep};
+use pendularm::actors::compute::study::{IntegrationStep, Study};
 use pendularm::actors::node::Unserved;
 use pendularm::math::integrator::Method;
 use tokio::time::timeout;
 
-fn integration() -> PoolBench<Integration> {
-    PoolBench::new(Integration::new)
-}
-
-async fn assert_nothing_more(bench: &mut PoolBench<Integration>) {
+async fn assert_nothing_more(bench: &mut PoolBench<Study<2>>) {
     // The worker would send any other message before the end of the next call.
     let call = bench.ask_as(99, request("t", 1));
     assert_eq!(bench.next().await, 99);
@@ -42,7 +39,7 @@ fn heavy() -> IntegrationStep {
 #[test]
 fn a_call_of_a_disconnected_caller_ends_early_and_once() {
     in_real_time(async {
-        let mut bench = integration();
+        let mut bench = study::<2>();
         let call = bench.ask_as(1, heavy());
         call.gone.store(true, Ordering::Relaxed);
         // The registry drops the answer. Every call ends with one.
@@ -56,7 +53,7 @@ fn a_call_of_a_disconnected_caller_ends_early_and_once() {
 #[test]
 fn a_caller_that_disconnects_at_any_moment_gets_one_answer() {
     in_real_time(async {
-        let mut bench = integration();
+        let mut bench = study::<2>();
         for microseconds in (0..2000).step_by(40) {
             let call = bench.ask_as(1, request("t", 300));
             tokio::time::sleep(Duration::from_micros(microseconds)).await;
@@ -71,7 +68,7 @@ fn a_caller_that_disconnects_at_any_moment_gets_one_answer() {
 #[test]
 fn the_end_of_the_pool_refuses_running_waiting_and_new_tasks() {
     in_real_time(async {
-        let mut bench = integration();
+        let mut bench = study::<2>();
         let mut calls: Vec<_> = (1..=5).map(|n| bench.ask_as(n, heavy())).collect();
         bench.pool.close("shutting down");
         calls.push(bench.ask_as(6, heavy()));
@@ -91,7 +88,7 @@ fn the_end_of_the_pool_refuses_running_waiting_and_new_tasks() {
 #[test]
 fn a_refused_call_takes_no_turn() {
     in_real_time(async {
-        let mut bench = integration();
+        let mut bench = study::<2>();
         let calls = [
             (1, IntegrationStep::default()),
             (2, request("((((", 10)),

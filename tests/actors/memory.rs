@@ -3,10 +3,11 @@
 
 use std::time::Duration;
 
+use crate::study::SettledArm;
 use crate::system::in_real_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use actix::prelude::*;
-use pendularm::actors::compute::integration::Integration;
+use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::limits::{CLIENT_BYTES, MAX_MEMORY};
 use pendularm::actors::gateway::registry::Nodes;
@@ -27,7 +28,8 @@ fn places_and_pools_have_the_documented_sizes() {
 /// A gateway with real computations, on real threads: so this test is in real time.
 async fn computing(answers: usize, workers: &WorkerPool) -> Gateway {
     let mut nodes = Nodes::default();
-    Integration::attach(&Integration::new(workers.clone()).start(), &mut nodes);
+    let arm = SettledArm::<2>.start().recipient();
+    Study::attach(&Study::new(arm, workers.clone()).start(), &mut nodes);
     Gateway::within(Memory::of(1, answers), nodes).await
 }
 

@@ -73,9 +73,10 @@ fn a_nodes_message_on_a_topic_of_the_runtime_reaches_clients_but_not_the_listene
         let mut client = gateway.connect(WIDE);
         client.subscribe("/joint_trajectory").await;
         let msg = json!({"points": []});
+        let frame = messages::publish("/joint_trajectory", &msg);
         gateway.registry.do_send(Publish {
             topic: Topic::JointTrajectory,
-            frame: messages::publish("/joint_trajectory", &msg).into(),
+            frame: Box::new(move || frame),
         });
         assert_eq!(client.receive().await["msg"], msg);
         settle().await;

@@ -148,7 +148,7 @@ fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
             };
             gateway.registry.do_send(Publish {
                 topic: Topic::JointStates,
-                frame: frame.into(),
+                frame: Box::new(move || frame),
             });
             settle().await;
             // One message is being written and one waits. The third replaces the waiting one.
@@ -183,8 +183,7 @@ fn a_panic_in_a_computation_is_answered_and_its_worker_works_on() {
         let mut nodes = Nodes::default();
         let node = Node {
             on_call: Box::new(move |call| {
-                let of = call.caller.connection();
-                pool.submit(of, Box::new(Panicking(call.caller)));
+                pool.submit(Box::new(Panicking(call.caller)));
             }),
             ..Node::default()
         };
@@ -241,7 +240,7 @@ fn a_panic_in_the_registry_ends_the_process() {
         let frame = Bytes::from_owner(Explosive(vec![b'x'; 10], "in the registry"));
         gateway.registry.do_send(Publish {
             topic: Topic::Clock,
-            frame: frame.into(),
+            frame: Box::new(move || frame),
         });
         settle().await;
     });

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use actix::prelude::*;
-use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::nodes::start_in_this_thread;
@@ -133,7 +133,7 @@ impl World {
 
     /// A computation without an owner that panics.
     pub fn submit_panic(&self) {
-        self.pool.submit(RUNTIME, Box::new(Trap));
+        self.pool.submit(Box::new(Trap));
     }
 
     /// Bytes held for all clients together.

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use actix::dev::ToEnvelope;
 use actix::prelude::*;
-use pendularm::actors::ConnectionId;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Unserved, ask, guard};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
@@ -30,10 +29,6 @@ impl<T: Send> Asker<T> for Asking<T> {
         // The answer is stored before it is reported.
         let _ = self.answer.send(answer);
         let _ = self.answered.send(self.connection);
-    }
-
-    fn client(&self) -> Option<ConnectionId> {
-        Some(ConnectionId(self.connection))
     }
 
     fn is_gone(&self) -> bool {

@@ -90,9 +90,10 @@ async fn per_message(subscribers: usize, messages: u32, size: usize) -> f64 {
         if round == 100 {
             before = counted();
         }
+        let frame = frame.clone();
         let message = Publish {
             topic: Topic::JointStates,
-            frame: frame.clone().into(),
+            frame: Box::new(move || frame),
         };
         registry.do_send(message);
         for (client, buffer) in &mut clients {

@@ -16,13 +16,12 @@ pub(super) fn answer<T: Send + 'static>(
     reply: Reply<T>,
     work: impl Work<T> + 'static,
 ) {
-    let of = reply.client();
     let answering = Answering {
         reply: Some(reply),
         has_room: false,
         work,
     };
-    workers.submit(of, Box::new(answering));
+    workers.submit(Box::new(answering));
 }
 
 struct Answering<T, W> {
@@ -47,7 +46,7 @@ impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
                 self.has_room = true;
             } else if let Some(answer) = self.work.advance(work_clock::reading) {
                 // Megabytes take a worker some tenths of a second, in which it does nothing else.
-                reply.answer_here(answer);
+                reply.answer(answer);
                 self.reply = None;
                 break;
             }
@@ -56,11 +55,6 @@ impl<T: Send, W: Work<T>> Computation for Answering<T, W> {
             }
         }
         Progress::Finished
-    }
-
-    fn is_abandoned(&self) -> bool {
-        let reply = self.reply.as_ref();
-        reply.is_some_and(Reply::caller_is_gone)
     }
 
     fn refuse(&mut self, why: &'static str) {

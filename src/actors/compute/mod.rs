@@ -3,6 +3,5 @@
 //! **Invariant:** nothing here blocks an actor's thread for longer than a slice.
 
 mod answering;
-pub mod integration;
 pub mod study;
 pub mod workers;

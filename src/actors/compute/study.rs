@@ -1,4 +1,5 @@
-//! `/study/*`: predictions and offline runs on the worker pool, without effect on the live arm.
+//! `/study/*`, predictions and offline runs, and `/arm_sim/integration_step`, on the worker pool. None has an effect on
+//! the live arm.
 //!
 //! A missing value is requested from the arm when the computation begins. The arm itself does not change. A connection
 //! submits one computation at a time.
@@ -11,15 +12,15 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use super::answering::answer;
-use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use super::workers::{Computation, Progress, WorkerPool};
 use crate::actors::arm::sim::{ArmSettings, HeldLimit};
 use crate::actors::node::{Call, Unserved};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{Node, Service};
-use crate::services::study::Computed;
+use crate::services::study::{Computed, Integrating};
 pub use crate::services::study::{
-    PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline, SuggestGains,
-    Suggested,
+    IntegrationStep, PlanRun, PlannedRun, PredictStability, Predicted, Ran, Refused, RunOffline,
+    SuggestGains, Suggested,
 };
 use crate::study::clocks::{ClockLimits, clock_limits};
 use crate::study::control_loop::ControlLoop;
@@ -45,6 +46,7 @@ impl<const N: usize> Study<N> {
         nodes.serve::<RunOffline<N>>(Service::Rollout, address.clone());
         nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
         nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
+        nodes.serve::<IntegrationStep>(Service::IntegrationStep, address.clone());
     }
 }
 
@@ -70,14 +72,22 @@ impl<const N: usize, A: Computed<N>> Handler<Call<A>> for Study<N> {
     }
 }
 
+/// It does not depend on the arm.
+impl<const N: usize> Handler<Call<IntegrationStep>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<IntegrationStep>, _: &mut Context<Self>) {
+        answer(&self.workers, call.reply, Integrating::Asked(call.ask));
+    }
+}
+
 impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
     type Result = ResponseFuture<Option<ClockLimits>>;
 
     fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
         let (answer, answered) = oneshot::channel();
         let answer = Some(answer);
-        self.workers
-            .submit(RUNTIME, Box::new(Limiting { control, answer }));
+        self.workers.submit(Box::new(Limiting { control, answer }));
         Box::pin(async move { answered.await.ok() })
     }
 }

@@ -111,7 +111,7 @@ impl Handler<Call<Look>> for RosapiNode {
             while reply.reserve(census.most_bytes()).is_err() {
                 sleep(ROOM_RETRY).await;
             }
-            let list = move || reply.answer_here(Listing { look, census });
+            let list = move || reply.answer(Listing { look, census });
             place.perform(list).await;
         };
         ctx.spawn(answered.into_actor(self));

@@ -10,7 +10,7 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, Feedback, FrameOut, Respond};
+use crate::actors::node::{Done, Feedback, Respond};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::Rejections;
@@ -130,7 +130,7 @@ impl ActionClient {
             let write = move || messages::action_feedback(&action, id.as_ref(), &values);
             self.feedback.do_send(Feedback {
                 connection: self.connection,
-                frame: FrameOut::unwritten(write),
+                frame: Box::new(write),
             });
         }
     }
@@ -143,7 +143,7 @@ impl ActionClient {
             move || messages::action_result(&action, id.as_ref(), &values, status as u8, result);
         self.respond.do_send(Respond {
             connection: self.connection,
-            frame: FrameOut::unwritten(write),
+            frame: Box::new(write),
             service: None,
             status: None,
             done: None,

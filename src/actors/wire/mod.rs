@@ -27,7 +27,7 @@ use crate::actors::node::{Asker, Call, Done, FrameOut, Interest, Reply, Respond,
 use crate::actors::resources::long_work::{WorkKind, run_long_work};
 use crate::actors::resources::memory::{Memory, NoRoom, Permit, SHORT, cover};
 use crate::protocol::catalog::{Action, Service, Topic};
-use crate::protocol::messages::{ErrorForm, Level};
+use crate::protocol::messages::Level;
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::json::Payload;
 pub use crate::services::{Address, Answered, Callable};
@@ -175,53 +175,33 @@ pub struct Caller {
     permit: Option<Permit>,
     gone: Arc<AtomicBool>,
     done: Option<Done>,
-    /// The pools for long answers, if the call may have one.
-    memory: Option<Memory>,
+    /// The pools for long answers.
+    memory: Memory,
 }
 
 impl Caller {
-    /// The client `connection`, which called `service`, spelled `name`. The receiver ends with the call.
+    /// The client `connection`, which called the service of `address`. `memory` has the pools for long answers, and
+    /// `permit` is that of the call's frame, if it was long. The receiver ends with the call.
     #[must_use]
     pub fn new(
         registry: Recipient<Respond>,
         connection: ConnectionId,
-        service: Service,
-        name: Box<str>,
-        id: Option<Payload>,
+        address: Address,
         gone: Arc<AtomicBool>,
+        memory: Memory,
+        permit: Option<Permit>,
     ) -> (Self, oneshot::Receiver<()>) {
         let (done, ended) = guard();
         let caller = Self {
             registry,
             connection,
-            address: Some(Address::new(service, name, id)),
-            permit: None,
+            address: Some(address),
+            permit,
             gone,
             done: Some(done),
-            memory: None,
+            memory,
         };
         (caller, ended)
-    }
-
-    /// Sets the pools for long answers. `asked` is the permit of the call's frame, if that was long.
-    #[must_use]
-    pub fn within(mut self, memory: Memory, asked: Option<Permit>) -> Self {
-        self.memory = Some(memory);
-        self.permit = asked;
-        self
-    }
-
-    /// The form in which the caller gets the reason of a failed call.
-    #[must_use]
-    pub fn with_errors(mut self, form: ErrorForm) -> Self {
-        self.address = self.address.take().map(|address| address.with_errors(form));
-        self
-    }
-
-    /// The connection that called.
-    #[must_use]
-    pub fn connection(&self) -> ConnectionId {
-        self.connection
     }
 
     /// The caller's `id`, which the response echoes.
@@ -242,13 +222,10 @@ impl Caller {
     /// # Errors
     /// While other answers use it.
     pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        let (Some(address), Some(memory)) = (&self.address, &self.memory) else {
-            return Ok(());
-        };
-        let id = address.id().map_or(0, |id| id.get().len());
+        let id = self.id().map_or(0, |id| id.get().len());
         let bytes = bytes.saturating_add(id);
         if bytes > SHORT {
-            self.permit = Some(memory.answer(bytes)?);
+            self.permit = Some(self.memory.answer(bytes)?);
         }
         Ok(())
     }
@@ -279,14 +256,14 @@ impl Caller {
             let service = address.service();
             let permit = self.permit.take();
             let write = move || cover(permit.as_ref(), write(&address));
-            self.send(service, FrameOut::unwritten(write), done);
+            self.send(service, Box::new(write), done);
         }
     }
 
     fn answer_at_once(&mut self, write: impl FnOnce(&Address) -> Bytes) {
         if let Some(address) = self.address.take() {
             let frame = cover(self.permit.as_ref(), write(&address));
-            self.send(address.service(), frame.into(), None);
+            self.send(address.service(), Box::new(move || frame), None);
         }
     }
 
@@ -328,10 +305,6 @@ impl<T: Send + 'static> Asker<T> for ClientAsker<T> {
     fn answer_here(self: Box<Self>, answer: T) {
         let Self { mut caller, write } = *self;
         caller.answer_at_once(|address| write(answer, address));
-    }
-
-    fn client(&self) -> Option<ConnectionId> {
-        Some(self.caller.connection())
     }
 
     fn is_gone(&self) -> bool {

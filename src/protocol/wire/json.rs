@@ -367,7 +367,7 @@ fn next_of(bytes: &[u8], at: usize, wanted: impl Fn(u8) -> bool) -> Option<usize
 }
 
 /// The index after the string that begins at `open`; the end of the text if it is not closed.
-fn string_end(bytes: &[u8], open: usize) -> usize {
+pub(crate) fn string_end(bytes: &[u8], open: usize) -> usize {
     let mut at = open + 1;
     while let Some(found) = next_of(bytes, at, |byte| matches!(byte, b'"' | b'\\')) {
         if bytes.get(found) == Some(&b'"') {

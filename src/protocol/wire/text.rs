@@ -49,19 +49,6 @@ pub(crate) fn push_plain(text: &mut String, character: char) {
     }
 }
 
-/// The same inside a JSON string, which YAML reads too.
-#[cfg(feature = "cli")]
-pub(crate) fn push_quoted(text: &mut String, character: char) {
-    match character {
-        '"' | '\\' => text.extend(['\\', character]),
-        '\n' => text.push_str("\\n"),
-        _ if acts(character) => {
-            let _ = write!(text, "\\u{:04x}", u32::from(character));
-        }
-        _ => text.push(character),
-    }
-}
-
 /// Describes a JSON value at the end of a sentence: the value itself if it is short, else its kind.
 pub(crate) fn found(raw: &RawValue) -> String {
     match raw.get() {

@@ -19,7 +19,7 @@ fn a_response_of_the_arm_discards_throttled_messages_of_its_state() {
         client.receive().await;
         let publish = |n: u64| Publish {
             topic: Topic::JointStates,
-            frame: messages::publish("/joint_states", &json!({"n": n})).into(),
+            frame: Box::new(move || messages::publish("/joint_states", &json!({"n": n}))),
         };
         for n in 0..2 {
             gateway.registry.do_send(publish(n));

@@ -78,7 +78,7 @@ fn several_frames_leave_in_one_write_but_not_to_a_client_that_ends_no_line() {
             for n in 0..5 {
                 gateway.registry.do_send(Publish {
                     topic: Topic::JointStates,
-                    frame: messages::publish("/joint_states", &json!({"n": n})).into(),
+                    frame: Box::new(move || messages::publish("/joint_states", &json!({"n": n}))),
                 });
             }
             settle().await;

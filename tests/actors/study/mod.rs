@@ -22,9 +22,8 @@ use pendularm::actors::arm::sim::{
     ArmSettings, HeldLimit, Present, Reset, SetGains, SetIntegrator, SetLimitPredictor, SetParams,
     SetPeriod,
 };
-use pendularm::actors::compute::integration::{Integration, IntegrationStep};
 use pendularm::actors::compute::study::{
-    PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,
+    IntegrationStep, PlanRun, PredictStability, Refused, RunOffline, Study, SuggestGains,
 };
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Nodes;
@@ -49,7 +48,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::{sleep, timeout};
 
 /// An arm with settings of its own, none of them the default.
-struct SettledArm<const N: usize>;
+pub struct SettledArm<const N: usize>;
 
 impl<const N: usize> Actor for SettledArm<N> {
     type Context = Context<Self>;
@@ -98,7 +97,7 @@ impl<const N: usize> Handler<ArmSettings<N>> for SettledArm<N> {
 }
 
 /// The node on a pool with one worker.
-fn study<const N: usize>() -> PoolBench<Study<N>> {
+pub fn study<const N: usize>() -> PoolBench<Study<N>> {
     let arm = SettledArm::<N>.start();
     PoolBench::new(|pool| Study::new(arm.recipient(), pool))
 }

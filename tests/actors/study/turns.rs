@@ -53,10 +53,8 @@ fn light_requests_are_answered_between_slices_of_heavy_ones() {
 async fn turns_until_integrated(others: u64) -> u32 {
     let (answered, mut order) = mpsc::unbounded_channel();
     let pool = WorkerPool::without_threads();
-    let study = Study::new(SettledArm::<2>.start().recipient(), pool.clone())
-        .start()
-        .recipient();
-    let integration = Integration::new(pool.clone()).start().recipient();
+    let node = Study::new(SettledArm::<2>.start().recipient(), pool.clone()).start();
+    let (study, integration) = (node.clone().recipient(), node.recipient());
     for connection in 1..=others {
         ask_as(&study, connection, &answered, heavy());
     }

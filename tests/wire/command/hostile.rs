@@ -182,8 +182,8 @@ fn values_that_say_nothing_to_a_command_are_not_spread_out() {
         let address = server(move |stream| {
             let value = "[[[1]]],".repeat(500_000);
             let foreign = format!("{{\"op\":\"service_response\",\"{member}\":[{value}1]}}\n");
-            // The command has asked for type and fields before.
-            let answer = "{\"op\":\"service_response\",\"id\":3,\"values\":{},\"result\":true}\n";
+            // The command has asked for the type before.
+            let answer = "{\"op\":\"service_response\",\"id\":2,\"values\":{},\"result\":true}\n";
             let _ = stream.write_all((foreign + answer).as_bytes());
             hold(stream);
         });
@@ -210,15 +210,14 @@ fn yaml_is_printed_before_all_of_it_is_written() {
 
 #[test]
 fn a_frame_that_no_runtime_sends_is_read_no_further() {
-    for (command, limit) in [(ECHO, 4 * 1024 * 1024 + 1), (CALL, 80 * 1024 * 1024)] {
+    for command in [ECHO, CALL] {
         let address = server(move |stream| {
             let chunk = [b' '; 1 << 16];
             while stream.write_all(&chunk).is_ok() {}
         });
         let (status, out, complaint) = end(start(&command, &address));
         assert_eq!((status, out.as_str()), (Some(3), ""));
-        let expected =
-            format!("pendularm: the connection ended: a frame is longer than {limit} bytes\n");
+        let expected = "pendularm: the connection ended: a frame is longer than 83886080 bytes\n";
         assert_eq!(complaint, expected);
     }
 }

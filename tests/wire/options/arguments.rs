@@ -39,7 +39,7 @@ proptest! {
     ) {
         let arguments = std::iter::once("pendularm".to_owned()).chain(arguments);
         if let Err(error) = Options::parse(arguments) {
-            let line = error.to_string();
+            let line = pendularm::output::line(&error);
             prop_assert!(!line.is_empty() && !line.contains(char::is_control), "{line:?}");
         }
     }

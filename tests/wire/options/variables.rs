@@ -64,7 +64,7 @@ fn every_variable_is_taken_and_a_wrong_one_is_refused_by_name_and_value() {
         #[cfg(feature = "web")]
         ("ARM_SIM_ALLOW_ORIGIN", "null,https://example.org", "*"),
         #[cfg(feature = "web")]
-        ("ARM_SIM_STRICT_ORIGIN", "1", "maybe"),
+        ("ARM_SIM_STRICT_ORIGIN", "true", "1"),
     ] {
         assert_taken(&TAKEN, &[(variable, value)]);
         let refused = refusal(&[], &[(variable, wrong)]);

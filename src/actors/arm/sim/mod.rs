@@ -10,7 +10,6 @@ mod node;
 mod orders;
 mod requests;
 mod turn;
-mod waiting;
 mod world;
 
 pub use self::messages::{

@@ -18,14 +18,15 @@ use tokio::time::Instant;
 
 use super::messages::{AddBarrier, ArmSettings, HeldLimit, SetLimitPredictor};
 use super::turn::Turn;
-use super::waiting::Steps;
 use super::world::ArmWorld;
-use crate::actors::node::{Barrier, Interest, Publish};
+use crate::actors::node::{Barrier, Interest, Publish, Reply};
 use crate::actors::resources::gauges::Gauges;
-use crate::live::{GoalProgress, LiveArm, PUBLISH_RATE, STEP_PAUSE};
+use crate::live::{GoalProgress, LiveArm, PUBLISH_RATE, STEP_PAUSE, StepsAsked};
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::math::simulation::ArmInput;
+use crate::protocol::op::fields::Rejections;
+use crate::services::arm::Stepped;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -46,6 +47,12 @@ pub struct ArmSim<const N: usize> {
     pub(super) owners: Vec<Recipient<Barrier>>,
     /// Feedback of the goal that has been sent and not yet arrived.
     pub(super) feedback_sent: Option<Pin<Box<RecipientRequest<GoalProgress<N>>>>>,
+}
+
+/// Requested steps that are not all taken, with the reply.
+pub(super) struct Steps<const N: usize> {
+    pub(super) asked: StepsAsked<N>,
+    pub(super) reply: Reply<Result<Stepped<N>, Rejections>>,
 }
 
 impl<const N: usize> ArmSim<N> {

@@ -8,9 +8,8 @@
 
 use actix::prelude::*;
 
-use super::node::{ArmSim, pass_barriers};
+use super::node::{ArmSim, Steps, pass_barriers};
 use super::orders;
-use super::waiting::Steps;
 use crate::actors::node::{Call, ShutDown, Unserved};
 use crate::actors::wire::Nodes;
 use crate::live::ArmRequest;

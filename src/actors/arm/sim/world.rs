@@ -9,7 +9,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use crate::actors::node::{FrameOut, Publish};
+use crate::actors::node::Publish;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::work_clock;
 use crate::live::{GoalProgress, World};
@@ -36,7 +36,7 @@ impl<const N: usize> World<N> for ArmWorld<N> {
     }
 
     fn publish(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
-        let frame = FrameOut::unwritten(write);
+        let frame = Box::new(write);
         self.publish.do_send(Publish { topic, frame });
     }
 

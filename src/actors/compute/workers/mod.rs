@@ -1,10 +1,8 @@
 //! A few threads that compute long requests in slices, so no client waits for a million steps of another one.
 //!
 //! A computation is advanced for one slice, and then queued at the end: round robin. A connection has at most one
-//! computation here at a time (the others wait in the connection), so each connection has the same share.
-//!
-//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection. Computations of
-//! disconnected callers are removed.
+//! computation here at a time (the others wait in the connection), so each connection has the same share. The
+//! computation of a disconnected caller ends at its next slice.
 //!
 //! **Invariant:** a computation is advanced, refused and dropped outside the lock. A panic ends neither its worker
 //! nor another computation.
@@ -14,19 +12,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::actors::ConnectionId;
 use crate::actors::panics::contain;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::resources::work_clock;
-use crate::options::MAX_CLIENTS;
 
 /// Longest time of one computation on a worker before the next one. It is short compared with the 5 ms by which a
 /// client may be delayed, and long compared with the cost of switching.
 pub const SLICE: Duration = Duration::from_millis(1);
-/// Most computations at once, waiting or running: one for each connection.
-pub const MAX_ADMITTED: usize = MAX_CLIENTS;
-/// The refusal when there are too many computations.
-pub const BUSY: &str = "busy: too many computations of all clients wait; try again later";
 /// Pause between two tries of computations that cannot begin.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
 /// Computations that try at the same time.
@@ -48,19 +40,9 @@ pub trait Computation: Send {
     /// Works until `deadline` or its end, and sends the answer at its end.
     fn advance(&mut self, deadline: Instant) -> Progress;
 
-    /// Whether the caller has disconnected, so the computation can be dropped.
-    fn is_abandoned(&self) -> bool {
-        false
-    }
-
     /// Sends the answer that the runtime is ending. The computation is dropped afterwards.
     fn refuse(&mut self, why: &'static str);
 }
-
-/// The client of a computation; `None` for the runtime's own.
-pub type Owner = Option<ConnectionId>;
-/// The owner of the runtime's own computations.
-pub const RUNTIME: Owner = None;
 
 type Job = Box<dyn Computation>;
 
@@ -93,15 +75,6 @@ impl Queue {
 
     fn admitted(&self) -> usize {
         self.ready.len() + self.running + self.waiting.len()
-    }
-
-    /// Removes the computations of disconnected callers.
-    fn take_abandoned(&mut self) -> Vec<Job> {
-        self.retry(usize::MAX);
-        let ready = std::mem::take(&mut self.ready).into_iter();
-        let (gone, left): (Vec<Job>, _) = ready.partition(|job| job.is_abandoned());
-        self.ready = left.into();
-        gone
     }
 
     fn next(&mut self) -> Option<Job> {
@@ -157,24 +130,14 @@ impl WorkerPool {
         thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).clamp(1, 4))
     }
 
-    /// Accepts a computation for a client. It is refused if the pool is closed or full. The runtime's own
-    /// computations are always accepted.
-    pub fn submit(&self, of: impl Into<Owner>, mut computation: Job) {
-        let is_own = of.into() == RUNTIME;
-        // Dropped outside the lock, because each sends an answer to its caller.
-        let mut abandoned = Vec::new();
-        let why = {
-            let mut queue = self.lock();
-            if queue.admitted() >= MAX_ADMITTED {
-                abandoned.extend(queue.take_abandoned());
-            }
-            if queue.closed.is_none() && (is_own || queue.admitted() < MAX_ADMITTED) {
-                queue.ready.push_back(computation);
-                self.shared.1.notify_one();
-                return;
-            }
-            queue.closed.unwrap_or(BUSY)
+    /// Accepts a computation, or refuses it if the pool is closed.
+    pub fn submit(&self, mut computation: Job) {
+        let mut queue = self.lock();
+        let Some(why) = queue.closed else {
+            queue.ready.push_back(computation);
+            return self.shared.1.notify_one();
         };
+        drop(queue);
         computation.refuse(why);
     }
 

@@ -553,8 +553,7 @@ impl Performer {
         }
     }
 
-    /// Releases the client's memory permit, unless a long frame `is_coming` or pieces of one are kept. Called before
-    /// the client is read again.
+    /// Releases the client's memory permit, unless a long frame `is_coming` or pieces of one are kept.
     fn give_back(&mut self, is_coming: bool) {
         if !is_coming && self.fragments.allocated() <= SHORT {
             self.permit = None;
@@ -687,9 +686,10 @@ impl Performer {
     /// Sends a frame to the client through the registry. Its mailbox may still have a response to an earlier frame,
     /// which must arrive first.
     async fn say(&self, frame: Bytes, status: Option<Level>) -> OpOutcome {
+        let frame = cover(self.permit.as_ref(), frame);
         let respond = Respond {
             connection: self.id,
-            frame: cover(self.permit.as_ref(), frame).into(),
+            frame: Box::new(move || frame),
             service: None,
             status,
             done: None,

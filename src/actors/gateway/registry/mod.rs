@@ -320,7 +320,7 @@ impl Handler<Respond> for Registry {
                 .status
                 .is_none_or(|level| client.verbosity.wants(level))
         {
-            let frame = respond.frame.write();
+            let frame = (respond.frame)();
             if let (Some(tap), Some(service)) = (&mut self.tap, respond.service) {
                 tap(Tapped::Answered {
                     to: respond.connection,

@@ -211,7 +211,7 @@ impl Handler<Publish> for Registry {
         if !self.is_wanted(name) {
             return;
         }
-        let frame = frame.write();
+        let frame = frame();
         if let Some(tap) = &mut self.tap {
             tap(Tapped::Published(topic, &frame));
         }

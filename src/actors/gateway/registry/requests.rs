@@ -25,7 +25,7 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::{ActionGoal, Arguments, CallService, GoalStatus, Problem};
 use crate::protocol::wire::json::Payload;
-use crate::services::NoService;
+use crate::services::{Address, NoService};
 
 // ---- to the runtime's own nodes -------------------------------------------------------------------------------------
 
@@ -53,20 +53,20 @@ impl Registry {
                             args: call.args.payload(),
                         });
                     }
+                    let address = Address::new(service, call.service.into_boxed_str(), origin.id)
+                        .with_errors(client.outlets.error_form());
                     let (caller, ended) = Caller::new(
                         ctx.address().recipient(),
                         origin.from,
-                        service,
-                        call.service.into_boxed_str(),
-                        origin.id,
+                        address,
                         Arc::clone(&client.outlets.gone),
+                        self.gauges.memory().clone(),
+                        self.permit.clone(),
                     );
                     node(ServiceCall {
                         service,
                         arguments: call.args,
-                        caller: caller
-                            .within(self.gauges.memory().clone(), self.permit.clone())
-                            .with_errors(client.outlets.error_form()),
+                        caller,
                     });
                     return Handled::with(ended);
                 }
@@ -196,7 +196,7 @@ impl Handler<Feedback> for Registry {
 
     fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
         if let Some(client) = self.clients.get(&feedback.connection) {
-            client.deliver_feedback(feedback.frame.write());
+            client.deliver_feedback((feedback.frame)());
         }
     }
 }

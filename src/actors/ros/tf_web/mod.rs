@@ -9,7 +9,6 @@
 //! **Invariant:** nothing is requested from the arm without a request and a subscriber. A connection has
 //! at most [`MAX_FRAME_SUBSCRIPTIONS`] requests.
 
-mod answers;
 mod wire;
 
 use std::collections::VecDeque;
@@ -18,6 +17,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use serde::Serialize;
+use serde_json::{Value, json};
 use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
@@ -25,8 +25,8 @@ use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, CancelSent, ForwardGoal};
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::scene::{WORLD, frames, seen_from};
-use crate::protocol::messages::{Empty, Stamp};
+use crate::protocol::messages::scene::{TfMessage, WORLD, frames, seen_from};
+use crate::protocol::messages::{Empty, Header, Stamp};
 use crate::protocol::op::GoalStatus;
 
 /// Most requests of one connection. The oldest one ends when another arrives.
@@ -313,7 +313,7 @@ impl<const N: usize> TfRepublisher<N> {
             match &subscription.by {
                 FrameReceiver::Client(client) => client.feed_back(message),
                 FrameReceiver::Topic { id, .. } => {
-                    let message = answers::feedback(stamp, id.clone(), message);
+                    let message = published(stamp, id, &message);
                     publish(&self.publish, Topic::TfWebFeedback, message);
                 }
             }
@@ -324,6 +324,15 @@ impl<const N: usize> TfRepublisher<N> {
 /// The next due time of a message that was due at `due` and is sent `now`. A delay of up to a period is made up.
 fn next(due: Instant, period: Duration, now: Instant) -> Instant {
     (due + period).max(now)
+}
+
+/// A `tf2_web_republisher/TFSubscriptionActionFeedback` under the id of the request. The status 1 is `active` in ROS 1.
+fn published(stamp: Stamp, id: &str, feedback: &TfMessage) -> Value {
+    json!({
+        "header": Header { stamp, frame_id: "" },
+        "status": {"goal_id": {"stamp": stamp, "id": id}, "status": 1, "text": ""},
+        "feedback": feedback,
+    })
 }
 
 fn publish(to: &Recipient<Publish>, topic: Topic, message: impl Serialize + Send + 'static) {

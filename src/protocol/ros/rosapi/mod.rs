@@ -16,7 +16,7 @@ pub use self::graph::{Census, ListedService, ListedTopic, MAX_LISTED};
 use self::graph::{
     ServedRow, actions, named, node_details, node_name, node_names, services, topics,
 };
-pub use self::typedef::TypeDef;
+pub use self::typedef::{TypeDef, asked_type};
 use self::typedef::{details, interfaces};
 use crate::protocol::catalog::{Node, Rosapi, Service, types};
 use crate::protocol::names;

@@ -31,8 +31,9 @@ pub struct TypeDef {
     pub constvalues: Vec<&'static str>,
 }
 
-/// The type of that name, field by field; `None` if it is unknown.
-pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
+/// The type whose fields the question asks for: a message type, or a part of a service's or an action's type.
+#[must_use]
+pub fn asked_type(question: Rosapi, name: &str) -> Option<Type> {
     let service = || own_services().find(|one| same_service_type(one.type_name(), name));
     let action = || {
         let mut all = Action::ALL.into_iter();
@@ -40,16 +41,32 @@ pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
         action.map(Action::parts)
     };
     Some(match question {
-        Rosapi::MessageDetails => typedefs(types::find(name)?),
-        Rosapi::ServiceRequestDetails => part_typedefs(service()?, "Request", service()?.fields()),
+        Rosapi::MessageDetails => types::find(name)?,
+        Rosapi::ServiceRequestDetails => message(service()?.type_name(), service()?.fields()),
         Rosapi::ServiceResponseDetails => {
-            part_typedefs(service()?, "Response", service()?.response_fields())
+            message(service()?.type_name(), service()?.response_fields())
         }
-        Rosapi::ActionGoalDetails => action().map(|[goal, _, _]| typedefs(goal))?,
-        Rosapi::ActionResultDetails => action().map(|[_, result, _]| typedefs(result))?,
-        Rosapi::ActionFeedbackDetails => action().map(|[_, _, feedback]| typedefs(feedback))?,
+        Rosapi::ActionGoalDetails => action().map(|[goal, _, _]| goal)?,
+        Rosapi::ActionResultDetails => action().map(|[_, result, _]| result)?,
+        Rosapi::ActionFeedbackDetails => action().map(|[_, _, feedback]| feedback)?,
         _ => return None,
     })
+}
+
+/// That type and all types in it, field by field; `None` if it is unknown.
+pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
+    let all = types::with_parts(asked_type(question, name)?).into_iter();
+    let mut all: Vec<TypeDef> = all
+        .map(|one| TypeDef::new(names::short_type(one.name), &one))
+        .collect();
+    if let Some(first) = all.first_mut() {
+        first.name += match question {
+            Rosapi::ServiceRequestDetails => "_Request",
+            Rosapi::ServiceResponseDetails => "_Response",
+            _ => "",
+        };
+    }
+    Some(all)
 }
 
 /// Every type that the runtime knows, each once.
@@ -58,22 +75,6 @@ pub(super) fn interfaces() -> BTreeSet<&'static str> {
     let services = own_services().map(Service::type_name);
     let actions = Action::ALL.into_iter().map(Action::type_name);
     messages.chain(services).chain(actions).collect()
-}
-
-/// A type and all types in it.
-fn typedefs(first: Type) -> Vec<TypeDef> {
-    let all = types::with_parts(first).into_iter();
-    all.map(|one| TypeDef::new(names::short_type(one.name), &one))
-        .collect()
-}
-
-/// One part of a service's type, and all types in it.
-fn part_typedefs(service: Service, part: &str, fields: &'static [Field]) -> Vec<TypeDef> {
-    let mut all = typedefs(message(service.type_name(), fields));
-    if let Some(first) = all.first_mut() {
-        first.name = format!("{}_{part}", first.name);
-    }
-    all
 }
 
 impl TypeDef {
