@@ -15,7 +15,6 @@ use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::memory::Memory;
 use pendularm::actors::resources::work_clock;
-use pendularm::math::pid::Gains;
 use tokio::io::{DuplexStream, duplex};
 use tokio::time::sleep;
 
@@ -165,9 +164,7 @@ fn start<const N: usize>(
     pool: &WorkerPool,
     seed: u64,
     nodes: &mut Nodes,
-) where
-    Gains<N>: Default,
-{
+) {
     let started = start_nodes::<N>(registry, gauges, pool, seed, nodes);
     started
         .arm

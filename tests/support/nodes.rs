@@ -33,10 +33,7 @@ pub async fn start_whole<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     seed: u64,
-) -> Started<N>
-where
-    Gains<N>: Default,
-{
+) -> Started<N> {
     let mut nodes = Nodes::default();
     let pool = WorkerPool::without_threads();
     let started = start_nodes(registry, gauges, &pool, seed, &mut nodes);
@@ -51,10 +48,7 @@ pub fn start_nodes<const N: usize>(
     pool: &WorkerPool,
     seed: u64,
     nodes: &mut Nodes,
-) -> Started<N>
-where
-    Gains<N>: Default,
-{
+) -> Started<N> {
     let publish = || registry.clone().recipient();
     let arm = ArmSim::<N>::new(
         Arm::default(),
