@@ -16,7 +16,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
-use pendularm::report::experiments::reference::{Law, ReferenceMotion};
+use pendularm::report::experiments::reference::{DoubleDouble, Law, ReferenceMotion};
 use pendularm::study::taylor::TaylorReference;
 
 /// Duration of the swing \[s\].
@@ -58,7 +58,7 @@ fn start<const N: usize>() -> State<N> {
 
 fn reference<const N: usize>() {
     let motion = ReferenceMotion::new(&Arm::<N>::default(), &start(), &Law::FREE, DURATION);
-    let end = motion.state(DURATION).position;
+    let end = motion.angles(DURATION).map(DoubleDouble::to_f64);
     let angles: Vec<String> = end.iter().map(|q| format!("{q:?}")).collect();
     println!("{} {:e}", angles.join(" "), motion.uncertainty(DURATION));
 }
@@ -130,7 +130,7 @@ fn all<const N: usize, const M: usize>(angles: &[f64]) {
         || {
             let start = black_box(start::<N>());
             let motion = ReferenceMotion::new(&arm, &start, &Law::FREE, DURATION);
-            Some(motion.state(DURATION).position)
+            Some(motion.angles(DURATION).map(DoubleDouble::to_f64))
         },
     );
     ode_solvers::<N, M>(angles, &arm);
