@@ -157,7 +157,7 @@ impl<const N: usize, const M: usize> System<f64, SVector<f64, M>> for FirstOrder
 
 fn ode_solvers<const N: usize, const M: usize>(angles: &[f64], arm: &Arm<N>) {
     let first = || SVector::<f64, M>::from_fn(|i, _| if i < N { START.0 } else { START.1 });
-    let angles = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
+    let position = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
     // Both have the same functions, but no common trait.
     macro_rules! sweep {
         ($solver:ident, $name:literal) => {
@@ -174,7 +174,7 @@ fn ode_solvers<const N: usize, const M: usize>(angles: &[f64], arm: &Arm<N>) {
                     );
                     solver.set_output(OutputType::Sparse);
                     solver.integrate().ok()?;
-                    solver.y_out().last().map(|y| angles(y.as_slice()))
+                    solver.y_out().last().map(|y| position(y.as_slice()))
                 });
             }
         };
