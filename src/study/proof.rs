@@ -76,8 +76,8 @@ pub(super) struct Proven<const N: usize> {
     pub(super) pose: [f64; N],
 }
 
-/// The most memory of a proof, and of every search that contains one, in bytes. It is that of the boxes, in a tree whose
-/// nodes are at least half full. All else is far less than the difference from the usual two thirds.
+/// The most memory of a proof, and of every search that contains one, in bytes: its boxes, in a tree whose nodes are at
+/// least half full. They are usually fuller, and all other memory is less than this reserve.
 pub const fn most_bytes<const N: usize>() -> usize {
     2 * (MAX_BOXES as usize + 2) * size_of::<((u64, u32), Angles<N>)>()
 }

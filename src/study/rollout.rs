@@ -187,7 +187,7 @@ pub async fn rollout<const N: usize>(
         from_ideal: ideals.as_ref().map(|_| Deviation::default()),
         ..Rollout::default()
     };
-    // References evaluate the law in every step. Without a law a step of theirs, and a piece, stays short.
+    // With a law, references follow every step. Without one, short spans keep the pieces short.
     let stride = if ideals.is_some() {
         1
     } else {
