@@ -235,10 +235,10 @@ impl<const N: usize> PoseSearch<N> {
 fn outer_poses<const N: usize>() -> Vec<[f64; N]> {
     let whole = around::<N>();
     let mut poses = vec![[0.0; N]];
-    for joint in 1..N {
-        let first = if joint == 1 { whole / 2 } else { 1 };
+    for joint in (1..N).rev() {
+        let first = if joint == 1 { whole / 2 } else { 0 };
         let turned = |mut pose: [f64; N]| {
-            (first..=whole).map(move |part| {
+            (first..whole + u32::from(joint == 1)).map(move |part| {
                 pose[joint] = part_of_turn(part, whole);
                 pose
             })
