@@ -6,10 +6,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
 /// The default gains without damping, and with hardly an integral, which would drive an undamped arm away.
-pub fn undamped<const N: usize>() -> Gains<N>
-where
-    Gains<N>: Default,
-{
+pub fn undamped<const N: usize>() -> Gains<N> {
     let gains = Gains::default();
     Gains {
         kp: gains.kp,
@@ -24,10 +21,7 @@ pub fn ready<const N: usize>(
     integral: bool,
     control: bool,
     method: Method,
-) -> Simulation<N>
-where
-    Gains<N>: Default,
-{
+) -> Simulation<N> {
     let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
     let mut gains = Gains::default();
     if !integral {

@@ -87,10 +87,7 @@ fn begin<const N: usize>(
     timestep: f64,
     period: ControlPeriod,
     gains: Option<&Object<'_>>,
-) -> PyResult<Mutex<Loop<N>>>
-where
-    Gains<N>: Default,
-{
+) -> PyResult<Mutex<Loop<N>>> {
     let mut one = Loop::new(arm, gains::read(gains, Gains::default())?);
     one.set_method(method);
     one.set_timestep(timestep);

@@ -46,10 +46,7 @@ pub fn start_arm<const N: usize>(
     workers: &WorkerPool,
     seed: u64,
     nodes: &mut Nodes,
-) -> Addr<ArmSim<N>>
-where
-    Gains<N>: Default,
-{
+) -> Addr<ArmSim<N>> {
     let publish = registry.clone().recipient();
     let gauges = Arc::clone(gauges);
     let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();

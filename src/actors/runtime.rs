@@ -239,10 +239,7 @@ fn start_nodes<const N: usize>(
     arm_thread: &Arbiter,
     workers: &WorkerPool,
     nodes: &mut Nodes,
-) -> NodeEnds
-where
-    Gains<N>: Default,
-{
+) -> NodeEnds {
     let publish = registry.clone().recipient();
     let gauges = Arc::clone(gauges);
     let period = options.control_period;

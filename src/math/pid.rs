@@ -41,34 +41,27 @@ pub struct Gains<const N: usize, T = f64> {
     pub kd: [T; N],
 }
 
-/// Gains for the default 2-link arm. They reach any setpoint within ±2π, from rest or from a free swing, to 0.02 rad
-/// and 0.02 m within 2 s. They are stable in every pose up to a timestep of 4.3 ms.
+/// Gains for the default arm of 2 or 3 links. They reach any setpoint within ±2π, from rest or from a free swing, to
+/// 0.02 rad and 0.02 m: within 2 s with 2 links, within 3.6 s with 3. They are stable in every pose up to a timestep of
+/// 4.3 ms with 2 links, and of 3.0 ms with 3.
+///
+/// A search for the least oscillation found those of 3 links (`benches/src/bin/default_gains.rs`). Its criterion: once
+/// all joints are slower than 0.01 rad/s, the effort is within 2 % of the gravity load. This holds on 94 of 100 moves,
+/// and on 78 of 100 with links of 2 kg. In the other moves a joint is slow because it turns back, or the load is small
+/// compared with that of the stretched arm. Moves within ±2π do not diverge at 3 ms; some of 4π at every joint do. The
+/// last joint has little damping, because `kd dt` of that joint limits the timestep.
 ///
 /// Other numbers of links have no default: gains must fit the inertia that each joint moves.
-impl Default for Gains<2> {
+impl<const N: usize> Default for Gains<N> {
     fn default() -> Self {
+        const { assert!(N == 2 || N == 3, "default gains are those of 2 and 3 links") };
+        let of = |two: [f64; 2], three: [f64; 3]| {
+            std::array::from_fn(|i| if N == 2 { two[i] } else { three[i] })
+        };
         Self {
-            kp: [1000.0, 250.0],
-            ki: [3000.0, 750.0],
-            kd: [110.0, 22.0],
-        }
-    }
-}
-
-/// Gains for the default 3-link arm: as for two links, but within 3.6 s. They are stable in every pose up to a
-/// timestep of 3.0 ms.
-///
-/// A search for the least oscillation found them (`benches/src/bin/default_gains.rs`). Its criterion: once all joints
-/// are slower than 0.01 rad/s, the effort is within 2 % of the gravity load. This holds on 94 of 100 moves, and on 78
-/// of 100 with links of 2 kg. In the other moves a joint is slow because it turns back, or the load is small compared
-/// with that of the stretched arm. Moves within ±2π do not diverge at 3 ms; some of 4π at every joint do. The last
-/// joint has little damping, because `kd dt` of that joint limits the timestep.
-impl Default for Gains<3> {
-    fn default() -> Self {
-        Self {
-            kp: [2200.0, 180.0, 80.0],
-            ki: [3500.0, 300.0, 185.0],
-            kd: [160.0, 38.0, 4.8],
+            kp: of([1000.0, 250.0], [2200.0, 180.0, 80.0]),
+            ki: of([3000.0, 750.0], [3500.0, 300.0, 185.0]),
+            kd: of([110.0, 22.0], [160.0, 38.0, 4.8]),
         }
     }
 }

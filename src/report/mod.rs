@@ -13,7 +13,7 @@ mod html;
 mod machine;
 pub mod scenes;
 mod section;
-mod svg;
+pub mod svg;
 mod timing;
 
 use std::fs;

@@ -82,10 +82,7 @@ impl LiveScene {
         }
     }
 
-    fn control<const N: usize>(&self) -> Result<ControlLoop<N>, String>
-    where
-        Gains<N>: Default,
-    {
+    fn control<const N: usize>(&self) -> Result<ControlLoop<N>, String> {
         let settings = &self.settings;
         let (params, standard) = (&settings["params"], Arm::<N>::default());
         let arm = Arm::new(
@@ -119,10 +116,7 @@ impl LiveScene {
             }))
     }
 
-    fn run<const N: usize>(&self) -> Result<LiveRun, String>
-    where
-        Gains<N>: Default,
-    {
+    fn run<const N: usize>(&self) -> Result<LiveRun, String> {
         /// Samples of a picture.
         const SAMPLES: u64 = 120;
         let control = self.control::<N>()?;

@@ -7,6 +7,7 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::svg::{HEIGHT, Key, Marker, Plot, STYLE, WIDTH, csv, escape, lines};
 use crate::math::count::length_in_f64;
@@ -19,7 +20,8 @@ pub(crate) struct Section {
     /// Sentences for the head of the report.
     pub(crate) findings: Vec<String>,
     pub(crate) verdicts: Vec<Verdict>,
-    pub(super) tables: Vec<TableText>,
+    /// Tables in words alone.
+    pub(super) tables: Vec<Value>,
     /// Run time \[s\], and the program's version.
     pub(crate) seconds: f64,
     pub(crate) version: String,
@@ -45,15 +47,6 @@ pub(crate) struct Verdict {
     pub(crate) holds: bool,
 }
 
-/// A table in words alone.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct TableText {
-    name: String,
-    title: String,
-    head: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
 /// Placeholder of a figure's number, which the page inserts.
 pub(super) const NUMBER: &str = "Figure #.";
 
@@ -63,10 +56,6 @@ impl Section {
         if self.quick { quick } else { full }
     }
 
-    pub(crate) fn find(&mut self, finding: String) {
-        self.findings.push(finding);
-    }
-
     pub(crate) fn claim(&mut self, claim: impl Into<String>, seen: impl Into<String>, holds: bool) {
         let (claim, seen) = (claim.into(), seen.into());
         self.verdicts.push(Verdict { claim, seen, holds });
@@ -74,13 +63,11 @@ impl Section {
 
     pub(crate) fn table(&mut self, table: &Table) {
         self.html += &table.html("h3");
-        let text = |row: &Vec<Cell>| row.iter().map(Cell::said).collect();
-        self.tables.push(TableText {
-            name: table.name.to_owned(),
-            title: table.title.clone(),
-            head: table.head.clone(),
-            rows: table.rows.iter().map(text).collect(),
-        });
+        let row = |row: &Vec<Cell>| row.iter().map(Cell::said).collect();
+        let rows: Vec<Vec<String>> = table.rows.iter().map(row).collect();
+        let Table { title, head, .. } = table;
+        let text = json!({ "name": table.name, "title": title, "head": head, "rows": rows });
+        self.tables.push(text);
     }
 
     /// A grid of panels with its files. The title states the result, and the caption explains the figure.

@@ -31,10 +31,8 @@ pub struct ClockLimits {
 pub fn clock_limits<const N: usize>(control: &ControlLoop<N>) -> ClockLimits {
     let linear = Linear::at_setpoint(control);
     let period = Stepping::held(&linear, Method::Rk4, EXACT, control.period.delay).limit();
-    ClockLimits {
-        period,
-        timestep: timestep_limit(control, &linear, period),
-    }
+    let timestep = timestep_limit(control, &linear, period);
+    ClockLimits { period, timestep }
 }
 
 /// The largest stable timestep. A period has a whole number of steps, so the smallest stable number of steps gives it.

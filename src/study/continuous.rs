@@ -9,6 +9,9 @@ use crate::math::integrator::increment;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use crate::math::simulation::add_carried;
 
+/// Most joints of an arm.
+const MAX_JOINTS: usize = 3;
+
 /// An arm whose control law, with its integral, is evaluated in every stage. The method steps `(q, s)`: the integral
 /// `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,17 +44,6 @@ impl<const N: usize> ContinuousLoop<N> {
         self.steps
     }
 
-    /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if the arm has more
-    /// than three joints.
-    pub fn step(&mut self) -> bool {
-        match N {
-            1 => self.step_all::<2>(),
-            2 => self.step_all::<4>(),
-            3 => self.step_all::<6>(),
-            _ => false,
-        }
-    }
-
     fn acceleration(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
         let Gains { kp, ki, kd } = &self.control.gains;
         let Setpoint { position, velocity } = &self.control.setpoint;
@@ -63,32 +55,19 @@ impl<const N: usize> ContinuousLoop<N> {
         forward_dynamics(&self.control.arm, q, v, &effort)
     }
 
-    /// `M` is twice `N`; stable Rust cannot express this bound.
-    fn step_all<const M: usize>(&mut self) -> bool {
-        debug_assert_eq!(M, 2 * N, "a position and an integral for every joint");
+    /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite.
+    pub fn step(&mut self) -> bool {
         let State { position, velocity } = self.state;
-        let joint = |i: usize| i % N;
-        let whole: [f64; M] = std::array::from_fn(|i| {
-            if i < N {
-                position[i]
-            } else {
-                self.integral[joint(i)]
-            }
-        });
-        let rates: [f64; M] = std::array::from_fn(|i| {
-            if i < N {
-                velocity[i]
-            } else {
-                self.control.setpoint.position[joint(i)] - position[joint(i)]
-            }
-        });
+        let off = |i: usize| self.control.setpoint.position[i] - position[i];
+        let whole = both(&position, &self.integral);
+        let rates = both(&velocity, &std::array::from_fn(off));
         let (moved, changed) = increment(
             self.control.method,
             |_, x, rate| {
                 let q = std::array::from_fn(|i| x[i]);
                 let v: [f64; N] = std::array::from_fn(|i| rate[i]);
                 let a = self.acceleration(&q, &v, &std::array::from_fn(|i| x[N + i]));
-                std::array::from_fn(|i| if i < N { a[i] } else { -v[joint(i)] })
+                both(&a, &v.map(|v| -v))
             },
             0.0,
             &whole,
@@ -114,4 +93,13 @@ impl<const N: usize> ContinuousLoop<N> {
         }
         finite
     }
+}
+
+/// Values of all positions and of all integrals, padded with zeros.
+fn both<const N: usize>(positions: &[f64; N], integrals: &[f64; N]) -> [f64; 2 * MAX_JOINTS] {
+    const { assert!(N <= MAX_JOINTS) };
+    std::array::from_fn(|i| {
+        let value = positions.iter().chain(integrals).nth(i);
+        value.copied().unwrap_or(0.0)
+    })
 }

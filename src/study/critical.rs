@@ -6,17 +6,13 @@
 use std::f64::consts::TAU;
 
 use super::linear::Linear;
-use super::matrix::{Complex, Matrix, largest};
+use super::matrix::{Complex, Matrix};
 use super::stability::{Modes, Sampling, Stepping};
 use crate::math::elementary::{atan2, hypot};
 use crate::math::integrator::Method;
 
 /// The loop is analysed at this multiple of its limit, since nothing grows at the limit itself.
 pub const BEYOND: f64 = 1.1;
-
-/// Steps of the inverse iteration. Each reduces the error by the ratio of the distances from the shift to the nearest
-/// and to the second nearest eigenvalue.
-const ITERATIONS: u32 = 6;
 
 /// The first unstable mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,26 +51,13 @@ pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Cr
 /// The index of the largest of the first `joints` entries of an eigenvector, in real arithmetic. For the eigenvalue
 /// `a + i b`, the invariant plane is the null space of `(E - a)² + b²`. If x lies in it, `x - i (E - a) x / b` is the
 /// eigenvector.
-///
-/// Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.6, on inverse iteration.
 fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
-    let n = generator.size();
     // The shift is slightly off the eigenvalue, where the matrix would be singular.
     let shift = mu.re + 1e-6 * mu.modulus();
-    let shifted = Matrix::from_fn(n, |i, j| {
-        generator[(i, j)] - if i == j { shift } else { 0.0 }
-    });
-    let square = Matrix::from_fn(n, |i, j| if i == j { mu.im * mu.im } else { 0.0 })
-        .plus(1.0, &shifted.product(&shifted));
+    let shifted = generator.clone().plus_diagonal(-shift);
+    let square = shifted.product(&shifted).plus_diagonal(mu.im * mu.im);
     let matrix = if mu.im == 0.0 { &shifted } else { &square };
-    let mut x = vec![1.0; n];
-    for _ in 0..ITERATIONS {
-        x = matrix.solve(&x)?;
-        let length = largest(x.iter().map(|x| x.abs()));
-        for x in &mut x {
-            *x /= length;
-        }
-    }
+    let x = matrix.most_shortened()?;
     let image = |i: usize| -> f64 { x.iter().enumerate().map(|(j, x)| shifted[(i, j)] * x).sum() };
     let reach = |i: usize| {
         let across = if mu.im == 0.0 { 0.0 } else { image(i) / mu.im };

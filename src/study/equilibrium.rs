@@ -9,7 +9,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::control_loop::ControlLoop;
-use super::symmetric::{Symmetric, eigen};
+use super::matrix::{Complex, Matrix, largest};
 use crate::math::arm::Arm;
 use crate::math::dynamics::{gravity_load, potential_energy};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
@@ -44,8 +44,6 @@ pub struct Equilibrium<const N: usize> {
     pub integral: [f64; N],
     /// Joints with an integral gain whose integral can carry the load within its limit.
     pub integrating: [bool; N],
-    /// Largest unbalanced effort \[N m\]: a few units of rounding, or more if no equilibrium exists.
-    pub residual: f64,
     /// Whether the setpoint itself is an unstable equilibrium, for example upright with low gains. The arm may then
     /// fall to either side.
     pub balanced: bool,
@@ -62,17 +60,15 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
         ..
     } = control;
     if control.is_free() {
-        let mut position = [0.0; N];
-        if let Some(first) = position.first_mut().filter(|_| arm.gravity() > 0.0) {
-            *first = -FRAC_PI_2;
-        } else {
-            position = setpoint.position;
-        }
+        let is_heavy = arm.gravity() > 0.0;
         return Equilibrium {
-            position,
+            position: if is_heavy {
+                hanging()
+            } else {
+                setpoint.position
+            },
             integral: [0.0; N],
             integrating: [false; N],
-            residual: 0.0,
             balanced: false,
         };
     }
@@ -105,12 +101,10 @@ pub fn equilibrium<const N: usize>(control: &ControlLoop<N>) -> Equilibrium<N> {
             }
         }
         if !saturated {
-            let left = (0..N).filter(|&i| !descent.integrating[i]);
             return Equilibrium {
                 position: std::array::from_fn(|i| setpoint.position[i] + sag[i]),
                 integral,
                 integrating: descent.integrating,
-                residual: left.fold(0.0, |max, i| max.max(load[i].abs())),
                 balanced,
             };
         }
@@ -171,8 +165,8 @@ impl<const N: usize> Descent<'_, N> {
         (sag, balanced)
     }
 
-    /// Descends to a point of zero gradient, by Newton steps within a trust radius. Along directions of negative
-    /// curvature the step is reversed, so that it descends there too.
+    /// Descends to a point of zero gradient, by Newton steps within a trust radius. Where the potential curves down in
+    /// some direction, all curvatures are increased, so that the step descends.
     ///
     /// Source: Nocedal and Wright, *Numerical Optimization* (2006), ch. 3.4 and 4.
     fn descend(&self, mut sag: [f64; N]) -> [f64; N] {
@@ -207,39 +201,42 @@ impl<const N: usize> Descent<'_, N> {
     /// The direction of the largest negative curvature, if there is one.
     fn way_down(&self, sag: &[f64; N]) -> Option<[f64; N]> {
         let stiffness = self.stiffness(sag);
-        let (curvature, way) = eigen(&stiffness)
-            .into_iter()
-            .min_by(|one, other| one.0.total_cmp(&other.0))?;
-        (curvature < -FLAT * size(&stiffness)).then_some(way)
+        let curvature = least_curvature(&stiffness);
+        if curvature >= -FLAT * size(&stiffness) {
+            return None;
+        }
+        // Slightly off the eigenvalue, where the matrix would be singular.
+        let shifted = stiffness.plus_diagonal(-1.000_001 * curvature);
+        shifted.most_shortened()?.try_into().ok()
     }
 
     /// `∂²V/∂y²` \[N m/rad\] of the joints that move; the others are decoupled, with 1 on the diagonal.
-    fn stiffness(&self, sag: &[f64; N]) -> Symmetric<N> {
+    fn stiffness(&self, sag: &[f64; N]) -> Matrix {
         let gradient = gravity_gradient(self.arm, &self.position(sag));
-        std::array::from_fn(|i| {
-            std::array::from_fn(
-                |j| match (i == j, self.integrating[i] || self.integrating[j]) {
-                    (true, true) => 1.0,
-                    (false, true) => 0.0,
-                    (_, false) => gradient[i.max(j)] + if i == j { self.gains.kp[i] } else { 0.0 },
-                },
-            )
+        Matrix::from_fn(N, |i, j| {
+            match (i == j, self.integrating[i] || self.integrating[j]) {
+                (true, true) => 1.0,
+                (false, true) => 0.0,
+                (_, false) => gradient[i.max(j)] + if i == j { self.gains.kp[i] } else { 0.0 },
+            }
         })
     }
 
-    fn newton(&self, sag: &[f64; N], stiffness: &Symmetric<N>) -> [f64; N] {
+    fn newton(&self, sag: &[f64; N], stiffness: &Matrix) -> [f64; N] {
         let gradient = self.gradient(sag);
-        let mut step = [0.0; N];
-        for (curvature, along) in eigen(stiffness) {
-            let moving = (0..N).filter(|&i| !self.integrating[i]);
-            let slope: f64 = moving.map(|i| gradient[i] * along[i]).sum();
-            // Without curvature only the trust radius limits the step.
-            let length = slope / curvature.abs().max(1e-15 * size(stiffness));
-            if length.is_finite() {
-                step = moved(&step, &along, -length);
+        let pull = (0..N).map(|i| {
+            if self.integrating[i] {
+                0.0
+            } else {
+                -gradient[i]
             }
-        }
-        step
+        });
+        let pull: Vec<f64> = pull.collect();
+        // Without curvature only the trust radius limits the step.
+        let added = (-2.0 * least_curvature(stiffness)).max(1e-15 * size(stiffness));
+        let step = stiffness.clone().plus_diagonal(added).solve(&pull);
+        step.and_then(|step| step.try_into().ok())
+            .unwrap_or([0.0; N])
     }
 }
 
@@ -248,17 +245,27 @@ pub(crate) fn moved<const N: usize>(from: &[f64; N], way: &[f64; N], length: f64
     std::array::from_fn(|i| from[i] + length * way[i])
 }
 
-/// The largest magnitude on the diagonal of a symmetric matrix.
-fn size<const N: usize>(matrix: &Symmetric<N>) -> f64 {
-    (0..N).fold(0.0, |max: f64, i| max.max(matrix[i][i].abs()))
+/// The pose of the hanging arm \[rad\].
+pub(crate) fn hanging<const N: usize>() -> [f64; N] {
+    std::array::from_fn(|joint| if joint == 0 { -FRAC_PI_2 } else { 0.0 })
+}
+
+/// The smallest eigenvalue of a symmetric matrix.
+fn least_curvature(matrix: &Matrix) -> f64 {
+    let curvatures = matrix
+        .eigenvalues()
+        .into_iter()
+        .map(|Complex { re, .. }| re);
+    curvatures.fold(f64::INFINITY, f64::min)
+}
+
+/// The largest magnitude on the diagonal of a matrix.
+fn size(matrix: &Matrix) -> f64 {
+    largest((0..matrix.size()).map(|i| matrix[(i, i)].abs()))
 }
 
 /// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]. Turning any joint up to `k` turns all links beyond `k` by the
 /// same angle. The derivative is therefore the load of the arm turned by a quarter of a turn.
 pub(crate) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
-    let mut turned = *q;
-    if let Some(first) = turned.first_mut() {
-        *first += FRAC_PI_2;
-    }
-    gravity_load(arm, &turned)
+    gravity_load(arm, &moved(q, &hanging(), -1.0))
 }

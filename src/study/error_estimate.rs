@@ -11,7 +11,7 @@
 //! **Invariant:** the simulation is not changed. An estimate costs one step of the method and two of Runge-Kutta 4.
 
 use super::matrix::largest;
-use crate::math::arm::{Arm, State};
+use crate::math::arm::State;
 use crate::math::integrator::{Increment, Method};
 use crate::math::simulation::{Simulation, step_under};
 
@@ -32,26 +32,11 @@ pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstim
     if simulation.divergence().is_some() {
         return None;
     }
+    let (arm, state) = (simulation.arm(), simulation.state());
+    let (method, h) = (simulation.method(), simulation.timestep());
     let effort = simulation.effort_of_next_step();
-    estimate_step(
-        simulation.arm(),
-        simulation.state(),
-        &effort,
-        simulation.method(),
-        simulation.timestep(),
-    )
-}
-
-/// The error of a step of `h` \[s\] from `state` under the constant `effort` \[N m\]; `None` if it is not finite.
-pub fn estimate_step<const N: usize>(
-    arm: &Arm<N>,
-    state: &State<N>,
-    effort: &[f64; N],
-    method: Method,
-    h: f64,
-) -> Option<ErrorEstimate> {
     let step = |method: Method, state: &State<N>, h: f64| -> Increment<N> {
-        step_under(arm, method, state, effort, h)
+        step_under(arm, method, state, &effort, h)
     };
     let (whole_q, whole_v) = step(method, state, h);
     let first = step(Method::Rk4, state, 0.5 * h);

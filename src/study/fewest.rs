@@ -43,11 +43,7 @@ pub async fn fewest(first: u64, most: u64, part: u64, mut trial: impl StepTrial)
         }
     }
     let mut best = None;
-    let (mut too_few, mut next) = if first <= ALL {
-        (ALL, 2 * ALL)
-    } else {
-        (first - 1, first)
-    };
+    let (mut too_few, mut next) = ((first - 1).max(ALL), first.max(2 * ALL));
     while best.is_none() && too_few < most {
         next = next.min(most);
         if trial.is_enough(next).await {

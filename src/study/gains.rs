@@ -94,25 +94,14 @@ pub enum GainsError {
     /// More steps than [`MAX_STEPS`].
     #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {}", shown_against(*.0, MAX_STEPS))]
     TooManySteps(f64),
-    /// No gains meet both demands: slow loops settle too late, and fast loops lack the stability margin.
+    /// No gains meet the demands at the timestep \[s\]: slow loops settle too late, and fast loops lack the stability
+    /// margin.
     #[error(
         "settling_time: no gains found that settle within {} s and leave a margin of {} at the timestep {} s; allow \
          more time or set a shorter timestep",
-        Shown(*.settling_time), Shown(*.margin), Shown(*.timestep)
+        Shown(.0.settling_time), Shown(.0.margin), Shown(*.1)
     )]
-    NotFound {
-        /// The requested time \[s\].
-        settling_time: f64,
-        /// The requested margin.
-        margin: f64,
-        /// The loop's timestep \[s\].
-        timestep: f64,
-    },
-}
-
-/// The most memory that [`search_gains`] takes, in bytes.
-pub const fn most_bytes<const N: usize>() -> usize {
-    limits::most_bytes::<N>()
+    NotFound(GainsRequirements, f64),
 }
 
 /// Searches gains for the arm, method and timestep of `control`, in pieces. Its gains and setpoint are ignored.
@@ -123,11 +112,7 @@ pub async fn search_gains<const N: usize>(
     mut control: ControlLoop<N>,
     requirements: GainsRequirements,
 ) -> Result<SuggestedGains<N>, GainsError> {
-    let GainsRequirements {
-        settling_time,
-        margin,
-    } = requirements;
-    let timestep = control.timestep;
+    let (settling_time, timestep) = (requirements.settling_time, control.timestep);
     let steps = settling_time / timestep;
     if steps > MAX_STEPS {
         return Err(GainsError::TooManySteps(steps));
@@ -140,7 +125,7 @@ pub async fn search_gains<const N: usize>(
             let limits = limits::search_limits(control).await;
             let limit = limits.trusted();
             let is_unstable = limit == Some(0.0);
-            let is_short = limit.is_some_and(|limit| limit < margin * timestep);
+            let is_short = limit.is_some_and(|limit| limit < requirements.margin * timestep);
             // The loop is too fast, or its springs hardly hold the load. Some faster loops decide which.
             if is_short && !is_unstable && paces >= SOFT_PACES {
                 break;
@@ -159,16 +144,12 @@ pub async fn search_gains<const N: usize>(
             pace *= FASTER;
         }
     }
-    Err(GainsError::NotFound {
-        settling_time,
-        margin,
-        timestep,
-    })
+    Err(GainsError::NotFound(requirements, timestep))
 }
 
 /// The default gains, scaled to an arm's inertia and to a speed factor.
 fn scaled<const N: usize>(arm: &Arm<N>, (springs, damping): Shape, pace: f64) -> Gains<N> {
-    let Gains { kp, ki, kd } = template::<N>();
+    let Gains { kp, ki, kd } = Gains::<N>::default();
     let scaled = |gains: [f64; N], weight: f64, power: i32| {
         let here = inertia(arm, weight);
         let there = inertia(&Arm::<N>::default(), weight);
@@ -231,8 +212,7 @@ fn start_of_move<const N: usize>(control: &ControlLoop<N>, index: u32) -> Simula
     };
     let mut start = State::rest();
     if index % 2 == 1 {
-        let reach: f64 = control.arm.lengths().iter().sum();
-        let falling = (2.0 * control.arm.gravity() / reach).sqrt();
+        let falling = (2.0 * control.arm.gravity() / control.arm.reach()).sqrt();
         start = State {
             position: std::array::from_fn(|i| PI * (2.0 * part(i + 1) - 1.0)),
             velocity: std::array::from_fn(|i| 2.0 * falling * (2.0 * part(i + 2) - 1.0)),
@@ -243,19 +223,6 @@ fn start_of_move<const N: usize>(control: &ControlLoop<N>, index: u32) -> Simula
         ..*control
     }
     .simulation(start)
-}
-
-/// The default gains of an arm with `N` links.
-fn template<const N: usize>() -> Gains<N> {
-    let (two, three) = (Gains::<2>::default(), Gains::<3>::default());
-    let of = |two: [f64; 2], three: [f64; 3]| {
-        std::array::from_fn(|i| if N == 2 { two[i % 2] } else { three[i % 3] })
-    };
-    Gains {
-        kp: of(two.kp, three.kp),
-        ki: of(two.ki, three.ki),
-        kd: of(two.kd, three.kd),
-    }
 }
 
 /// The inertia that each joint moves \[kg m²\], with all joints beyond it stretched and the others held. It is averaged

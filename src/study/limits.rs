@@ -8,8 +8,8 @@ use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
 use super::motion::Motion;
 use super::paused::{at_once, pause};
-use super::poses::{self, PoseCandidate, smallest_of_all_poses};
-use super::proof::{Proof, Proven};
+use super::poses::{PoseCandidate, smallest_of_all_poses};
+use super::proof::{BOXES, MAX_BOXES, Proven, prove};
 use super::stability::{Modes, Sampling, largest_timestep};
 use crate::math::integrator::Method;
 
@@ -22,9 +22,6 @@ const AGREEMENT: f64 = 0.01;
 
 /// A bound below this part of the smallest limit found is too low to be used as advice.
 const USEFUL: f64 = 0.5;
-
-/// Boxes that a proof splits in one piece: half a millisecond (optimised build).
-const BOXES: u32 = 200;
 
 /// Largest distance from the setpoint at which an arm counts as at it \[rad\].
 const AT_SETPOINT: f64 = 1e-6;
@@ -118,11 +115,6 @@ pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
     at_once(search_limits(*control))
 }
 
-/// The most memory that [`search_limits`] takes, in bytes.
-pub const fn most_bytes<const N: usize>() -> usize {
-    Proof::<N>::MOST_BYTES + poses::most_bytes::<N>()
-}
-
 /// Does what [`limits`] does, in pieces.
 pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N> {
     let method = control.method;
@@ -138,7 +130,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let here = PoseCandidate::as_it_is(equilibrium);
     let (mut least, mut worst) = (held, here);
     let (mut bound, mut runaway) = (None, None);
-    if let Some(Proven { timestep, pose }) = prove(&control).await {
+    if let Some(Proven { timestep, pose }) = prove(&control, MAX_BOXES).await {
         bound = Some(timestep);
         // The pose at which the bound is tightest.
         let nearest = PoseCandidate::as_it_is(pose);
@@ -201,17 +193,6 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     limits
 }
 
-/// The bound for all poses, if the proof applies.
-async fn prove<const N: usize>(control: &ControlLoop<N>) -> Option<Proven<N>> {
-    let mut proof = Proof::new(control)?;
-    loop {
-        if let Some(proven) = proof.advance(BOXES) {
-            return Some(proven);
-        }
-        pause().await;
-    }
-}
-
 /// The equilibrium, its kind, and the linearised loop there.
 fn settle<const N: usize>(control: &ControlLoop<N>) -> ([f64; N], Rest, Linear) {
     let rest = equilibrium(control);
@@ -242,9 +223,10 @@ pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
     let linear = Linear::at_setpoint(control);
     match largest_timestep(&linear, control.method, Sampling::Held) {
         // The same rule as in the search for all limits.
-        Some(0.0) => Proof::new(control)
-            .and_then(|mut proof| proof.advance(BOXES))
-            .map_or(Some(0.0), |proven| Some(proven.timestep)),
+        Some(0.0) => {
+            let proven = at_once(prove(control, BOXES));
+            Some(proven.map_or(0.0, |proven| proven.timestep))
+        }
         limit => limit,
     }
 }

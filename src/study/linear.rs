@@ -17,7 +17,6 @@
 //! **Invariant:** for every arm and all gains the linearisation takes bounded time.
 
 use super::control_loop::ControlLoop;
-pub use super::control_loop::no_control;
 pub(crate) use super::equilibrium::gravity_gradient;
 pub use super::equilibrium::{Equilibrium, equilibrium};
 use super::matrix::Matrix;

@@ -9,7 +9,7 @@
     reason = "indices run over 0..N of arrays and matrices of that size, as they do in the formulas"
 )]
 
-pub(crate) mod beside;
+pub mod beside;
 pub mod clocks;
 pub mod continuous;
 pub mod control_loop;
@@ -29,5 +29,4 @@ mod proof;
 pub mod rollout;
 mod slow_modes;
 pub mod stability;
-mod symmetric;
 pub mod taylor;

@@ -27,10 +27,10 @@
 //!
 //! [`max_rotation_per_step`]: crate::math::integrator::Method::max_rotation_per_step
 
-use std::f64::consts::FRAC_PI_2;
 use std::ops::RangeInclusive;
 
 use super::control_loop::ControlLoop;
+use super::equilibrium::hanging;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics, gravity_load, potential_energy};
 use crate::math::pid::INTEGRAL_LIMIT;
@@ -88,24 +88,19 @@ impl Motion {
         };
         // An arm with extreme parameters gives NaN, which counts as no limit.
         let timestep = method.max_rotation_per_step() / speed;
-        if speed > 0.0 && timestep > 0.0 {
-            Self { speed, timestep }
+        let limits = speed > 0.0 && timestep > 0.0;
+        let (speed, timestep) = if limits {
+            (speed, timestep)
         } else {
-            Self {
-                speed: 0.0,
-                timestep: f64::INFINITY,
-            }
-        }
+            (0.0, f64::INFINITY)
+        };
+        Self { speed, timestep }
     }
 }
 
 /// The potential energy of the hanging arm \[J\].
 pub(crate) fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
-    let mut hanging = [0.0; N];
-    if let Some(first) = hanging.first_mut() {
-        *first = -FRAC_PI_2;
-    }
-    potential_energy(arm, &hanging)
+    potential_energy(arm, &hanging())
 }
 
 /// `max (M⁻¹)_ii` in the angles of the links \[1/(kg m²)\]. All joints before link i transmit its effort, and its

@@ -6,11 +6,11 @@
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): the hold is an error |
 //! | the same with a control period that is given | the loop whose law runs once a period: the hold is no error |
 //!
-//! The reference is refined with smaller steps until two references agree to a part of the allowed error. For a free
-//! arm the tolerance is reduced instead. Then each method is simulated like the live arm and compared with the
-//! reference. A search ([`fewest`]) finds the fewest steps with which it stays within the rest of the error after every
-//! step. The plan is the cheapest run, in evaluations of the dynamics, and its error is measured. Runs that cannot be
-//! cheaper are skipped.
+//! The reference of a law that acts at every instant is a run of Runge-Kutta 4, refined with smaller steps until two of
+//! them agree to a part of the allowed error. The others are those of a rollout, known to rounding. Each method is then
+//! simulated like the live arm and compared with the reference. A search ([`fewest`]) finds the fewest steps with which
+//! it stays within the rest of the error after every step. The plan is the cheapest run, in evaluations of the
+//! dynamics, and its error is measured. Runs that cannot be cheaper are skipped.
 //!
 //! If no control period is given, it is planned too. The law then runs in every step: a longer period at the same
 //! timestep costs as much and has a larger error. Under control the timestep never exceeds the advice for all poses,
@@ -18,16 +18,14 @@
 //!
 //! **Invariant:** the work is bounded by the request, and every returned candidate was simulated.
 
-use std::f64::consts::PI;
-
-use super::beside::{FreeMotion, Steppable, largest_distance};
+use super::beside::{Steppable, largest_distance};
 use super::clocks::clock_limits;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::fewest::{StepTrial, fewest};
 use super::limits;
 use super::paused::pause;
-use super::taylor::{ROUNDING, TaylorReference};
+use super::rollout;
 use crate::math::arm::State;
 use crate::math::count::{self, in_f64};
 use crate::math::integrator::Method;
@@ -45,9 +43,6 @@ const MAX_STEPS: u64 = 4_000_000;
 
 /// Largest uncertainty of the reference, relative to the allowed error.
 const PART_OF_REFERENCE: f64 = 0.05;
-
-/// A tolerance that was too large is multiplied by this. Two more digits increase the work by less than half.
-const FINER: f64 = 0.01;
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,50 +111,20 @@ pub enum PlanError {
     TooManySteps(f64),
 }
 
-/// The resolution of a reference.
-#[derive(Debug, Clone, Copy)]
-enum Fineness {
-    /// The number of steps per whole.
-    Steps(u64),
-    /// Within a tolerance.
-    Tolerance(f64),
-}
-
-impl Fineness {
-    fn finer(self) -> Self {
-        match self {
-            Self::Steps(steps) => Self::Steps(2 * steps),
-            Self::Tolerance(tolerance) => Self::Tolerance(FINER * tolerance),
-        }
-    }
-}
-
-/// The most memory of [`plan`], in bytes: a run, its reference, and a search for limits.
-pub const fn most_bytes<const N: usize>() -> usize {
-    2 * size_of::<FreeMotion<N>>() + limits::most_bytes::<N>()
-}
-
 /// Searches a plan, in pieces.
 ///
 /// # Errors
 /// The reason why there is no plan.
 pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
-    let Task {
-        control,
-        duration,
-        error,
-        ..
-    } = task;
-    if duration.is_nan() || duration > MAX_DURATION {
-        return Err(PlanError::TooLong(duration));
+    if task.duration.is_nan() || task.duration > MAX_DURATION {
+        return Err(PlanError::TooLong(task.duration));
     }
-    let reference = Reference::known_to(PART_OF_REFERENCE * error, task).await?;
-    let uncertainty = reference.uncertainty;
+    let reference = Reference::known_to(PART_OF_REFERENCE * task.error, task).await?;
     let mut candidates: Vec<Candidate> = Vec::new();
     let (mut longest_stable, mut has_run) = (0.0_f64, false);
     for method in Method::ALL.into_iter().rev() {
         pause().await;
-        let control = control.with_method(method);
+        let control = task.control.with_method(method);
         let most = longest_timestep(&control).await;
         longest_stable = longest_stable.max(most);
         let least = count::whole((reference.whole / most * (1.0 - count::ROUNDING)).ceil());
@@ -182,7 +147,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     candidates.sort_by_key(|one| std::cmp::Reverse(one.evaluations));
     let Some(&best) = candidates.last() else {
         return Err(if has_run {
-            PlanError::NotFound(error)
+            PlanError::NotFound(task.error)
         } else if longest_stable > 0.0 {
             PlanError::TooManySteps(longest_stable)
         } else {
@@ -192,7 +157,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     Ok(Planned {
         best,
         candidates,
-        uncertainty,
+        uncertainty: reference.uncertainty,
     })
 }
 
@@ -248,7 +213,8 @@ struct Reference<const N: usize> {
     whole: f64,
     /// The number of wholes in the duration.
     count: u64,
-    fineness: Fineness,
+    /// The fewest steps per whole of Runge-Kutta 4.
+    steps: u64,
     /// Uncertainty of the motion \[m\].
     uncertainty: f64,
 }
@@ -256,50 +222,35 @@ struct Reference<const N: usize> {
 impl<const N: usize> Reference<N> {
     /// The motion of a task, refined until its uncertainty is at most `enough` \[m\].
     async fn known_to(enough: f64, task: Task<N>) -> Result<Self, PlanError> {
-        let Task {
-            control, duration, ..
-        } = task;
-        let (count, whole) = if is_sampled(&control) {
+        let (control, duration) = (&task.control, task.duration);
+        let (count, whole) = if is_sampled(control) {
             let period = control.period.period;
             (count::whole((duration / period).round()).max(1), period)
         } else {
             (1, duration)
         };
-        let fineness = if control.is_free() {
-            // The tolerance is relative to a rotation. For half a turn of the stretched arm it moves the end effector
-            // by `enough`.
-            let tolerance = enough / (PI * control.arm.reach());
-            // The reference of the first comparison must be finer.
-            Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
-        } else {
-            Fineness::Steps(4 * spans(whole, count))
-        };
+        let spans = (whole / LONGEST_SPAN).max(FEWEST_SPANS / in_f64(count));
         let mut reference = Self {
             task,
             whole,
             count,
-            fineness,
+            steps: 4 * count::whole(spans.ceil()),
             uncertainty: f64::INFINITY,
         };
+        // Two motions that are further apart have nothing in common.
+        let reach = control.arm.reach();
         loop {
-            let steps = match reference.fineness {
-                Fineness::Steps(steps) => steps,
-                Fineness::Tolerance(_) => spans(whole, count),
-            };
-            let (coarse, _) = reference.motion(steps);
-            reference.fineness = reference.fineness.finer();
-            let apart = reference.off_by(coarse, steps, f64::INFINITY).await;
+            let steps = reference.steps;
+            let (coarse, _) = reference.motion(steps, 1);
+            reference.steps *= 2;
+            let apart = reference.off_by(coarse, steps, reach).await;
             if apart.is_finite() {
                 reference.uncertainty = apart;
             }
-            let can_be_finer = match reference.fineness {
-                Fineness::Steps(steps) => 2 * steps * count <= MAX_STEPS,
-                Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
-            };
             if apart <= enough {
                 return Ok(reference);
             }
-            if !can_be_finer {
+            if !has_ideal(control) || 2 * reference.steps * count > MAX_STEPS {
                 return Err(PlanError::Unknown(reference.uncertainty));
             }
         }
@@ -308,42 +259,34 @@ impl<const N: usize> Reference<N> {
     /// Largest error of a run of `steps` steps per whole \[m\]. The run ends once the error exceeds `allowed`.
     async fn off_by(&self, run: Box<dyn Steppable<N>>, steps: u64, allowed: f64) -> f64 {
         let arm = &self.task.control.arm;
-        largest_distance(arm, (run, steps * self.count), self.motion(steps), allowed).await
+        largest_distance(
+            arm,
+            (run, steps * self.count),
+            self.motion(steps, 0),
+            allowed,
+        )
+        .await
     }
 
-    /// The motion from its start, and the number of its steps per step of a run with `steps` steps per whole.
-    fn motion(&self, steps: u64) -> (Box<dyn Steppable<N>>, u64) {
+    /// A motion from its start, and the number of its steps per step of a run with `steps` steps per whole. Motions known
+    /// to rounding differ by it if they have different indices.
+    fn motion(&self, steps: u64, index: usize) -> (Box<dyn Steppable<N>>, u64) {
         let Task { control, start, .. } = self.task;
-        match self.fineness {
-            Fineness::Steps(finest) => {
-                let each = finest.div_ceil(steps);
-                let timestep = self.whole / in_f64(steps * each);
-                let control = control.with_method(Method::Rk4).with_timestep(timestep);
-                if is_sampled(&control) {
-                    return (Box::new(control.simulation(start)), each);
-                }
-                let law = ContinuousLoop::new(control, start, [0.0; N]);
-                (Box::new(law), each)
-            }
-            Fineness::Tolerance(tolerance) => {
-                let motion = FreeMotion {
-                    arm: control.arm,
-                    taylor: TaylorReference::within(start, tolerance),
-                    timestep: self.whole / in_f64(steps),
-                };
-                (Box::new(motion), 1)
-            }
+        if has_ideal(&control) {
+            let each = self.steps.div_ceil(steps);
+            let timestep = self.whole / in_f64(steps * each);
+            let control = control.with_method(Method::Rk4).with_timestep(timestep);
+            let law = ContinuousLoop::new(control, start, [0.0; N]);
+            return (Box::new(law), each);
         }
+        let control = control.with_timestep(self.whole / in_f64(steps));
+        (Box::new(rollout::Reference::new(&control, start, index)), 1)
     }
 }
 
-/// Number of comparisons of references per whole \[s\], for `count` wholes.
-fn spans(whole: f64, count: u64) -> u64 {
-    count::whole(
-        (whole / LONGEST_SPAN)
-            .max(FEWEST_SPANS / in_f64(count))
-            .ceil(),
-    )
+/// Whether the reference is the loop whose law acts at every instant.
+fn has_ideal<const N: usize>(control: &ControlLoop<N>) -> bool {
+    !control.is_free() && !is_sampled(control)
 }
 
 /// Whether the control period is given.

@@ -12,9 +12,8 @@
 //! the limit falls to zero. They are therefore searched first, by ascending the largest real part of any mode in
 //! continuous time.
 //!
-//! **Invariant:** the work is bounded: [`cells`] poses, and at most one climb from each.
+//! **Invariant:** the work is bounded: the poses of the grid, and at most one climb from each pose of the outer joints.
 
-use crate::math::count::length_in_f64;
 use std::f64::consts::{PI, TAU};
 
 use super::control_loop::ControlLoop;
@@ -23,7 +22,7 @@ use super::paused::pause;
 use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 
 /// Angles of the first joint for the gravity load, among them hanging and upright.
-const DIRECTIONS: usize = 8;
+const DIRECTIONS: u32 = 8;
 
 /// Parts of the smallest limit so far. A pose that is stable at all of them needs no search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
@@ -34,8 +33,8 @@ const SMALLEST_STRIDE: f64 = 1e-3;
 /// Most moves of one climb.
 const MAX_MOVES: u32 = 400;
 
-/// Poses around the circle of each outer joint; even, so that stretched and folded are among them.
-const fn grid<const N: usize>() -> usize {
+/// Angles around the circle of each outer joint; even, so that stretched and folded are among them.
+const fn around<const N: usize>() -> u32 {
     if N > 2 { 16 } else { 64 }
 }
 
@@ -74,58 +73,54 @@ pub(super) async fn smallest_of_all_poses<const N: usize>(
     sampling: Option<Sampling>,
     known: (Option<f64>, PoseCandidate<N>),
 ) -> (Option<f64>, PoseCandidate<N>) {
-    let (smallest, worst) = known;
     let mut search = PoseSearch {
         control,
         sampling,
-        smallest,
-        worst,
+        least: known,
     };
     search.run().await;
-    (search.smallest, search.worst)
-}
-
-/// The most memory of a search \[bytes\]: the cells, and the list of cells from which the climbs start.
-pub(super) const fn most_bytes<const N: usize>() -> usize {
-    2 * cells::<N>() * size_of::<(PoseCandidate<N>, f64)>()
+    search.least
 }
 
 struct PoseSearch<const N: usize> {
     control: ControlLoop<N>,
     /// When the law runs for the sought limit; `None` if an unstable pose is sought.
     sampling: Option<Sampling>,
-    /// The smallest so far \[s\]; `None` while there is no limit.
-    smallest: Option<f64>,
-    /// The pose of that value.
-    worst: PoseCandidate<N>,
+    /// The smallest so far \[s\], `None` while there is no limit, and its pose.
+    least: (Option<f64>, PoseCandidate<N>),
 }
 
 impl<const N: usize> PoseSearch<N> {
     async fn run(&mut self) {
+        let outer = outer_poses::<N>();
         if self.sampling.is_some() {
-            for (_, candidate) in grid_poses(self.turns()) {
-                self.judge(&candidate);
+            for pose in &outer {
+                for candidate in self.turned(pose) {
+                    self.judge(&candidate);
+                    pause().await;
+                }
+            }
+            if self.least.0.is_none_or(|limit| limit == 0.0) {
+                return;
+            }
+        }
+        // For every pose of the outer joints, the largest growth at the smallest limit.
+        let mut worst: Vec<(PoseCandidate<N>, f64)> = Vec::new();
+        for pose in &outer {
+            let mut here = (PoseCandidate::as_it_is(*pose), f64::NEG_INFINITY);
+            for candidate in self.turned(pose) {
+                let growth = self.growth(&candidate);
+                if growth > here.1 {
+                    here = (candidate, growth);
+                }
                 pause().await;
+                if self.is_found() {
+                    return;
+                }
             }
-            if self.smallest.is_none_or(|limit| limit == 0.0) {
-                return;
-            }
+            worst.push(here);
         }
-        // The largest growth of every cell at the smallest limit.
-        let mut cells: Vec<(PoseCandidate<N>, f64)> = Vec::new();
-        for (cell, candidate) in grid_poses(self.turns()) {
-            let growth = self.growth(&candidate);
-            match cells.get_mut(cell) {
-                Some(cell) if growth > cell.1 => *cell = (candidate, growth),
-                Some(_) => {}
-                None => cells.push((candidate, growth)),
-            }
-            pause().await;
-            if self.is_found() {
-                return;
-            }
-        }
-        for start in summits::<N>(&cells).into_iter().rev() {
+        for start in summits(&worst).into_iter().rev() {
             self.climb(start).await;
             if self.is_found() {
                 return;
@@ -135,16 +130,24 @@ impl<const N: usize> PoseSearch<N> {
 
     /// Whether an unstable pose is sought and was found.
     fn is_found(&self) -> bool {
-        self.sampling.is_none() && self.smallest.is_some()
+        self.sampling.is_none() && self.least.0.is_some()
     }
 
-    /// Analyses per pose of the outer joints. Without gravity the angle of the first joint has no effect.
-    fn turns(&self) -> usize {
-        if self.control.arm.gravity() == 0.0 {
-            1
-        } else {
-            DIRECTIONS + 1
-        }
+    /// A pose of the outer joints without gravity, where the angle of the first joint has no effect. If there is
+    /// gravity, also with it in every direction.
+    fn turned(&self, outer: &[f64; N]) -> impl Iterator<Item = PoseCandidate<N>> + use<N> {
+        let weightless = PoseCandidate {
+            pose: *outer,
+            has_gravity: false,
+        };
+        let has_gravity = self.control.arm.gravity() > 0.0;
+        let directions = if has_gravity { DIRECTIONS } else { 0 };
+        let heavy = (0..directions).map(move |part| {
+            let mut turned = PoseCandidate::as_it_is(weightless.pose);
+            turned.pose[0] = part_of_turn(part, DIRECTIONS);
+            turned
+        });
+        std::iter::once(weightless).chain(heavy)
     }
 
     fn judge(&mut self, candidate: &PoseCandidate<N>) {
@@ -153,7 +156,7 @@ impl<const N: usize> PoseSearch<N> {
         };
         let linear = candidate.linear(&self.control);
         let stepping = Stepping::new(&linear, self.control.method, sampling);
-        let passes = self.smallest.is_some_and(|limit| {
+        let passes = self.least.0.is_some_and(|limit| {
             PROBES
                 .iter()
                 .all(|part| limit == 0.0 || stepping.is_stable(part * limit))
@@ -166,10 +169,9 @@ impl<const N: usize> PoseSearch<N> {
             return;
         }
         if let Some(limit) = stepping.search(&modes)
-            && self.smallest.is_none_or(|smallest| limit < smallest)
+            && self.least.0.is_none_or(|smallest| limit < smallest)
         {
-            self.smallest = Some(limit);
-            self.worst = *candidate;
+            self.least = (Some(limit), *candidate);
         }
     }
 
@@ -179,13 +181,12 @@ impl<const N: usize> PoseSearch<N> {
         let Some(sampling) = self.sampling else {
             let modes = Modes::of(&linear);
             if modes.run_away() {
-                self.smallest = Some(0.0);
-                self.worst = *candidate;
+                self.least = (Some(0.0), *candidate);
             }
             return modes.growth();
         };
         let growth = Stepping::new(&linear, self.control.method, sampling)
-            .growth(self.smallest.unwrap_or(0.0));
+            .growth(self.least.0.unwrap_or(0.0));
         if growth > NEUTRAL && candidate.has_gravity && Modes::of(&linear).run_away() {
             f64::NEG_INFINITY
         } else {
@@ -196,7 +197,7 @@ impl<const N: usize> PoseSearch<N> {
     /// Ascends the growth to a local maximum, with one analysis per move.
     async fn climb(&mut self, mut at: PoseCandidate<N>) {
         let mut growth = self.growth(&at);
-        let mut stride = 0.5 * TAU / ratio(grid::<N>(), 1);
+        let mut stride = PI / f64::from(around::<N>());
         // The first joint has an effect only with gravity.
         let first = usize::from(!at.has_gravity);
         let directions = 2 * N.saturating_sub(first);
@@ -229,83 +230,40 @@ impl<const N: usize> PoseSearch<N> {
     }
 }
 
-/// The poses of the grid with the cell of each, `turns` poses to a cell: first without gravity, then, if there is any,
-/// with it in every direction.
-fn grid_poses<const N: usize>(turns: usize) -> impl Iterator<Item = (usize, PoseCandidate<N>)> {
-    (0..).map_while(move |index| {
-        let (cell, turn) = (index / turns, index % turns);
-        let mut pose = outer_pose::<N>(cell)?;
-        if turn > 0
-            && let Some(first) = pose.first_mut()
-        {
-            *first = part_of_turn(turn - 1, DIRECTIONS);
-        }
-        let has_gravity = turn > 0;
-        Some((cell, PoseCandidate { pose, has_gravity }))
-    })
-}
-
-/// Local maxima: cells whose growth is at least that of all neighbours.
-fn summits<const N: usize>(cells: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandidate<N>> {
-    let (half, whole) = (grid::<N>() / 2 + 1, grid::<N>());
-    let stands_out = |index: usize| {
-        let mut apart = 1;
-        (1..N).all(|joint| {
-            let length = if joint == 1 { half } else { whole };
-            let (stride, digit) = (apart, index / apart % length);
-            apart *= length;
-            // The second joint covers a half circle, whose ends have one neighbour.
-            let beside = if joint == 1 {
-                [digit.saturating_sub(1), (digit + 1).min(length - 1)]
-            } else {
-                [(digit + length - 1) % length, (digit + 1) % length]
-            };
-            beside.iter().all(|beside| {
-                let neighbour = cells.get(index - digit * stride + beside * stride);
-                neighbour.is_none_or(|neighbour| neighbour.1 <= cells[index].1)
+/// The grid of the outer joints, with the first joint at zero. By mirror symmetry about the vertical the second joint
+/// needs only half of its circle.
+fn outer_poses<const N: usize>() -> Vec<[f64; N]> {
+    let whole = around::<N>();
+    let mut poses = vec![[0.0; N]];
+    for joint in (1..N).rev() {
+        let first = if joint == 1 { whole / 2 } else { 0 };
+        let turned = |mut pose: [f64; N]| {
+            (first..whole + u32::from(joint == 1)).map(move |part| {
+                pose[joint] = part_of_turn(part, whole);
+                pose
             })
-        })
-    };
-    (0..cells.len())
-        .filter(|&index| stands_out(index))
-        .map(|index| cells[index].0)
-        .collect()
-}
-
-/// Number of poses of the outer joints.
-const fn cells<const N: usize>() -> usize {
-    let (mut cells, mut joint) = (grid::<N>() / 2 + 1, 2);
-    while joint < N {
-        (cells, joint) = (cells * grid::<N>(), joint + 1);
+        };
+        poses = poses.into_iter().flat_map(turned).collect();
     }
-    cells
+    poses
 }
 
-/// One of the poses of the outer joints, the first joint at zero; `None` beyond the last. By mirror symmetry about the
-/// vertical the second joint needs only half of its circle.
-fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
-    let half = grid::<N>() / 2 + 1;
-    let mut index = Some(index).filter(|index| *index < cells::<N>())?;
-    Some(std::array::from_fn(|joint| match joint {
-        0 => 0.0,
-        1 => {
-            let digit = index % half;
-            index /= half;
-            PI * ratio(digit, grid::<N>() / 2)
-        }
-        _ => {
-            let digit = index % grid::<N>();
-            index /= grid::<N>();
-            part_of_turn(digit, grid::<N>())
-        }
-    }))
+/// Local maxima: poses of the grid at which the growth is at least that of all neighbours.
+fn summits<const N: usize>(worst: &[(PoseCandidate<N>, f64)]) -> Vec<PoseCandidate<N>> {
+    let spacing = TAU / f64::from(around::<N>());
+    // Neighbours differ in one angle.
+    let is_beside = |one: &PoseCandidate<N>, other: &PoseCandidate<N>| {
+        let apart = (1..N).map(|joint| (one.pose[joint] - other.pose[joint]).abs());
+        apart.map(|apart| apart.min(TAU - apart)).sum::<f64>() < 1.5 * spacing
+    };
+    let is_summit = |(pose, growth): &&(PoseCandidate<N>, f64)| {
+        let mut others = worst.iter().filter(|other| is_beside(pose, &other.0));
+        others.all(|other| other.1 <= *growth)
+    };
+    worst.iter().filter(is_summit).map(|pose| pose.0).collect()
 }
 
 /// `part / whole` of a turn, from -π \[rad\].
-fn part_of_turn(part: usize, whole: usize) -> f64 {
-    TAU * ratio(part, whole) - PI
-}
-
-fn ratio(part: usize, whole: usize) -> f64 {
-    length_in_f64(part) / length_in_f64(whole)
+fn part_of_turn(part: u32, whole: u32) -> f64 {
+    TAU * (f64::from(part) / f64::from(whole)) - PI
 }

@@ -36,12 +36,12 @@
 //! **Invariant:** the bound holds whenever the search ends, under gravity if the estimate holds. The number of boxes is
 //! bounded.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::control_loop::ControlLoop;
-use super::symmetric::{Symmetric, is_positive};
+use super::paused::pause;
+use super::stability::bisect;
 use crate::math::arm::Arm;
 use crate::math::dynamics::{coupling, mass_matrix, weight_moment};
 use crate::math::elementary::sin_cos;
@@ -51,18 +51,21 @@ use crate::math::pid::Gains;
 /// Relative distance of the bound from the limit of the worst pose: half of the promised 1 %.
 const SHARPNESS: f64 = 0.004;
 
-/// Most boxes that are split. The search then ends with the bound so far, after some 50 ms of one core (optimised
-/// build).
-const MAX_BOXES: u32 = 20_000;
+/// Most boxes that are split in a search for all limits. It then ends with the bound so far, after some 50 ms of one
+/// core (optimised build).
+pub(super) const MAX_BOXES: u32 = 20_000;
 
-/// Halvings of an interval of timesteps.
-const HALVINGS: u32 = 60;
+/// Boxes that are split in one piece: half a millisecond (optimised build).
+pub(super) const BOXES: u32 = 200;
+
+/// Halvings of the logarithm of a timestep, from an interval of 18 decades to a relative width of 1e-6.
+const HALVINGS: u32 = 26;
 
 /// Largest `ε`, the effect of gravity within the stages, for which there is a bound.
 const LARGEST_STAGE: f64 = 0.01;
 
-/// Intervals of timesteps in each of which two decreasing factors are bounded separately.
-const PARTS: u32 = 64;
+/// A symmetric matrix, row by row.
+type Symmetric<const N: usize> = [[f64; N]; N];
 
 /// A bound, and the pose at which it is tightest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,9 +76,42 @@ pub(super) struct Proven<const N: usize> {
     pub(super) pose: [f64; N],
 }
 
+/// The most memory of a proof, and of every search that contains one, in bytes: its boxes, in a tree whose nodes are at
+/// least half full. They are usually fuller, and all other memory is less than this reserve.
+pub const fn most_bytes<const N: usize>() -> usize {
+    2 * (MAX_BOXES as usize + 2) * size_of::<((u64, u32), Angles<N>)>()
+}
+
+/// The bound for held control in every pose, after at most `most` splits of a box; `None` if the proof does not apply.
+pub(super) async fn prove<const N: usize>(
+    control: &ControlLoop<N>,
+    most: u32,
+) -> Option<Proven<N>> {
+    let mut proof = Proof::new(control)?;
+    let mut splits = 0;
+    let bound = loop {
+        let Some(first) = proof.boxes.first_entry() else {
+            break f64::INFINITY;
+        };
+        let bound = f64::from_bits(first.key().0);
+        if splits == most || bound >= (1.0 - SHARPNESS) * proof.least.timestep {
+            break bound;
+        }
+        let angles = first.remove();
+        proof.split(angles);
+        splits += 1;
+        if splits.is_multiple_of(BOXES) {
+            pause().await;
+        }
+    };
+    Some(Proven {
+        timestep: bound.min(proof.cap),
+        pose: proof.least.pose,
+    })
+}
+
 /// A proof in progress.
-#[derive(Debug, Clone)]
-pub(super) struct Proof<const N: usize> {
+struct Proof<const N: usize> {
     arm: Arm<N>,
     gains: Gains<N>,
     is_euler: bool,
@@ -85,41 +121,18 @@ pub(super) struct Proof<const N: usize> {
     cap: f64,
     /// The smallest limit of the poses so far \[s\], and its pose.
     least: Proven<N>,
-    boxes: BinaryHeap<Angles<N>>,
-    cut: u32,
+    /// Boxes of joint angles with a bound below the cap, by the bits of the bound \[s\] and by their age. Bits of
+    /// positive numbers are ordered like the numbers.
+    boxes: BTreeMap<(u64, u32), Angles<N>>,
+    found: u32,
 }
 
-/// A box of joint angles.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Angles<const N: usize> {
-    /// The bound for every pose in it \[s\].
-    bound: f64,
-    middle: [f64; N],
-    half: [f64; N],
-}
-
-impl<const N: usize> Eq for Angles<N> {}
-
-/// Smallest bound first: the order is reversed, since [`BinaryHeap`] returns the greatest item.
-impl<const N: usize> Ord for Angles<N> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound)
-    }
-}
-
-impl<const N: usize> PartialOrd for Angles<N> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
+/// The middle and the half widths of a box of joint angles \[rad\].
+type Angles<const N: usize> = [[f64; N]; 2];
 
 impl<const N: usize> Proof<N> {
-    /// The most memory that a proof takes, in bytes: its boxes, in a buffer that grows by doubling.
-    pub(super) const MOST_BYTES: usize =
-        size_of::<Self>() + (MAX_BOXES + 2).next_power_of_two() as usize * size_of::<Angles<N>>();
-
-    /// A proof of held control, not begun; `None` if the proof does not apply.
-    pub(super) fn new(control: &ControlLoop<N>) -> Option<Self> {
+    /// A proof that has not begun; `None` if it does not apply.
+    fn new(control: &ControlLoop<N>) -> Option<Self> {
         let ControlLoop {
             arm, gains, method, ..
         } = control;
@@ -133,8 +146,8 @@ impl<const N: usize> Proof<N> {
                 timestep: f64::INFINITY,
                 pose: [0.0; N],
             },
-            boxes: BinaryHeap::new(),
-            cut: 0,
+            boxes: BTreeMap::new(),
+            found: 0,
         };
         proof.cap = proof.largest_for_gains()?;
         let half = std::array::from_fn(|joint| match joint {
@@ -144,58 +157,35 @@ impl<const N: usize> Proof<N> {
             _ => PI,
         });
         let middle = std::array::from_fn(|joint| if joint == 1 { FRAC_PI_2 } else { 0.0 });
-        proof.look_at(middle, half);
+        proof.look_at([middle, half]);
         Some(proof)
     }
 
-    /// Splits up to `boxes` boxes. Returns the bound once it cannot be sharpened further.
-    pub(super) fn advance(&mut self, boxes: u32) -> Option<Proven<N>> {
-        for _ in 0..boxes {
-            let Some(first) = self.boxes.peek().copied() else {
-                return Some(self.proven(f64::INFINITY));
-            };
-            let sharp = first.bound >= (1.0 - SHARPNESS) * self.least.timestep;
-            if sharp || first.bound >= self.cap || self.cut >= MAX_BOXES {
-                return Some(self.proven(first.bound));
-            }
-            self.boxes.pop();
-            self.cut += 1;
-            let Angles {
-                middle, mut half, ..
-            } = first;
-            let widest = (1..N).max_by(|&i, &j| half[i].total_cmp(&half[j]))?;
-            half[widest] *= 0.5;
-            for side in [-1.0, 1.0] {
-                let mut middle = middle;
-                middle[widest] += side * half[widest];
-                self.look_at(middle, half);
-            }
-        }
-        None
-    }
-
-    fn proven(&self, bound: f64) -> Proven<N> {
-        Proven {
-            timestep: bound.min(self.cap),
-            pose: self.least.pose,
+    /// Halves a box along its widest angle.
+    fn split(&mut self, [middle, mut half]: Angles<N>) {
+        let widest = (1..N).max_by(|&i, &j| half[i].total_cmp(&half[j]));
+        let widest = widest.unwrap_or(0);
+        half[widest] *= 0.5;
+        for side in [-1.0, 1.0] {
+            let mut middle = middle;
+            middle[widest] += side * half[widest];
+            self.look_at([middle, half]);
         }
     }
 
-    fn look_at(&mut self, middle: [f64; N], half: [f64; N]) {
-        let here = self.largest_for_mass(&self.least_mass(&middle, &[0.0; N]));
+    fn look_at(&mut self, angles: Angles<N>) {
+        let [middle, half] = &angles;
+        let here = self.largest_for_mass(&self.least_mass(middle, &[0.0; N]));
         if here < self.least.timestep {
             self.least = Proven {
                 timestep: here,
-                pose: middle,
+                pose: *middle,
             };
         }
-        let bound = self.largest_for_mass(&self.least_mass(&middle, &half));
+        let bound = self.largest_for_mass(&self.least_mass(middle, half));
         if bound < self.cap {
-            self.boxes.push(Angles {
-                bound,
-                middle,
-                half,
-            });
+            self.boxes.insert((bound.to_bits(), self.found), angles);
+            self.found += 1;
         }
     }
 
@@ -308,56 +298,57 @@ impl<const N: usize> Proof<N> {
         (cap > 0.0 && cap.is_finite()).then_some(cap)
     }
 
-    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds. Each interval is tested in the worst case: the
-    /// decreasing factors of P₁ P₂ at its end, and P₃, which decreases too, at its start.
+    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds: for the mass without the damping that the hold takes from
+    /// it, so that both sides are monotonic in the timestep.
     fn largest_for_integrals(&self, end: f64) -> f64 {
         let stretched = mass_matrix(&self.arm, &[0.0; N]);
         let mass: [f64; N] = dominating(|i, j| stretched[i][j], |j| stretched[j][j]);
-        let ki = &self.gains.ki;
-        let holds = |from: f64, to: f64| {
+        let Gains { kp, ki, .. } = &self.gains;
+        largest(end, |h| {
             let acting = (0..N).filter(|&j| ki[j] > 0.0);
             let pace = acting
-                .map(|j| self.spring(j, to) / ki[j])
+                .map(|j| self.spring(j, h) / ki[j])
                 .fold(f64::INFINITY, f64::min);
             (0..N).all(|j| {
                 // Gravity and the stages may increase P₃ by as much as they may decrease it.
-                let weight =
-                    0.25 * to * to * (self.weight[j] + 2.0 * self.stage(to) * self.gains.kp[j]);
-                let lost = 0.5 * from * self.gains.kd[j];
-                let gained = if self.is_euler {
-                    0.25 * to * to * (self.gains.kp[j] + 0.5 * to * ki[j])
+                let weight = self.weight[j] + 2.0 * self.stage(h) * kp[j];
+                let spring = if self.is_euler {
+                    kp[j] + 0.5 * h * ki[j]
                 } else {
                     0.0
                 };
-                pace * self.damping(j, to) > mass[j] - lost + weight + gained
+                pace * self.damping(j, h) > mass[j] + 0.25 * h * h * (weight + spring)
             })
-        };
-        let edge = |part: u32| end * f64::from(part) / f64::from(PARTS);
-        (0..PARTS)
-            .take_while(|&part| holds(edge(part), edge(part + 1)))
-            .last()
-            .map_or(0.0, |part| edge(part + 1))
+        })
     }
+}
+
+/// Whether every eigenvalue is positive: all pivots of an elimination are positive.
+fn is_positive<const N: usize>(matrix: &Symmetric<N>) -> bool {
+    let mut a = *matrix;
+    (0..N).all(|k| {
+        let pivot = a[k];
+        for row in a.iter_mut().skip(k + 1) {
+            let factor = row[k] / pivot[k];
+            for (entry, above) in row.iter_mut().zip(pivot).skip(k + 1) {
+                *entry -= factor * above;
+            }
+        }
+        // This is false for NaN too.
+        pivot[k] > 0.0 && pivot[k].is_finite()
+    })
 }
 
 /// The largest timestep up to `end` for which `holds` is true. It must be true up to some timestep and false beyond.
 fn largest(end: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let tiny = 1e-18 * end;
     if holds(end) {
-        return end;
+        end
+    } else if holds(tiny) {
+        bisect((tiny, end), HALVINGS, holds)
+    } else {
+        0.0
     }
-    let (mut good, mut bad) = (0.0, end);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (good + bad);
-        if holds(middle) {
-            good = middle;
-        } else {
-            bad = middle;
-        }
-        if bad - good < 1e-6 * good {
-            break;
-        }
-    }
-    good
 }
 
 /// A diagonal matrix D with -D ≤ A ≤ D for every symmetric A whose entries are no larger than these. It follows from

@@ -12,10 +12,11 @@
 //! **Invariant:** an accepted request bounds the steps, samples and work of its run. Its other numbers are checked
 //! where they are read.
 
+use super::beside::Steppable;
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::matrix::{largest, largest_difference};
-use super::paused::PieceWork;
+use super::paused::{PieceWork, at_once};
 use super::taylor::TaylorReference;
 use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, steps_in, whole};
@@ -198,6 +199,12 @@ pub async fn rollout<const N: usize>(
         from_ideal: ideals.as_ref().map(|_| Deviation::default()),
         ..Rollout::default()
     };
+    // With a law, references follow every step. Without one, short spans keep the pieces short.
+    let stride = if ideals.is_some() {
+        1
+    } else {
+        whole(MAX_SPAN / control.timestep).clamp(1, 1000)
+    };
     let mut piece = PieceWork::default();
     let evaluations = u64::from(control.method.evaluations());
     for index in 0..samples {
@@ -205,7 +212,7 @@ pub async fn rollout<const N: usize>(
         let due = (2 * index * steps + intervals) / (2 * intervals);
         while run.steps() < due && run.divergence().is_none() {
             let ahead = due - run.steps();
-            let taken = run.advance(ahead.min(stride(&request)));
+            let taken = run.advance(ahead.min(stride));
             piece.spend(taken * evaluations).await;
             for reference in references.as_deref_mut().into_iter().flatten() {
                 reference.follow(taken, &mut piece).await;
@@ -225,16 +232,6 @@ pub async fn rollout<const N: usize>(
     Ok(made)
 }
 
-/// Steps per call: one if references evaluate the law in every step. Otherwise at most [`MAX_SPAN`] of them, so that
-/// the spans of a reference and the pieces stay short.
-fn stride<const N: usize>(request: &RolloutRequest<N>) -> u64 {
-    if request.reference && !request.control.is_free() {
-        1
-    } else {
-        whole(MAX_SPAN / request.control.timestep).clamp(1, 1000)
-    }
-}
-
 impl<const N: usize> Rollout<N> {
     fn sample(
         &mut self,
@@ -248,13 +245,17 @@ impl<const N: usize> Rollout<N> {
         self.velocities.push(state.velocity);
         self.efforts.push(*run.effort());
         self.energy.push(energy(run.arm(), state));
-        let last_digit = last_digit(state);
+        let last_digit = f64::EPSILON * largest(state.position.iter().map(|q| q.abs())).max(1.0);
         if let (Some(deviation), Some(references)) = (&mut self.deviation, references)
             && references.iter().all(|one| !one.is_lost)
         {
-            let states = references.each_ref().map(|one| one.taylor.state());
-            let spread = SPREAD * largest_distance(&states);
-            let error = largest_difference(&state.position, &states[0].position);
+            let poses = references.each_ref().map(|it| it.state().position);
+            let pairs = poses
+                .iter()
+                .flat_map(|one| poses.iter().map(move |it| (one, it)));
+            let apart = pairs.map(|(one, other)| largest_difference(one, other));
+            let spread = SPREAD * largest(apart);
+            let error = largest_difference(&state.position, &poses[0]);
             deviation.take(error, spread.max(last_digit));
         }
         if let (Some(deviation), Some([first, second])) = (&mut self.from_ideal, ideals)
@@ -313,8 +314,8 @@ impl<const N: usize> Ideal<N> {
     }
 }
 
-/// The reference motion of the run.
-struct Reference<const N: usize> {
+/// The reference motion of a run: the same law at the same instants, and between them the arm to rounding.
+pub(super) struct Reference<const N: usize> {
     arm: Arm<N>,
     taylor: TaylorReference<N>,
     pid: Pid<N>,
@@ -326,7 +327,8 @@ struct Reference<const N: usize> {
 }
 
 impl<const N: usize> Reference<N> {
-    fn new(control: &ControlLoop<N>, start: State<N>, index: usize) -> Self {
+    /// One of several references of a loop, which differ by rounding.
+    pub(super) fn new(control: &ControlLoop<N>, start: State<N>, index: usize) -> Self {
         let held = Held {
             period: control.period,
             ..Held::default()
@@ -341,30 +343,44 @@ impl<const N: usize> Reference<N> {
         }
     }
 
-    /// Follows the run by this number of its steps: one by one with a control law, else in one span.
+    /// Follows the run by this number of its steps, which is 1 with a control law.
     async fn follow(&mut self, steps: u64, piece: &mut PieceWork) {
-        let has_law = self.pid.is_enabled();
-        let (stretches, stretch) = if has_law || steps == 0 {
-            (steps, self.timestep)
-        } else {
-            (1, in_f64(steps) * self.timestep)
-        };
-        for _ in 0..stretches {
-            if self.is_lost {
-                return;
-            }
-            let mut effort = [0.0; N];
-            if has_law {
-                let (control, held) = self.hold.begin_step(&self.pid, self.taylor.state());
-                effort = control.effort;
-                self.pid.commit(control.integral);
-                self.hold.commit(held);
-            }
-            let followed = self
-                .taylor
-                .follow_in_pieces(&self.arm, &effort, stretch, piece);
-            self.is_lost = !followed.await;
+        if self.is_lost {
+            return;
         }
+        let mut effort = [0.0; N];
+        if self.pid.is_enabled() {
+            let (control, held) = self.hold.begin_step(&self.pid, self.taylor.state());
+            effort = control.effort;
+            self.pid.commit(control.integral);
+            self.hold.commit(held);
+        }
+        let span = in_f64(steps) * self.timestep;
+        let followed = self
+            .taylor
+            .follow_in_pieces(&self.arm, &effort, span, piece);
+        self.is_lost = !followed.await;
+    }
+}
+
+/// Most series coefficients of a motion that is compared step by step: a few seconds of one core.
+const MAX_COEFFICIENTS: u64 = 40_000_000;
+
+impl<const N: usize> Steppable<N> for Reference<N> {
+    fn advance(&mut self, steps: u64) -> u64 {
+        let mut follow = || {
+            at_once(self.follow(1, &mut PieceWork::default()));
+            !self.is_lost && self.evaluations() <= MAX_COEFFICIENTS
+        };
+        (0..steps).take_while(|_| follow()).count() as u64
+    }
+
+    fn evaluations(&self) -> u64 {
+        self.taylor.coefficients()
+    }
+
+    fn state(&self) -> &State<N> {
+        self.taylor.state()
     }
 }
 
@@ -382,21 +398,4 @@ fn neighbour<const N: usize>(arm: &Arm<N>, index: usize) -> Arm<N> {
         };
     }
     Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
-}
-
-/// Largest distance of any two states in a joint position \[rad\]; NaN counts as the largest.
-fn largest_distance<const N: usize>(states: &[&State<N>]) -> f64 {
-    let pairs = states.iter().enumerate().flat_map(|(index, one)| {
-        let others = &states[..index];
-        others
-            .iter()
-            .map(|other| largest_difference(&one.position, &other.position))
-    });
-    largest(pairs)
-}
-
-/// One unit in the last place of a joint position \[rad\].
-fn last_digit<const N: usize>(state: &State<N>) -> f64 {
-    let largest = largest(state.position.iter().map(|q| q.abs()));
-    f64::EPSILON * largest.max(1.0)
 }

@@ -36,9 +36,9 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
         return false;
     }
     let flow = linear.flow();
-    let times = flow.inverse().map_or_else(Vec::new, |it| it.eigenvalues());
     let sizes = modes.iter().map(|mode| mode.modulus());
-    let mut sizes = sizes.chain(times.iter().map(|time| 1.0 / time.modulus()));
+    let slow = shifted_modes(&flow, 0.0).into_iter();
+    let mut sizes = sizes.chain(slow.map(|(re, im)| hypot(re, im)));
     sizes.any(|size| {
         let modes = shifted_modes(&flow, SHIFT * size);
         modes.into_iter().any(|(re, im)| {
@@ -51,10 +51,7 @@ pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64
 
 /// Real and imaginary parts of the modes, from the eigenvalues of the shifted inverse; empty if the matrix is singular.
 fn shifted_modes(flow: &Matrix, shift: f64) -> Vec<(f64, f64)> {
-    let shifted = Matrix::from_fn(flow.size(), |row, column| {
-        flow[(row, column)] - if row == column { shift } else { 0.0 }
-    });
-    let inverse = shifted.inverse();
+    let inverse = flow.clone().plus_diagonal(-shift).inverse();
     let times = inverse.map_or_else(Vec::new, |inverse| inverse.eigenvalues());
     let mode = |time: Complex| {
         let modulus = time.modulus();

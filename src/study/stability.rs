@@ -20,11 +20,10 @@
 //! ignored.
 
 pub use super::critical::{BEYOND, Critical};
-pub use super::limits::{
-    ADVISED_PART, Limits, Rest, limit_held, limits, most_bytes, search_limits,
-};
+pub use super::limits::{ADVISED_PART, Limits, Rest, limit_held, limits, search_limits};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
+pub use super::proof::most_bytes;
 use super::slow_modes;
 use crate::math::integrator::Method;
 
@@ -167,7 +166,7 @@ impl<'a> Stepping<'a> {
 
     /// The matrix by which one period \[s\] changes a deviation; states as in [`Linear::flow`].
     pub fn matrix(&self, period: f64) -> Matrix {
-        self.generator(period).shifted_identity(period)
+        self.generator(period).scaled(period).plus_diagonal(1.0)
     }
 
     /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].
@@ -211,8 +210,7 @@ impl<'a> Stepping<'a> {
             let product = step.product(&sum);
             sum = sum.plus(1.0, step).plus(h, &product);
         }
-        let size = sum.size();
-        Matrix::zeros(size).plus(1.0 / f64::from(self.substeps), &sum)
+        sum.scaled(1.0 / f64::from(self.substeps))
     }
 
     /// The law acts once a period, for the next period: efforts are states, `u ↦ -kp x - kd v`.

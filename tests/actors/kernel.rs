@@ -10,7 +10,6 @@ use crate::stage::{Client, Stage, ms, pass};
 use crate::system::in_virtual_time;
 use pendularm::actors::resources::work_clock;
 use pendularm::math::arm::Arm;
-use pendularm::math::pid::Gains;
 use pendularm_wasm::Kernel;
 use serde_json::{Value, json};
 use tokio::time::Instant;
@@ -38,7 +37,6 @@ const SEED: u64 = 11;
 impl<const N: usize> Both<N>
 where
     Arm<N>: Default,
-    Gains<N>: Default,
 {
     async fn start() -> Self {
         // A busy machine defers no step. The kernel's budget follows the virtual clock, and the runtime's budget counts
@@ -229,7 +227,6 @@ const SERVED: [&str; 20] = [
 async fn every_answer_is_the_same<const N: usize>()
 where
     Arm<N>: Default,
-    Gains<N>: Default,
 {
     let mut both = Both::<N>::start().await;
     let (mut good, mut refused) = (0, 0);

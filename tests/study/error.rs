@@ -12,7 +12,7 @@ use pendularm::report::experiments::task::LOST;
 fn every_method_has_its_order_in_every_scene_but_where_the_effort_is_held() {
     for scene in scenes() {
         // A held effort is half a step old on average: first order, whatever the method.
-        let held = scene.control == "held";
+        let held = scene.is_held;
         for method in Method::ALL {
             // Fine enough for the leading term to be all of the error, also of Euler in a whirl.
             let steps = match method.order() {

@@ -18,6 +18,7 @@
 )]
 
 mod clocks;
+mod drawing;
 mod equilibrium;
 mod error;
 mod experiments;

@@ -8,9 +8,12 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
+use pendularm::study::beside::{Steppable, largest_distance};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::paused::at_once;
 use pendularm::study::planner::{self, Candidate, MAX_DURATION, PlanError, Planned, Task};
+
+use crate::reference::state;
 
 pub(crate) fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     at_once(planner::plan(task))
@@ -47,7 +50,7 @@ fn error_within<const N: usize>(
     (1..=count)
         .map(|sample| {
             live.advance(every as u64);
-            tip(live.state()).distance(tip(&truth.state(spacing * sample as f64)))
+            tip(live.state()).distance(tip(&state(&truth, spacing * sample as f64)))
         })
         .fold(0.0, f64::max)
 }
@@ -180,4 +183,32 @@ fn a_plan_without_a_run_gives_the_reason() {
         why.contains("unstable") && !why.contains("4000000"),
         "{why}"
     );
+}
+
+/// A run that has diverged.
+struct Diverged(State<2>);
+
+impl Steppable<2> for Diverged {
+    fn advance(&mut self, _: u64) -> u64 {
+        0
+    }
+
+    fn evaluations(&self) -> u64 {
+        0
+    }
+
+    fn state(&self) -> &State<2> {
+        &self.0
+    }
+}
+
+#[test]
+fn a_run_that_diverges_is_infinitely_far_off_however_far_is_allowed() {
+    let arm = Arm::default();
+    let run = || Box::new(Diverged(State::rest()));
+    let reference = || Box::new(ControlLoop::free(arm).simulation(State::rest()));
+    let off = largest_distance(&arm, (run(), 1_000_000), (reference(), 1), f64::INFINITY);
+    assert!(at_once(off).is_infinite());
+    let off = largest_distance(&arm, (reference(), 1_000_000), (run(), 1), f64::INFINITY);
+    assert!(at_once(off).is_infinite());
 }

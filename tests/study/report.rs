@@ -83,3 +83,23 @@ fn an_unreadable_kept_section_is_reported_with_its_file() {
     // The refusal comes before any section is made, which takes minutes.
     assert!(!out.join("sections/conditioning.json").exists());
 }
+
+/// A count without a kept number would be shown as not measured, and a line of the wrong columns would be left out.
+#[test]
+fn every_line_and_every_count_of_the_work_is_shown() {
+    let out = Folder::new("report-work");
+    let page = run(&quick(&out, &["work"])).unwrap();
+    let html = fs::read_to_string(page).unwrap();
+    assert!(!html.contains("not measured"));
+    assert!(html.contains("counted with pendularm "), "no version");
+    let report = fs::read_to_string(out.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let work = &report["sections"][0];
+    let count = |list: &serde_json::Value| list.as_array().unwrap().len();
+    let lines = |text: &str| text.lines().count();
+    let left_out = include_str!("../../src/report/figures/left_out.txt");
+    assert_eq!(count(&work["tables"][0]["rows"]), lines(left_out) - 1);
+    // Two more claims compare counts with each other.
+    let below = include_str!("../../src/report/figures/below.txt");
+    assert_eq!(count(&work["verdicts"]), lines(below) + 2);
+}

@@ -5,7 +5,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::error_estimate::{estimate, estimate_step};
+use pendularm::study::error_estimate::estimate;
 use pendularm::study::paused::{Paused, at_once};
 use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutRequest, rollout};
 use pendularm::study::taylor::TaylorReference;
@@ -257,7 +257,10 @@ fn the_error_of_a_step_is_estimated_at_rest_and_in_motion() {
             .flat_map(|one| [(one, 4e-3), (one, 1e-2)])
         {
             let arm = Arm::<3>::default();
-            let estimate = estimate_step(&arm, &state, &effort, method, h).unwrap();
+            let control = ControlLoop::free(arm).with_method(method);
+            let mut simulation = control.with_timestep(h).simulation(state);
+            simulation.drive(Some(effort));
+            let estimate = estimate(&simulation).unwrap();
             let mut truth = TaylorReference::new(state);
             assert!(truth.follow(&arm, &effort, h));
             let (dq, dv) = pendularm::math::integrator::increment(

@@ -5,7 +5,7 @@ use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::taylor::{ROUNDING, TaylorReference};
 use serde_json::Value;
 
-use crate::reference::{array, numbers, stored};
+use crate::reference::{array, numbers, state, stored};
 
 fn size<const N: usize>(x: &[f64; N]) -> f64 {
     x.iter().map(|x| x.abs()).fold(0.0, f64::max)
@@ -144,7 +144,7 @@ fn an_asked_tolerance_is_kept() {
 /// Against twice the digits: the error, and the effect of a start at the next double.
 fn beside_twice_the_digits<const N: usize>(arm: &Arm<N>, start: &State<N>, time: f64) -> [f64; 2] {
     let truth = ReferenceMotion::new(arm, start, &Law::FREE, time);
-    let truth = truth.state(time).position;
+    let truth = state(&truth, time).position;
     let end = |start: State<N>| {
         let mut follower = TaylorReference::new(start);
         (0..16).for_each(|_| assert!(follower.follow(arm, &[0.0; N], time / 16.0)));
@@ -216,7 +216,7 @@ fn a_wound_up_joint_moves_as_any_other() {
     let truth = ReferenceMotion::new(&arm, &wound, &Law::FREE, 0.5);
     let mut follower = TaylorReference::new(wound);
     assert!(follower.follow(&arm, &[0.0; 2], 0.5));
-    let off = difference(&follower.state().velocity, &truth.state(0.5).velocity);
+    let off = difference(&follower.state().velocity, &state(&truth, 0.5).velocity);
     assert!(off < 1e-8, "{off:e}");
 }
 

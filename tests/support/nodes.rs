@@ -10,17 +10,13 @@ use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::nodes::start_arm;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::Nodes;
-use pendularm::math::pid::Gains;
 
 /// Starts all nodes and hands them to the registry. Computations wait for the turns of the pool.
 pub async fn start_whole<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     seed: u64,
-) -> (Addr<ArmSim<N>>, WorkerPool)
-where
-    Gains<N>: Default,
-{
+) -> (Addr<ArmSim<N>>, WorkerPool) {
     let mut nodes = Nodes::default();
     let pool = WorkerPool::without_threads();
     let arm = start_arm(registry, gauges, &pool, seed, &mut nodes);

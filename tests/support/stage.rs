@@ -20,7 +20,7 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Registry;
 use pendularm::actors::node::{Ask, Call, Publish, Reply, guard};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
 use pendularm_client::pipe;
@@ -46,10 +46,7 @@ pub struct Stage<const N: usize> {
     pub gauges: Arc<Gauges>,
 }
 
-impl<const N: usize> Stage<N>
-where
-    Gains<N>: Default,
-{
+impl<const N: usize> Stage<N> {
     pub async fn start() -> Self {
         Self::with_seed(1).await
     }

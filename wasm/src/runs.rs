@@ -56,7 +56,6 @@ pub fn text() -> String {
 fn answers<const N: usize>(text: &mut String)
 where
     Arm<N>: Default,
-    Gains<N>: Default,
 {
     let mut kernel = Kernel::<N>::new(|| Duration::ZERO, 0);
     for (service, args) in QUESTIONS {
@@ -71,7 +70,6 @@ where
 fn line<const N: usize>(text: &mut String, method: Method, on: bool)
 where
     Arm<N>: Default,
-    Gains<N>: Default,
 {
     let mut simulation = Simulation::<N>::new(Arm::default(), Gains::default());
     simulation.set_method(method);

@@ -16,7 +16,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::state_after;
-use pendularm::report::experiments::reference::{Law, ReferenceMotion};
+use pendularm::report::experiments::reference::{DoubleDouble, Law, ReferenceMotion};
 use pendularm::study::taylor::TaylorReference;
 
 /// Duration of the swing \[s\].
@@ -58,7 +58,7 @@ fn start<const N: usize>() -> State<N> {
 
 fn reference<const N: usize>() {
     let motion = ReferenceMotion::new(&Arm::<N>::default(), &start(), &Law::FREE, DURATION);
-    let end = motion.state(DURATION).position;
+    let end = motion.angles(DURATION).map(DoubleDouble::to_f64);
     let angles: Vec<String> = end.iter().map(|q| format!("{q:?}")).collect();
     println!("{} {:e}", angles.join(" "), motion.uncertainty(DURATION));
 }
@@ -130,7 +130,7 @@ fn all<const N: usize, const M: usize>(angles: &[f64]) {
         || {
             let start = black_box(start::<N>());
             let motion = ReferenceMotion::new(&arm, &start, &Law::FREE, DURATION);
-            Some(motion.state(DURATION).position)
+            Some(motion.angles(DURATION).map(DoubleDouble::to_f64))
         },
     );
     ode_solvers::<N, M>(angles, &arm);
@@ -157,7 +157,7 @@ impl<const N: usize, const M: usize> System<f64, SVector<f64, M>> for FirstOrder
 
 fn ode_solvers<const N: usize, const M: usize>(angles: &[f64], arm: &Arm<N>) {
     let first = || SVector::<f64, M>::from_fn(|i, _| if i < N { START.0 } else { START.1 });
-    let angles = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
+    let position = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
     // Both have the same functions, but no common trait.
     macro_rules! sweep {
         ($solver:ident, $name:literal) => {
@@ -174,7 +174,7 @@ fn ode_solvers<const N: usize, const M: usize>(angles: &[f64], arm: &Arm<N>) {
                     );
                     solver.set_output(OutputType::Sparse);
                     solver.integrate().ok()?;
-                    solver.y_out().last().map(|y| angles(y.as_slice()))
+                    solver.y_out().last().map(|y| position(y.as_slice()))
                 });
             }
         };

@@ -51,10 +51,7 @@ fn counted() -> u64 {
     ALLOCATIONS.load(Ordering::Relaxed)
 }
 
-fn steps<const N: usize>()
-where
-    Gains<N>: Default,
-{
+fn steps<const N: usize>() {
     for pid in [false, true] {
         for method in Method::ALL {
             let mut simulation = Simulation::<N>::new(Arm::default(), Gains::default());

@@ -9,15 +9,11 @@
 use std::hint::black_box;
 
 use pendularm::math::integrator::Method;
-use pendularm::math::pid::Gains;
 use pendularm::study::error_estimate::estimate;
 use pendularm_benches::step_scene::ready;
 
 /// The arm under its controller, stepped by Runge-Kutta 4.
-fn estimates<const N: usize>(count: u64)
-where
-    Gains<N>: Default,
-{
+fn estimates<const N: usize>(count: u64) {
     let simulation = ready::<N>(9.81, true, true, Method::Rk4);
     for _ in 0..count {
         black_box(estimate(black_box(&simulation)));

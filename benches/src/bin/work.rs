@@ -12,15 +12,11 @@ use std::hint::black_box;
 use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
-use pendularm::math::pid::Gains;
 use pendularm_benches::step_scene::{ready, undamped};
 
 // A separate function, so its name identifies the counts of the arm's code, for any inlining.
 #[inline(never)]
-fn step<const N: usize>(method: Method, what: &str, count: u64)
-where
-    Gains<N>: Default,
-{
+fn step<const N: usize>(method: Method, what: &str, count: u64) {
     let has = |word: &str| what.split('-').any(|part| part == word);
     let gravity = if has("weightless") { 0.0 } else { 9.81 };
     let control = ["pd", "pi", "pid", "pushed"].iter().any(|law| has(law));

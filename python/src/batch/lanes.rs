@@ -174,10 +174,7 @@ pub(crate) fn end_effectors<const N: usize>(lanes: &[Simulation<N>]) -> PyResult
 }
 
 /// Arms in the starting pose, as in a fresh runtime.
-pub(crate) fn fresh<const N: usize>(arms: usize) -> PyResult<Vec<Simulation<N>>>
-where
-    Gains<N>: Default,
-{
+pub(crate) fn fresh<const N: usize>(arms: usize) -> PyResult<Vec<Simulation<N>>> {
     let fresh = Simulation::new(Arm::default(), Gains::default());
     collected(arms, std::iter::repeat_n(fresh, arms))
 }

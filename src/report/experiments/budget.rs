@@ -8,9 +8,7 @@
 //! **Invariant:** each of the three parts is a difference of two computed motions; none is the remainder of the others.
 
 use super::error::{REACH_GAINS, REACH_SETPOINT};
-use super::reference::{
-    DoubleDouble, Law, ReferenceMotion, distance, exact_steps, largest_difference,
-};
+use super::reference::{DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -98,8 +96,8 @@ impl Budget {
                     .map(|q| if is_whole { q } else { f64::NAN });
                 raise(&mut parts.total, largest_difference(law, &live));
                 raise(&mut parts.rounding, largest_difference(exact, &live));
-                raise(&mut parts.truncation, distance(exact, plant));
-                raise(&mut parts.hold, distance(plant, law));
+                raise(&mut parts.truncation, largest_difference(exact, plant));
+                raise(&mut parts.hold, largest_difference(plant, law));
             }
             parts
         };

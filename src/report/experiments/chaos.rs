@@ -2,16 +2,13 @@
 //!
 //! **Invariant:** every run starts at a stated state and uses the live arm's stepper.
 
-use std::f64::consts::FRAC_PI_2;
-
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
-use crate::math::dynamics::{
-    coupling, energy, kinetic_energy, potential_energy, solve, weight_moment,
-};
+use crate::math::dynamics::{coupling, energy, kinetic_energy, solve, weight_moment};
 use crate::math::integrator::Method;
 use crate::math::trig;
 use crate::study::control_loop::ControlLoop;
+use crate::study::motion::lowest;
 use crate::study::taylor::series::{differences, sums};
 
 /// Energy drift over the energy scale, largest so far, at step counts that grow by a constant factor: `(time, drift)`.
@@ -46,8 +43,7 @@ pub fn symplectic_drift<const N: usize>(
 /// The scale of energies \[J\]: twice the largest possible potential energy plus the initial kinetic energy. Never the
 /// energy itself, which is 0 for an arm let go from the horizontal.
 fn energy_scale<const N: usize>(arm: &Arm<N>, start: &State<N>) -> f64 {
-    let upright = std::array::from_fn(|i| if i == 0 { FRAC_PI_2 } else { 0.0 });
-    2.0 * potential_energy(arm, &upright) + kinetic_energy(arm, &start.position, &start.velocity)
+    kinetic_energy(arm, &start.position, &start.velocity) - 2.0 * lowest(arm)
 }
 
 fn drift<const N: usize>(

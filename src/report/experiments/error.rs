@@ -45,8 +45,8 @@ pub struct Scene {
     pub name: &'static str,
     /// The scene in words, for a heading.
     pub title: &'static str,
-    /// How the effort is computed: `none`, `continuous` or `held`.
-    pub control: &'static str,
+    /// Whether an effort is held for each step.
+    pub is_held: bool,
     /// The largest stable timestep \[s\] of each method that has one, as predicted for the control at its setpoint.
     pub(crate) limits: Vec<(Method, f64)>,
     /// The motion.
@@ -102,23 +102,22 @@ fn swing<const N: usize>(
     start: State<N>,
 ) -> Scene {
     let control = ControlLoop::free(arm);
-    arm_scene((name, title, "none"), control, start, Sampling::Held)
+    arm_scene((name, title), control, start, Sampling::Held)
 }
 
 fn reach(name: &'static str, title: &'static str, sampling: Sampling) -> Scene {
-    let names = (name, title, sampling.name());
     let control = ControlLoop::new(Arm::default(), REACH_GAINS, REACH_SETPOINT);
     let linear = Linear::at_setpoint(&control);
     let limit = |method| Some((method, largest_timestep(&linear, method, sampling)?));
     Scene {
         limits: Method::ALL.into_iter().filter_map(limit).collect(),
-        ..arm_scene(names, control, State::rest(), sampling)
+        ..arm_scene((name, title), control, State::rest(), sampling)
     }
 }
 
 /// An arm in motion. The reference has a continuous-time law with integral gains of 0.
 fn arm_scene<const N: usize>(
-    (name, title, control): (&'static str, &'static str, &'static str),
+    (name, title): (&'static str, &'static str),
     law_loop: ControlLoop<N>,
     start: State<N>,
     sampling: Sampling,
@@ -129,7 +128,7 @@ fn arm_scene<const N: usize>(
     Scene {
         name,
         title,
-        control,
+        is_held: sampling == Sampling::Held && !law_loop.is_free(),
         limits: Vec::new(),
         task: Task {
             duration: ARM_DURATION,

@@ -236,7 +236,7 @@ impl Implicit {
     fn midpoint(&mut self) -> Option<Whole> {
         let (y, h) = (self.y, self.h);
         let (mut k, jacobian) = self.jacobian();
-        let newton = jacobian.shifted_identity(-0.5 * h);
+        let newton = jacobian.scaled(-0.5 * h).plus_diagonal(1.0);
         for _ in 0..MAX_ITERATIONS {
             let f = self.slope(&moved(&y, &k, 0.5 * h));
             let left: Vec<f64> = (0..4).map(|i| f[i] - k[i]).collect();

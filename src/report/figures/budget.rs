@@ -93,7 +93,7 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
         return;
     };
     let period = seconds(rk4.timestep);
-    section.find(format!(
+    section.findings.push(format!(
         "**Holding the effort costs {} rad, RK4's truncation {} and rounding {}**. These are errors at a control \
          period of {period}, on {REACH}. The hold is measured against a law that acts at every instant. A better \
          method cannot recover the loss of the control period.",
@@ -101,7 +101,7 @@ fn findings(section: &mut Section, held: &[Vec<Parts>]) {
         scientific(rk4.truncation),
         scientific(rk4.rounding)
     ));
-    section.find(format!(
+    section.findings.push(format!(
         "**Against the loop whose law runs at the same instants RK4 is {} rad off, Verlet {} and Euler {}**, on the \
          same reach at {period}. The method matters for the simulation, the period for the control.",
         scientific(rk4.truncation),

@@ -53,7 +53,7 @@ pub(super) fn make(section: &mut Section) {
         all if all.is_infinite() => "all".to_owned(),
         digits => number(digits),
     };
-    section.find(format!(
+    section.findings.push(format!(
         "**With a last link up to 10⁹ times lighter or heavier than the others, bent and stretched arms lose at most \
          {} of 16 digits**. With the second link folded back onto the first they lose up to {}. At most {} of them are \
          lost by the arm's own algorithm; the rest is due to the angles' last bits. Eliminating the mass matrix loses \

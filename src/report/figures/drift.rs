@@ -61,7 +61,7 @@ pub(super) fn make(section: &mut Section) {
         one_digit(chaotic.end(Method::Verlet)),
         one_digit(chaotic.end(Method::Rk4))
     );
-    section.find(format!(
+    section.findings.push(format!(
         "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} \
          with RK4**. These are {ENSEMBLE} swings released a billionth of a radian apart. This Verlet is not \
          symplectic: the forces of an arm depend on velocity.",

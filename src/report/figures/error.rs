@@ -99,10 +99,6 @@ impl Data {
         times.sort_by(f64::total_cmp);
         times.get(times.len() / 2).copied()
     }
-
-    fn is_held(&self) -> bool {
-        self.scene.control == "held"
-    }
 }
 
 impl Run {
@@ -207,7 +203,7 @@ fn against_timestep(section: &mut Section, data: &[Data]) {
         });
         plot.curves.extend(limits.chain(strokes));
     }
-    let held = data.iter().find(|data| data.is_held());
+    let held = data.iter().find(|data| data.scene.is_held);
     let order = |method| {
         let order = held.and_then(|data| data.order(method));
         order.map_or_else(|| "?".to_owned(), |order| format!("{order:.2}"))
@@ -234,7 +230,7 @@ fn findings(section: &mut Section, data: &[Data]) {
         // Euler takes an evaluation a step.
         let euler = cost(Method::Euler).map(|euler| times(euler.evaluations()));
         let euler = euler.unwrap_or_else(|| format!("over {}", times(in_f64(MOST_SEARCHED))));
-        section.find(format!(
+        section.findings.push(format!(
             "**To stay within 10⁻⁴ rad of the true motion on a free 2-link swing of {} s RK4 takes steps of {}**, and \
              {} evaluations per simulated second. Verlet needs {} times as many and Euler {euler} times.",
             number(swing.scene.task.duration),
@@ -247,7 +243,7 @@ fn findings(section: &mut Section, data: &[Data]) {
     // 2 s in 2048 steps: the power of two next to the default timestep.
     let at = |method| held.and_then(|held| held.of(method).find(|run| run.outcome.steps == 2048));
     if let (Some(rk4), Some(verlet)) = (at(Method::Rk4), at(Method::Verlet)) {
-        section.find(format!(
+        section.findings.push(format!(
             "**Against a law that acts at every instant RK4 is no better than Verlet, once the effort is held for each \
              step**. On {REACH} they are {} and {} rad off at a timestep of {}. The control period decides there.",
             scientific(rk4.outcome.error),
@@ -262,7 +258,7 @@ fn verdicts(section: &mut Section, data: &[Data]) {
         .iter()
         .flat_map(|data| Method::ALL.map(|method| (data, method)));
     let fitted = all.filter_map(|(data, method)| {
-        let expected = if data.is_held() {
+        let expected = if data.scene.is_held {
             1.0
         } else {
             f64::from(method.order())

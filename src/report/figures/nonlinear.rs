@@ -10,7 +10,7 @@ use crate::report::section::Section;
 use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Unit, number};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
-use crate::study::stability::{limit_held, limits};
+use crate::study::stability::{ADVISED_PART, limit_held, limits};
 
 /// A kind of motion: its name, its second axis, and the ends of the axes (timestep \[s\], amplitude or speed).
 struct Kind {
@@ -32,9 +32,6 @@ const SWINGS: Kind = Kind {
     steps: (1e-3, 0.5),
     values: (0.3, 300.0),
 };
-
-/// The advised part of the predicted limit.
-const ADVISED: f64 = 0.8;
 
 pub(super) fn make(section: &mut Section) {
     let columns = section.choose(32, 12);
@@ -67,7 +64,7 @@ pub(super) fn make(section: &mut Section) {
         (swings, carried),
     ] {
         section.claim(
-            format!("Within {ADVISED} of the predicted limit {motions} (in 98 of 100 cells)"),
+            format!("Within {ADVISED_PART} of the predicted limit {motions} (in 98 of 100 cells)"),
             format!("{} of {cells} cells", cells - lost),
             cells > 0 && 50 * lost <= cells,
         );
@@ -107,7 +104,7 @@ fn map<P: Fn(f64) -> f64, H: Fn(f64, f64) -> bool>(
             }
             for h in &steps {
                 let holds = holds(*value, *h);
-                if *h <= ADVISED * limit {
+                if *h <= ADVISED_PART * limit {
                     counts.0 += 1;
                     counts.1 += usize::from(!holds);
                 }
@@ -150,7 +147,7 @@ fn floquet(section: &mut Section) {
         first.and_then(|first| Some((SWINGS.get(first.checked_sub(1)?)?, SWINGS.get(first)?)));
     let swing =
         "**The periodic swing of 2 links that begins at small amplitude is stable by itself";
-    section.find(match (ends, SWINGS.last().zip(multipliers.last().copied().flatten())) {
+    section.findings.push(match (ends, SWINGS.last().zip(multipliers.last().copied().flatten())) {
         (Some((&(mut stable), &(mut unstable))), Some((last, multiplier))) => {
             for _ in 0..4 {
                 let middle = 0.5 * (stable + unstable);

@@ -51,7 +51,7 @@ pub(super) fn make(section: &mut Section) {
         "**{} of {run} stiff and extreme scenes agree with theory**",
         run - short.len()
     );
-    section.find(match short.is_empty() {
+    section.findings.push(match short.is_empty() {
         true => finding + ".",
         false => format!("{finding}; these do not: {names}."),
     });

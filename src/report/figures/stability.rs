@@ -29,7 +29,7 @@ fn finding(section: &mut Section) {
     let of = |method| limits(&stiffened(1.0).with_method(method));
     let (rk4, verlet) = (of(Method::Rk4), of(Method::Verlet));
     let said = |limit: Option<f64>| seconds(limit.unwrap_or(f64::NAN));
-    section.find(format!(
+    section.findings.push(format!(
         "**Held at (0.4, 0.8) with the default gains, the 2-link arm goes unstable at {} with RK4 and at {} with \
          Verlet**. Both limits are the same, since the effort is held for the step. With the law in every stage RK4 \
          would be stable up to {}. That limit belongs to the simulation. The first one belongs to the controller, and \
@@ -193,12 +193,8 @@ fn control_period(section: &mut Section) {
     let dots = section.choose(12, 4);
     let mut growth = Growth::default();
     let panels = Method::ALL.map(|method| growth.panel(method, dots));
-    let Growth {
-        dots,
-        furthest,
-        apart,
-    } = growth;
-    let (apart, furthest_percent) = (number(100.0 * apart), number(100.0 * furthest));
+    let (dots, furthest) = (growth.dots, growth.furthest);
+    let (apart, furthest_percent) = (number(100.0 * growth.apart), number(100.0 * furthest));
     section.claim(
         "A deviation of the arm grows per control period as the spectral radius says (within 0.1 %)",
         format!("furthest off {furthest_percent} % in {dots} measurements with 1, 10 and 100 steps per period"),

@@ -7,12 +7,13 @@
 //! **Invariant:** a value outside the axes is drawn at the edge as lost, never dropped silently.
 
 mod axis;
-mod numbers;
+pub mod numbers;
 mod plot;
 
-pub(crate) use axis::{Axis, Unit};
+pub use axis::{Axis, Unit};
 pub(crate) use numbers::{number, one_digit, plain, power, scientific, seconds};
-pub(crate) use plot::{Form, Plot, Thumbnail, csv};
+pub(crate) use plot::{Form, Thumbnail};
+pub use plot::{Plot, csv};
 
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
@@ -54,7 +55,7 @@ impl Marker {
 
 /// The look of a curve, and its name in the legend.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Key {
+pub struct Key {
     /// CSS class: a method's name, or one of the style's others.
     pub(crate) class: &'static str,
     pub(crate) marker: Marker,
@@ -73,7 +74,7 @@ impl Key {
     }
 
     /// A line without markers.
-    pub(crate) fn line(class: &'static str, label: impl Into<String>) -> Self {
+    pub fn line(class: &'static str, label: impl Into<String>) -> Self {
         Self {
             class,
             marker: Marker::None,
@@ -86,7 +87,9 @@ impl Key {
         Self { marker, ..self }
     }
 
-    pub(crate) fn dashed(self) -> Self {
+    /// The same look, dashed.
+    #[must_use]
+    pub fn dashed(self) -> Self {
         Self {
             dashed: true,
             ..self
@@ -108,7 +111,7 @@ impl Key {
 
 /// A point of a curve.
 #[derive(Debug, Clone)]
-pub(crate) struct Point {
+pub struct Point {
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// A note that is not on the axes; often empty.
@@ -133,7 +136,7 @@ impl From<(f64, f64)> for Point {
 
 /// A line with marks, or marks alone.
 #[derive(Debug, Clone)]
-pub(crate) struct Curve {
+pub struct Curve {
     pub(crate) key: Key,
     pub(crate) has_line: bool,
     pub(crate) has_tooltips: bool,
@@ -141,7 +144,8 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    pub(crate) fn line(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
+    /// A line with the marks of its key.
+    pub fn line(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
         let points = points.into_iter().map(Into::into).collect();
         Self {
             key,
@@ -156,7 +160,8 @@ impl Curve {
         Self::line(key, Vec::<Point>::new())
     }
 
-    pub(crate) fn dots(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
+    /// Marks alone.
+    pub fn dots(key: Key, points: impl IntoIterator<Item = impl Into<Point>>) -> Self {
         Self {
             has_line: false,
             ..Self::line(key, points)
@@ -182,7 +187,7 @@ pub(crate) fn escape(text: &str) -> String {
 
 /// A heading's words in lines of at most `room` pixels, with `letter` pixels for a letter. A longer word has its own
 /// line.
-pub(crate) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
+pub fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in heading.split_whitespace() {
         let line = lines.last().map_or("", String::as_str);
@@ -196,25 +201,4 @@ pub(crate) fn lines(heading: &str, room: f64, letter: f64) -> Vec<String> {
         }
     }
     lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{length_in_f64, lines};
-
-    #[test]
-    fn a_heading_takes_as_many_lines_as_it_needs_and_loses_no_word() {
-        const LETTER: f64 = 10.4;
-        let heading =
-            "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
-        for room in [100.0, 400.0, 812.0, 5000.0] {
-            let lines = lines(heading, room, LETTER);
-            assert_eq!(lines.join(" "), heading);
-            for line in &lines {
-                let fits = LETTER * length_in_f64(line.chars().count()) <= room;
-                assert!(fits || !line.contains(' '), "{line}");
-            }
-        }
-        assert_eq!(lines(heading, 5000.0, LETTER).len(), 1);
-    }
 }

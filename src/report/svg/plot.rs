@@ -11,7 +11,7 @@ const SMALL_ENDS: [f64; 4] = [8.0, 0.5 * WIDTH - 8.0, 40.0, 0.5 * HEIGHT - 24.0]
 
 /// A panel with axes.
 #[derive(Debug, Clone)]
-pub(crate) struct Plot {
+pub struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
@@ -44,7 +44,8 @@ pub(crate) struct Thumbnail {
 }
 
 impl Plot {
-    pub(crate) fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+    /// A panel without curves.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
             title: title.into(),
             x,
@@ -56,7 +57,7 @@ impl Plot {
     }
 
     /// Horizontal bars from zero, each with its number; a row without a number is marked.
-    pub(crate) fn bars(
+    pub fn bars(
         title: &'static str,
         class: &'static str,
         rows: impl IntoIterator<Item = (&'static str, Option<f64>)>,
@@ -76,7 +77,9 @@ impl Plot {
         }
     }
 
-    pub(crate) fn with(mut self, curves: impl IntoIterator<Item = Curve>) -> Self {
+    /// The panel with more curves.
+    #[must_use]
+    pub fn with(mut self, curves: impl IntoIterator<Item = Curve>) -> Self {
         self.curves.extend(curves);
         self
     }
@@ -299,7 +302,7 @@ fn text(class: &str, (x, y): (f64, f64), anchor: &str, words: &str) -> String {
 
 /// The numbers of a figure as CSV: a column for each axis of its panels, with the axis' name and the values of its
 /// panels.
-pub(crate) fn csv(panels: &[Plot]) -> String {
+pub fn csv(panels: &[Plot]) -> String {
     let mut axes: Vec<String> = Vec::new();
     for axis in panels
         .iter()
@@ -346,50 +349,5 @@ fn spelled(value: f64) -> String {
         format!("{value:e}")
     } else {
         String::new()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeSet;
-
-    #[test]
-    fn curves_that_look_different_have_different_names() {
-        let axis = || Axis::linear("x", (0.0, 1.0));
-        let mut plot = Plot::new("panel", axis(), axis());
-        let key = || Key::line("euler", "Euler");
-        let points = [(0.0, 1.0)];
-        let unnamed = Key::line("rk4", "").dashed();
-        plot.curves = vec![
-            Curve::line(key(), points),
-            Curve::line(key().dashed(), points),
-            Curve::dots(key(), points),
-            Curve::line(Key::line("rk4", "rk4"), points),
-            Curve::line(unnamed, points),
-        ];
-        let names: BTreeSet<String> = plot.curves.iter().map(|curve| plot.name(curve)).collect();
-        assert_eq!(names.len(), plot.curves.len(), "{names:?}");
-    }
-
-    #[test]
-    fn a_column_is_named_by_its_axis_with_the_unit() {
-        let draw = |y| {
-            let x = Axis::log("timestep", Unit::Seconds, (1e-3, 1.0));
-            let key = Key::line("rk4", "rk4");
-            Plot::new("panel", x, y).with([Curve::line(key, [(0.5, 2.0)])])
-        };
-        let panels = [
-            draw(Axis::linear("largest error [rad]", (0.0, 3.0))),
-            draw(Axis::linear("growth, per period", (0.0, 3.0))),
-            Plot::bars("Time per step [ns]", "c1", [("one", Some(7.0))]),
-        ];
-        assert_eq!(
-            csv(&panels),
-            "curve,timestep [s],largest error [rad],\"growth, per period\",Time per step [ns],note\n\
-             panel: rk4,5e-1,2e0,,,\n\
-             panel: rk4,5e-1,,2e0,,\n\
-             Time per step [ns]: one,,,,7e0,\n"
-        );
     }
 }

@@ -16,11 +16,11 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
-use crate::study::control_loop::ControlLoop;
-use crate::study::gains::{self, GainsError, GainsRequirements, SuggestedGains, search_gains};
-use crate::study::linear::no_control;
+use crate::study::control_loop::{ControlLoop, no_control};
+use crate::study::gains::{GainsError, GainsRequirements, SuggestedGains, search_gains};
 use crate::study::paused::Paused;
-use crate::study::planner::{self, PlanError, Planned, Task, plan};
+use crate::study::planner::{PlanError, Planned, Task, plan};
+use crate::study::stability::most_bytes;
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -218,7 +218,7 @@ impl<const N: usize> Computed<N> for SuggestGains<N> {
             Ok(Suggested { found, timestep })
         });
         StudyWork {
-            most_bytes: gains::most_bytes::<N>(),
+            most_bytes: most_bytes::<N>(),
             computation,
         }
     }
@@ -262,7 +262,7 @@ impl<const N: usize> Computed<N> for PlanRun<N> {
             })
         });
         StudyWork {
-            most_bytes: planner::most_bytes::<N>(),
+            most_bytes: most_bytes::<N>(),
             computation,
         }
     }

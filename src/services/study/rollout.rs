@@ -20,8 +20,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::services::FieldByField as _;
 use crate::services::arm::{SetGains, SetParams};
 use crate::services::{Address, Answered, Ask, Callable};
-use crate::study::control_loop::ControlLoop;
-use crate::study::linear::no_control;
+use crate::study::control_loop::{ControlLoop, no_control};
 use crate::study::paused::Paused;
 use crate::study::rollout::{
     MAX_SAMPLES, Rollout, RolloutError, RolloutRequest, most_bytes, rollout,

@@ -129,12 +129,8 @@ impl Matrix {
     fn is_negligible(&self, i: usize, sweeps: usize, norm: f64) -> bool {
         let beside = self[(i, i)].abs() + self[(i - 1, i - 1)].abs();
         // Compared with two zero eigenvalues no entry is small. After some sweeps the size of the matrix is the scale.
-        let scale = if sweeps < MAX_SWEEPS / 3 {
-            beside
-        } else {
-            beside.max(norm)
-        };
-        self[(i, i - 1)].abs() <= f64::EPSILON * scale
+        let least = if sweeps < MAX_SWEEPS / 3 { 0.0 } else { norm };
+        self[(i, i - 1)].abs() <= f64::EPSILON * beside.max(least)
     }
 
     /// The eigenvalues of the block of two rows that ends at `last`.

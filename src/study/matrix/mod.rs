@@ -1,7 +1,5 @@
 //! Small dense matrices for the step matrices of the stability predictions, of sizes up to some ten.
 //!
-//! It uses only floating-point arithmetic.
-//!
 //! **Invariant:** no input causes a panic or an endless loop. A value that cannot be computed is NaN, which every
 //! comparison treats as unstable.
 
@@ -86,14 +84,18 @@ impl Matrix {
         self
     }
 
-    /// `I + factor · self`.
+    /// `factor · self`.
     #[must_use]
-    pub fn shifted_identity(mut self, factor: f64) -> Self {
-        for entry in &mut self.entries {
-            *entry *= factor;
-        }
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.entries.iter_mut().for_each(|entry| *entry *= factor);
+        self
+    }
+
+    /// `self + value · I`.
+    #[must_use]
+    pub fn plus_diagonal(mut self, value: f64) -> Self {
         for i in 0..self.n {
-            self[(i, i)] += 1.0;
+            self[(i, i)] += value;
         }
         self
     }
@@ -141,6 +143,21 @@ impl Matrix {
         let columns: Option<Vec<_>> = (0..n).map(|column| self.solve(&unit(column))).collect();
         let columns = columns?;
         Some(Self::from_fn(n, |row, column| columns[column][row]))
+    }
+
+    /// The vector that the matrix shortens most, by inverse iteration. Its largest entry is 1 or -1. Each step reduces
+    /// the error by the ratio of the two eigenvalues that are nearest to zero.
+    ///
+    /// Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.6.
+    pub fn most_shortened(&self) -> Option<Vec<f64>> {
+        const ITERATIONS: u32 = 6;
+        let mut x = vec![1.0; self.n];
+        for _ in 0..ITERATIONS {
+            x = self.solve(&x)?;
+            let length = largest(x.iter().map(|x| x.abs()));
+            x.iter_mut().for_each(|x| *x /= length);
+        }
+        Some(x)
     }
 
     /// Largest modulus of an eigenvalue; NaN if [`Matrix::eigenvalues`] has a NaN.

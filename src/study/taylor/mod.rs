@@ -25,6 +25,9 @@ pub const ROUNDING: f64 = f64::LEAST_TOLERANCE;
 /// Most coefficients per span, some thousand steps. A motion that needs more changes too fast to be computed.
 const MAX_COEFFICIENTS: u64 = 20_000;
 
+/// Highest order of a series in doubles: beyond it a coefficient contributes only rounding.
+const HIGHEST_ORDER: usize = 22;
+
 /// Number of last terms that must be small before a series counts as converged. For an arm released at rest, stretched
 /// along the horizontal, three consecutive terms vanish between two that do not.
 const LAST: usize = 4;
@@ -32,17 +35,13 @@ const LAST: usize = 4;
 /// Largest ratio of a step to the last one.
 const LONGER: f64 = 1.25;
 
-/// Factors that shorten a step whose last terms are too large. The second one applies if they are more than
-/// [`LARGE_EXCESS`] times too large.
-const SHORTER: [f64; 2] = [0.95, 0.25];
-const LARGE_EXCESS: f64 = 1e9;
+/// Part of the allowed step that is taken if the last step was too long.
+const RESERVE: f64 = 0.95;
 
 /// The arithmetic in which a motion is computed.
 pub(crate) trait Precision: Arithmetic + Default {
     /// Relative size of a rounding error.
     const LEAST_TOLERANCE: f64;
-    /// Highest order of a series: beyond it a coefficient contributes only rounding.
-    const HIGHEST_ORDER: usize;
     /// The magnitude as a double.
     fn magnitude(self) -> f64;
     /// `sum + change` and its rounding error, where `carry` is the rounding error of `sum`.
@@ -60,7 +59,6 @@ pub(crate) trait Precision: Arithmetic + Default {
 
 impl Precision for f64 {
     const LEAST_TOLERANCE: f64 = 1e-16;
-    const HIGHEST_ORDER: usize = 22;
 
     fn magnitude(self) -> f64 {
         self.abs()
@@ -112,10 +110,6 @@ pub(crate) struct Taylor<T, const N: usize> {
     tolerance: f64,
     /// Order of the series, except at the end of a span.
     order: usize,
-    /// Factors of [`SHORTER`], and the factors by which they reduce the last terms.
-    shorter: [(f64, f64); 2],
-    /// Largest size of each of the last terms, relative to the tolerance. Terms of lower order may be larger.
-    allowances: [f64; LAST],
     /// Factor by which steps and spans are divided in addition to the tolerance's demand.
     cuts: f64,
     coefficients: u64,
@@ -138,11 +132,6 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
             carry: [[T::default(); N]; 2],
             tolerance,
             order,
-            shorter: SHORTER.map(|factor| (factor, power(factor, order - LAST))),
-            allowances: std::array::from_fn(|i| {
-                let missing = length_in_f64(LAST - 1 - i) / length_in_f64(order);
-                pow(tolerance, -missing)
-            }),
             cuts: 1.0,
             coefficients: 0,
             step: f64::INFINITY,
@@ -166,22 +155,15 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
         let effort = drive.efforts(&position, &velocity);
         let acceleration = T::acceleration(arm, &position, &velocity, &effort);
         let directions = T::directions(&position);
-        let series = &mut self.series;
-        series.begin(arm, &directions, &velocity, &acceleration);
-        let extend = |series: &mut PowerSeries<T, N>| {
-            let effort = drive.coefficient(&position, series, series.order());
-            series.extend(&series::link_efforts(&effort));
-        };
-        let mut small = 0;
-        if whole > LONGER * LONGER * self.step {
-            while series.order() < self.order {
-                extend(series);
-            }
-        } else {
-            // A short step needs no long series.
-            let mut power = whole;
-            while self.series.order() < self.order && small < LAST {
-                extend(&mut self.series);
+        self.series
+            .begin(arm, &directions, &velocity, &acceleration);
+        // A short step needs no long series.
+        let is_short = whole <= LONGER * LONGER * self.step;
+        let (mut small, mut power) = (0, whole);
+        while self.series.order() < self.order && small < LAST {
+            let effort = drive.coefficient(&position, &self.series, self.series.order());
+            self.series.extend(&series::link_efforts(&effort));
+            if is_short {
                 power *= whole;
                 let term = self.excess(self.series.order(), whole, power);
                 small = if term <= 1.0 { small + 1 } else { 0 };
@@ -220,21 +202,23 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
     }
 
     /// The longest step \[s\] up to `step` whose last terms are within the tolerance.
-    fn allowed(&self, mut step: f64) -> f64 {
+    fn allowed(&self, step: f64) -> f64 {
         let first = self.order + 1 - LAST;
-        let mut of_order = power(step, first);
+        let mut power = (0..first).fold(1.0, |power, _| power * step);
         let mut excess = 0.0_f64;
-        for (order, allowance) in (first..).zip(self.allowances) {
-            excess = excess.max(self.excess(order, step, of_order) / allowance);
-            of_order *= step;
+        for order in first..=self.order {
+            // Terms of lower order may be larger.
+            let missing = length_in_f64(self.order - order) / length_in_f64(self.order);
+            let allowance = pow(self.tolerance, -missing);
+            excess = excess.max(self.excess(order, step, power) / allowance);
+            power *= step;
         }
-        // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
-        while excess > 1.0 && step > 0.0 {
-            let (factor, of_terms) = self.shorter[usize::from(excess > LARGE_EXCESS)];
-            step *= factor;
-            excess *= of_terms;
+        if excess > 1.0 {
+            // The terms decrease with at least the power of the first of them, minus 1 for the scale of the comparison.
+            RESERVE * step * pow(excess, -1.0 / length_in_f64(first - 1))
+        } else {
+            step
         }
-        step
     }
 
     /// How many times too large the terms of `order` are in a step \[s\], whose `power` of that order is given.
@@ -253,21 +237,7 @@ impl<T: Precision, const N: usize> Taylor<T, N> {
 /// with the square of its order. Here every step also needs an evaluation at its start.
 fn order_for(tolerance: f64) -> usize {
     let order = whole((3.0 - 0.5 * ln(tolerance)).ceil());
-    usize::try_from(order).map_or(f64::HIGHEST_ORDER, |order| {
-        order.clamp(6, f64::HIGHEST_ORDER)
-    })
-}
-
-fn power(base: f64, exponent: usize) -> f64 {
-    let (mut power, mut square, mut rest) = (1.0, base, exponent);
-    while rest > 0 {
-        if rest % 2 == 1 {
-            power *= square;
-        }
-        square *= square;
-        rest /= 2;
-    }
-    power
+    usize::try_from(order).map_or(HIGHEST_ORDER, |order| order.clamp(6, HIGHEST_ORDER))
 }
 
 fn size<T: Precision, const N: usize>(x: &[T; N]) -> f64 {
@@ -290,11 +260,7 @@ impl<const N: usize> TaylorReference<N> {
     /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
     /// held between [`ROUNDING`] and 1.
     pub fn within(state: State<N>, tolerance: f64) -> Self {
-        let tolerance = if tolerance > ROUNDING {
-            tolerance.min(1.0)
-        } else {
-            ROUNDING
-        };
+        let tolerance = tolerance.clamp(ROUNDING, 1.0);
         let State { position, velocity } = state;
         Self {
             taylor: Taylor::new(position, velocity, tolerance, order_for(tolerance)),

@@ -9,8 +9,6 @@
 //! is an input, so that it can come from a kernel that loses fewer digits. Known limit: on a folded arm with a last
 //! link a billion times heavier than the others, the series loses one or two digits more than its start.
 //!
-//! The series works in doubles, for the study, and in double-double arithmetic, for the report's references.
-//!
 //! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
 //! methods*, Experimental Mathematics 14 (2005).
 //!
@@ -79,7 +77,10 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
             sin: [[zeros; N]; ORDER],
             cos: [[zeros; N]; ORDER],
             turning: [[zeros; N]; ORDER],
-            equation: Equation::default(),
+            equation: Equation {
+                factors: [zeros; N],
+                eliminated: [zeros; N],
+            },
         }
     }
 
@@ -98,7 +99,7 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
         acceleration: &[T; N],
     ) {
         (self.sin[0], self.cos[0]) = between(directions);
-        self.equation.set(arm, &self.cos[0]);
+        self.equation = Equation::new(arm, &self.cos[0]);
         self.rate[0] = sums(velocity);
         self.squared_rate[backwards(0)] = self.rate[0].map(|rate| rate * rate);
         self.close(0, sums(acceleration));
@@ -208,30 +209,20 @@ impl<T: Arithmetic + Default, const N: usize> PowerSeries<T, N> {
     }
 }
 
-impl<T: Arithmetic + Default, const N: usize> Default for Equation<T, N> {
-    fn default() -> Self {
-        let zeros = [T::default(); N];
-        Self {
-            factors: [zeros; N],
-            eliminated: [zeros; N],
-        }
-    }
-}
-
 impl<T: Arithmetic + Default, const N: usize> Equation<T, N> {
-    fn set(&mut self, arm: &Arm<N>, cos: &[[T; N]; N]) {
+    fn new(arm: &Arm<N>, cos: &[[T; N]; N]) -> Self {
+        let (mut factors, mut matrix) = ([[T::default(); N]; N], [[T::default(); N]; N]);
         let real = |value| T::default().like(value);
         let (l, m) = (arm.lengths().map(real), arm.masses().map(real));
         let mut beyond = T::default();
-        let matrix = &mut self.eliminated;
         for i in (0..N).rev() {
             let (first, second) = (m[i] / real(2.0) + beyond, m[i] / real(3.0) + beyond);
             for j in 0..i {
                 let coupling = first * l[i] * l[j];
-                self.factors[i - j][i] = coupling;
+                factors[i - j][i] = coupling;
                 matrix[i][j] = coupling * cos[i - j][i];
             }
-            self.factors[0][i] = real(arm.gravity()) * first * l[i];
+            factors[0][i] = real(arm.gravity()) * first * l[i];
             matrix[i][i] = second * l[i] * l[i];
             beyond = beyond + m[i];
         }
@@ -246,6 +237,10 @@ impl<T: Arithmetic + Default, const N: usize> Equation<T, N> {
                 }
                 matrix[pivot][row] = factor;
             }
+        }
+        Self {
+            factors,
+            eliminated: matrix,
         }
     }
 
@@ -294,8 +289,7 @@ pub(crate) fn acceleration<T: Arithmetic + Default, const N: usize>(
     effort: &[T; N],
 ) -> [T; N] {
     let (sin, cos) = between(directions);
-    let mut equation = Equation::default();
-    equation.set(arm, &cos);
+    let equation = Equation::new(arm, &cos);
     let rate = sums(velocity);
     let mut right = link_efforts(effort);
     for i in 0..N {

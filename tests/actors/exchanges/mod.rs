@@ -70,7 +70,6 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
 use pendularm::actors::resources::memory::Memory;
-use pendularm::math::pid::Gains;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
 #[cfg(feature = "web")]
@@ -136,10 +135,7 @@ struct World {
 }
 
 impl World {
-    async fn start<const N: usize>() -> Self
-    where
-        Gains<N>: Default,
-    {
+    async fn start<const N: usize>() -> Self {
         let gateway = Gateway::bare().await;
         let (registry, gauges) = (&gateway.registry, &gateway.gauges);
         work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);
@@ -423,10 +419,7 @@ fn replace(line: &str, values: &[(&str, &str)]) -> String {
 }
 
 /// Runs one exchange.
-async fn run<const N: usize>(file: &str, title: &str, steps: &[Step]) -> Result<(), String>
-where
-    Gains<N>: Default,
-{
+async fn run<const N: usize>(file: &str, title: &str, steps: &[Step]) -> Result<(), String> {
     let first = steps.first().map_or("", |(_, step)| step);
     let words: Vec<&str> = first.split(' ').collect();
     let (mut world, steps) = match words[..] {

@@ -10,7 +10,6 @@ use pendularm::actors::arm::sim::SetListener;
 use pendularm::actors::gateway::messages::SetTap;
 use pendularm::actors::recorder::listeners;
 use pendularm::math::integrator::Method;
-use pendularm::math::pid::Gains;
 use pendularm::record::{
     Content, McapWriter, RecordEnding, RecordEntry, RecordedMessage, Recording, ReplayVerdict,
     RunSettings, replay,
@@ -44,10 +43,7 @@ impl Notes {
     }
 
     /// Starts to record all messages.
-    pub async fn take<const N: usize>(&self, stage: &Stage<N>)
-    where
-        Gains<N>: Default,
-    {
+    pub async fn take<const N: usize>(&self, stage: &Stage<N>) {
         let (of_arm, of_registry) = (self.clone(), self.clone());
         let listener = listeners::arm::<N>(move |content| {
             of_arm.put(content);
@@ -89,10 +85,7 @@ pub fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
     replay(&*file(entries)).unwrap()
 }
 
-pub async fn stop<const N: usize>(stage: &Stage<N>)
-where
-    Gains<N>: Default,
-{
+pub async fn stop<const N: usize>(stage: &Stage<N>) {
     stage.arm.send(SetListener::<N>(None)).await.unwrap();
     stage.registry.send(SetTap(None)).await.unwrap();
 }
@@ -159,10 +152,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
     client.call(service, args).await;
 }
 
-async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry>
-where
-    Gains<N>: Default,
-{
+async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry> {
     let stage = Stage::<N>::with_seed(seed).await;
     let mut client = stage.connect();
     let mut rng = fastrand::Rng::with_seed(seed);

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use crate::nodes::{start_whole, work_in_this_thread};
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
-use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
 
@@ -71,10 +70,7 @@ fn first_rows(service: Service) -> Vec<Row> {
 }
 
 /// A gateway with the nodes of all services but the recorder; the arm is paused.
-async fn start<const N: usize>() -> (Gateway, Peer)
-where
-    Gains<N>: Default,
-{
+async fn start<const N: usize>() -> (Gateway, Peer) {
     let gateway = Gateway::bare().await;
     let (registry, gauges) = (&gateway.registry, &gateway.gauges);
     work_in_this_thread(start_whole::<N>(registry, gauges, 1).await.1);

@@ -109,10 +109,7 @@ fn the_papers_list_every_question_of_rosapi_with_its_fields_in_order() {
 }
 
 /// The column of an arm of `N` links in the table of defaults.
-fn defaults<const N: usize>() -> Vec<String>
-where
-    Gains<N>: Default,
-{
+fn defaults<const N: usize>() -> Vec<String> {
     let gains = Gains::<N>::default();
     let simulation = Simulation::new(Arm::<N>::default(), gains);
     let arm = simulation.arm();

@@ -13,6 +13,7 @@ use pendularm::study::planner::{Task, plan};
 use pendularm::study::rollout::{RolloutRequest, rollout};
 
 use super::{Dice, Tally, cases, property, run, tells};
+use crate::reference::state;
 
 /// A state to begin with, and a time for which the motion from there is known.
 fn start<const N: usize>(dice: &mut Dice, arm: &Arm<N>) -> (State<N>, f64) {
@@ -50,7 +51,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
         for sample in 1..=steps / every {
             live.advance(every as u64);
-            let off = tip(live.state()).distance(tip(&truth.state(spacing * sample as f64)));
+            let off = tip(live.state()).distance(tip(&state(&truth, spacing * sample as f64)));
             assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
         }
         tally.tried += 1;

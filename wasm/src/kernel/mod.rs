@@ -56,7 +56,6 @@ pub struct Kernel<const N: usize> {
 impl<const N: usize> Kernel<N>
 where
     Arm<N>: Default,
-    Gains<N>: Default,
 {
     /// An arm in the runtime's initial state. The targets of trials depend on `seed`.
     #[must_use]

@@ -37,17 +37,10 @@ const TERMS: u32 = 34;
 impl DoubleDouble {
     /// Zero.
     pub const ZERO: Self = Self { hi: 0.0, lo: 0.0 };
-    /// One.
-    pub const ONE: Self = Self { hi: 1.0, lo: 0.0 };
 
     /// The nearest double.
     pub const fn to_f64(self) -> f64 {
         self.hi
-    }
-
-    /// This number less a double, as a double: the difference is rounded once, at the end.
-    pub fn minus(self, value: f64) -> f64 {
-        (self - Self::from(value)).hi
     }
 
     /// Magnitude.
@@ -73,8 +66,8 @@ impl DoubleDouble {
             rest - Self::from(turns) * Self::from(*part)
         });
         let square = reduced * reduced;
-        let (mut sin, mut cos) = (reduced, Self::ONE);
-        let (mut odd, mut even) = (reduced, Self::ONE);
+        let (mut sin, mut cos) = (reduced, Self::from(1.0));
+        let (mut odd, mut even) = (reduced, Self::from(1.0));
         for n in (2..=TERMS).step_by(2) {
             let n = f64::from(n);
             even = -even * square / Self::from((n - 1.0) * n);
@@ -185,7 +178,6 @@ impl Arithmetic for DoubleDouble {
 
 impl Precision for DoubleDouble {
     const LEAST_TOLERANCE: f64 = 1e-32;
-    const HIGHEST_ORDER: usize = series::ORDER;
 
     fn magnitude(self) -> f64 {
         self.hi.abs()

@@ -168,26 +168,6 @@ impl<const N: usize> ReferenceMotion<N> {
         angles(&self.fine, time.into())
     }
 
-    /// The state at `time` \[s\], rounded to doubles.
-    pub fn state(&self, time: f64) -> State<N> {
-        let (piece, after) = at(&self.fine, time.into());
-        let zeros = [Real::ZERO; N];
-        // The derivative of Horner's rule, beside it.
-        let (change, rate) = piece
-            .change
-            .iter()
-            .rev()
-            .fold((zeros, zeros), |(sum, rate), term| {
-                let sum = plus(&sum, term);
-                let rate = std::array::from_fn(|i| rate[i] * after + sum[i]);
-                (sum.map(|sum| sum * after), rate)
-            });
-        State {
-            position: plus(&piece.position, &change).map(Real::to_f64),
-            velocity: rate.map(Real::to_f64),
-        }
-    }
-
     /// The largest angle error of `position` at `time` \[s\] \[rad\].
     pub fn angle_error(&self, time: impl Into<DoubleDouble>, position: &[f64]) -> f64 {
         largest_difference(&self.angles(time), position)
@@ -196,7 +176,7 @@ impl<const N: usize> ReferenceMotion<N> {
     /// How far the angles at `time` \[s\] may be off: the largest difference between two settings \[rad\].
     pub fn uncertainty(&self, time: f64) -> f64 {
         let [fine, coarse] = [&self.fine, &self.coarse].map(|pieces| angles(pieces, time.into()));
-        distance(&fine, &coarse)
+        largest_difference(&fine, &coarse)
     }
 }
 
@@ -272,11 +252,6 @@ fn plus<const N: usize>(x: &[Real; N], y: &[Real; N]) -> [Real; N] {
     std::array::from_fn(|i| x[i] + y[i])
 }
 
-/// The largest difference of two poses \[rad\].
-pub(super) fn distance<const N: usize>(a: &[Real; N], b: &[Real; N]) -> f64 {
-    largest(a.iter().zip(b).map(|(a, b)| (*a - *b).magnitude()))
-}
-
 /// Joint accelerations \[rad/s²\] under the efforts `tau` \[N m\], with 106 bits.
 pub fn exact_acceleration<const N: usize>(
     arm: &Arm<N>,
@@ -287,10 +262,14 @@ pub fn exact_acceleration<const N: usize>(
     Real::acceleration(arm, &position, &velocity, &tau.map(Real::from))
 }
 
-/// `max |exact - value|`, the difference rounded only once it is taken; NaN if a value is.
-pub fn largest_difference(exact: &[DoubleDouble], values: &[f64]) -> f64 {
+/// `max |exact - value|`, of doubles or of exact values; the difference is rounded only once it is taken. NaN if a value
+/// is.
+pub fn largest_difference<T: Copy + Into<DoubleDouble>>(
+    exact: &[DoubleDouble],
+    values: &[T],
+) -> f64 {
     let both = exact.iter().zip(values);
-    largest(both.map(|(exact, value)| exact.minus(*value).abs()))
+    largest(both.map(|(exact, value)| (*exact - (*value).into()).magnitude()))
 }
 
 /// Joint angles \[rad\] and rates \[rad/s\] after every `every` steps of `h` \[s\] with `method`, `count` samples in

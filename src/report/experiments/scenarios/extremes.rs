@@ -16,7 +16,7 @@ use crate::math::pid::Gains;
 use crate::math::simulation::state_after;
 use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::{ControlLoop, no_control};
-use crate::study::error_estimate::estimate_step;
+use crate::study::error_estimate::estimate;
 use crate::study::linear::Linear;
 use crate::study::matrix::{largest, largest_difference};
 use crate::study::paused::at_once;
@@ -362,7 +362,9 @@ fn step_doubling() -> Observation {
         let ratios = (0..50).map(|_| {
             let (position, velocity) = (noise.array(3.0), noise.array(3.0));
             let (state, effort) = (State { position, velocity }, noise.array(10.0));
-            let estimate = estimate_step(&arm, &state, &effort, method, h);
+            let mut simulation = free(arm, state, method, h);
+            simulation.drive(Some(effort));
+            let estimate = estimate(&simulation);
             // The error of the step, against the arm followed to rounding.
             let end = state_after(&arm, method, &state, &effort, h);
             let mut exact = TaylorReference::new(state);
