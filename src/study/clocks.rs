@@ -42,14 +42,10 @@ fn timestep_limit<const N: usize>(
     period_limit: Option<f64>,
 ) -> Option<f64> {
     let (method, delayed) = (control.method, control.period.delay);
-    let every_step = if delayed {
-        Stepping::held(linear, method, 1, true).limit()
-    } else {
-        limit_held(control)
-    };
-    let period = control.period.period;
+    let every_step = limit_held(control);
+    let period = control.given_period();
     // Up to this limit the law may run in every step. A longer timestep then makes the control period longer.
-    if control.is_free() || every_step.is_none_or(|limit| period <= limit) {
+    if every_step.is_none_or(|limit| period <= limit) {
         return every_step;
     }
     if period_limit.is_some_and(|limit| period > limit) {

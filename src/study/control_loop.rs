@@ -43,6 +43,15 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
+    /// The given control period \[s\]; zero if the law runs in every step, and without a law.
+    pub fn given_period(&self) -> f64 {
+        if self.is_free() {
+            0.0
+        } else {
+            self.period.period
+        }
+    }
+
     /// A free arm.
     pub fn free(arm: Arm<N>) -> Self {
         Self::new(arm, no_control(), Setpoint::default())

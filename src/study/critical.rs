@@ -5,11 +5,11 @@
 
 use std::f64::consts::TAU;
 
+use super::control_loop::ControlLoop;
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix};
 use super::stability::{Modes, Sampling, Stepping};
 use crate::math::elementary::{atan2, hypot};
-use crate::math::integrator::Method;
 
 /// The loop is analysed at this multiple of its limit, since nothing grows at the limit itself.
 pub const BEYOND: f64 = 1.1;
@@ -27,13 +27,17 @@ pub struct Critical {
 
 /// The fastest growing mode of a loop with held control, beyond `limit` \[s\]. If the limit is zero, the timestep is
 /// tiny.
-pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Critical> {
+pub(super) fn critical<const N: usize>(
+    linear: &Linear,
+    control: &ControlLoop<N>,
+    limit: f64,
+) -> Option<Critical> {
     let period = if limit > 0.0 {
         BEYOND * limit
     } else {
         Modes::of(linear).tiny()
     };
-    let generator = Stepping::new(linear, method, Sampling::Held).generator(period);
+    let generator = Stepping::of(linear, control, Sampling::Held).generator(period);
     let growth = |mu: &Complex| 2.0 * mu.re + period * mu.modulus() * mu.modulus();
     let fastest = generator
         .eigenvalues()

@@ -10,7 +10,7 @@ use super::motion::Motion;
 use super::paused::{at_once, pause};
 use super::poses::{PoseCandidate, smallest_of_all_poses};
 use super::proof::{BOXES, MAX_BOXES, Proven, prove};
-use super::stability::{Modes, Sampling, largest_timestep};
+use super::stability::{Modes, Sampling, Stepping, largest_timestep};
 use crate::math::integrator::Method;
 
 /// Advised part of the smallest limit over all poses, a margin for effects outside the linearisation. A start 0.3 rad
@@ -89,18 +89,19 @@ pub struct Limits<const N: usize> {
     /// of the bound if that is less and still useful. If the loop is unstable in some pose, neither applies. Then it is
     /// of the smaller of `held` and the smallest of all poses without gravity, and holds for this setpoint alone.
     pub advised: Option<f64>,
+    /// The control period of the loop \[s\].
+    period: f64,
 }
 
 impl<const N: usize> Limits<N> {
-    /// The advised timestep for a motion \[s\]: [`ADVISED_PART`] of the limit of poses and motion; `None` if there is
-    /// no limit.
+    /// The advised timestep for a motion \[s\]: [`ADVISED_PART`] of the limit of poses and motion. `None` if there is no
+    /// limit, or if the control period is longer: the limits over all poses are those of a law that runs in every step.
     pub fn advised_for(&self, motion: &Motion) -> Option<f64> {
         let carried = ADVISED_PART * motion.timestep;
         let carried = Some(carried).filter(|timestep| timestep.is_finite());
-        [self.advised, carried]
-            .into_iter()
-            .flatten()
-            .reduce(f64::min)
+        let both = [self.advised, carried].into_iter().flatten();
+        both.reduce(f64::min)
+            .filter(|timestep| self.period <= *timestep)
     }
 
     /// A reliable value of the smallest limit over all poses, effort held over the step \[s\]. It is `minimum_held` if
@@ -120,13 +121,11 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     let method = control.method;
     let (equilibrium, kind, linear) = settle(&control);
     pause().await;
-    let mut held = largest_timestep(&linear, method, Sampling::Held);
+    let mut held = Stepping::of(&linear, &control, Sampling::Held).limit();
     // A joint without a restoring force drifts, but a loop that is stable at some timestep is not unstable in
     // continuous time.
     let mut runs_away = held == Some(0.0) && Modes::of(&linear).run_away();
-    pause().await;
     let continuous = largest_timestep(&linear, method, Sampling::Continuous);
-    pause().await;
     let here = PoseCandidate::as_it_is(equilibrium);
     let (mut least, mut worst) = (held, here);
     let (mut bound, mut runaway) = (None, None);
@@ -134,7 +133,8 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         bound = Some(timestep);
         // The pose at which the bound is tightest.
         let nearest = PoseCandidate::as_it_is(pose);
-        let there = largest_timestep(&nearest.linear(&control), method, Sampling::Held);
+        let there = nearest.linear(&control);
+        let there = Stepping::of(&there, &control, Sampling::Held).limit();
         if there.is_some_and(|there| there > 0.0 && least.is_none_or(|least| there < least)) {
             (least, worst) = (there, nearest);
         }
@@ -159,7 +159,6 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         agrees = is_near(bound, least);
     }
     let useful = bound.filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
-    let has_no_estimate = method == Method::Euler || control.arm.gravity() == 0.0;
     let mut limits = Limits {
         equilibrium,
         rest: if runs_away { Rest::Unstable } else { kind },
@@ -168,28 +167,30 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         minimum_held: least,
         minimum_continuous: Some(0.0),
         bound: useful,
-        bound_is_proven: useful.is_some() && has_no_estimate,
+        bound_is_proven: useful.is_some()
+            && (method == Method::Euler || control.arm.gravity() == 0.0),
         certified: agrees,
         worst_pose: None,
         critical: None,
         advised: None,
+        period: control.given_period(),
     };
     if let Some(pose) = runaway {
         limits.advised = least.map(|limit| ADVISED_PART * limit);
         limits.minimum_held = Some(0.0);
         limits.worst_pose = Some(pose.pose);
-        limits.critical = critical(&pose.linear(&control), method, 0.0);
+        limits.critical = critical(&pose.linear(&control), &control, 0.0);
         return limits;
     }
     limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
     if let Some(limit) = least {
         limits.worst_pose = Some(worst.pose);
-        limits.critical = critical(&worst.linear(&control), method, limit);
+        limits.critical = critical(&worst.linear(&control), &control, limit);
     }
     pause().await;
     let known = (continuous, here);
-    let found = smallest_of_all_poses(control, Some(Sampling::Continuous), known).await;
-    limits.minimum_continuous = found.0;
+    (limits.minimum_continuous, _) =
+        smallest_of_all_poses(control, Some(Sampling::Continuous), known).await;
     limits
 }
 
@@ -221,7 +222,7 @@ fn is_near(bound: Option<f64>, least: Option<f64>) -> bool {
 /// 1 ms for three (optimised build).
 pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
     let linear = Linear::at_setpoint(control);
-    match largest_timestep(&linear, control.method, Sampling::Held) {
+    match Stepping::of(&linear, control, Sampling::Held).limit() {
         // The same rule as in the search for all limits.
         Some(0.0) => {
             let proven = at_once(prove(control, BOXES));

@@ -41,8 +41,9 @@ pub const MAX_DURATION: f64 = 1000.0;
 /// Most steps of the reference, and of one run.
 const MAX_STEPS: u64 = 4_000_000;
 
-/// Largest uncertainty of the reference, relative to the allowed error.
-const PART_OF_REFERENCE: f64 = 0.05;
+/// Uncertainty of the reference, relative to the allowed error: the wanted one, so that few steps are too many, and the
+/// largest.
+const PART_OF_REFERENCE: [f64; 2] = [0.001, 0.05];
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,7 +120,7 @@ pub async fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
     if task.duration.is_nan() || task.duration > MAX_DURATION {
         return Err(PlanError::TooLong(task.duration));
     }
-    let reference = Reference::known_to(PART_OF_REFERENCE * task.error, task).await?;
+    let reference = Reference::known_to(task).await?;
     let mut candidates: Vec<Candidate> = Vec::new();
     let (mut longest_stable, mut has_run) = (0.0_f64, false);
     for method in Method::ALL.into_iter().rev() {
@@ -196,7 +197,7 @@ impl<const N: usize> StepTrial for &mut MethodTrials<'_, N> {
 async fn longest_timestep<const N: usize>(control: &ControlLoop<N>) -> f64 {
     let most = if control.is_free() {
         None
-    } else if is_sampled(control) {
+    } else if control.given_period() > 0.0 {
         // It divides the period, up to rounding.
         let limit = clock_limits(control).timestep;
         limit.map(|limit| limit * (1.0 + count::ROUNDING))
@@ -220,10 +221,10 @@ struct Reference<const N: usize> {
 }
 
 impl<const N: usize> Reference<N> {
-    /// The motion of a task, refined until its uncertainty is at most `enough` \[m\].
-    async fn known_to(enough: f64, task: Task<N>) -> Result<Self, PlanError> {
+    /// The motion of a task, refined to the wanted uncertainty, or as far as possible.
+    async fn known_to(task: Task<N>) -> Result<Self, PlanError> {
         let (control, duration) = (&task.control, task.duration);
-        let (count, whole) = if is_sampled(control) {
+        let (count, whole) = if control.given_period() > 0.0 {
             let period = control.period.period;
             (count::whole((duration / period).round()).max(1), period)
         } else {
@@ -247,10 +248,12 @@ impl<const N: usize> Reference<N> {
             if apart.is_finite() {
                 reference.uncertainty = apart;
             }
-            if apart <= enough {
+            let [wanted, most] = PART_OF_REFERENCE.map(|part| part * task.error);
+            let is_finest = !has_ideal(control) || 2 * reference.steps * count > MAX_STEPS;
+            if apart <= if is_finest { most } else { wanted } {
                 return Ok(reference);
             }
-            if !has_ideal(control) || 2 * reference.steps * count > MAX_STEPS {
+            if is_finest {
                 return Err(PlanError::Unknown(reference.uncertainty));
             }
         }
@@ -286,12 +289,7 @@ impl<const N: usize> Reference<N> {
 
 /// Whether the reference is the loop whose law acts at every instant.
 fn has_ideal<const N: usize>(control: &ControlLoop<N>) -> bool {
-    !control.is_free() && !is_sampled(control)
-}
-
-/// Whether the control period is given.
-fn is_sampled<const N: usize>(control: &ControlLoop<N>) -> bool {
-    control.period.period > 0.0 && !control.is_free()
+    !control.is_free() && control.given_period() == 0.0
 }
 
 /// The message for references that differ by `uncertainty` \[m\].

@@ -155,7 +155,7 @@ impl<const N: usize> PoseSearch<N> {
             return;
         };
         let linear = candidate.linear(&self.control);
-        let stepping = Stepping::new(&linear, self.control.method, sampling);
+        let stepping = Stepping::of(&linear, &self.control, sampling);
         let passes = self.least.0.is_some_and(|limit| {
             PROBES
                 .iter()
@@ -185,8 +185,8 @@ impl<const N: usize> PoseSearch<N> {
             }
             return modes.growth();
         };
-        let growth = Stepping::new(&linear, self.control.method, sampling)
-            .growth(self.least.0.unwrap_or(0.0));
+        let growth =
+            Stepping::of(&linear, &self.control, sampling).growth(self.least.0.unwrap_or(0.0));
         if growth > NEUTRAL && candidate.has_gravity && Modes::of(&linear).run_away() {
             f64::NEG_INFINITY
         } else {

@@ -136,6 +136,9 @@ impl<const N: usize> Proof<N> {
         let ControlLoop {
             arm, gains, method, ..
         } = control;
+        if control.period.delay {
+            return None;
+        }
         let mut proof = Self {
             arm: *arm,
             gains: *gains,

@@ -19,6 +19,7 @@
 //! **Invariant:** the result is the end of the stable interval that begins at zero. Stable intervals beyond it are
 //! ignored.
 
+use super::control_loop::ControlLoop;
 pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{ADVISED_PART, Limits, Rest, limit_held, limits, search_limits};
 use super::linear::Linear;
@@ -44,6 +45,10 @@ const SEARCH_STEP: f64 = 1.05;
 
 /// End of the search. No limit of the explicit methods exceeds 3.
 const SEARCH_END: f64 = 30.0;
+
+/// Growth of a late loop in continuous time that makes it unstable, as a part of its fastest rate: far above the rounding
+/// error of a double mode at zero.
+const LATE_GROWTH: f64 = 1e-6;
 
 /// When the control law is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -159,6 +164,18 @@ impl<'a> Stepping<'a> {
         }
     }
 
+    /// A loop whose law runs in every step, with the delay of `control`, or in every stage.
+    pub(super) fn of<const N: usize>(
+        linear: &'a Linear,
+        control: &ControlLoop<N>,
+        sampling: Sampling,
+    ) -> Self {
+        Self {
+            delayed: control.period.delay && sampling == Sampling::Held,
+            ..Self::new(linear, control.method, sampling)
+        }
+    }
+
     /// The largest stable period \[s\]: see [`Limits`] for `None` and zero.
     pub fn limit(&self) -> Option<f64> {
         self.search(&Modes::of(self.linear))
@@ -257,6 +274,10 @@ impl<'a> Stepping<'a> {
         // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
         // timestep.
         if modes.slow_growth && !self.delayed {
+            return Some(0.0);
+        }
+        // A late law is analysed without its integrals, which may make the loop grow by themselves.
+        if self.delayed && modes.growth() > LATE_GROWTH * rate {
             return Some(0.0);
         }
         let start = SEARCH_START / rate;

@@ -6,9 +6,10 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::ControlPeriod;
 use pendularm::study::clocks::clock_limits;
 use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::motion::Motion;
 use pendularm::study::paused::at_once;
 use pendularm::study::rollout::{RolloutRequest, rollout};
-use pendularm::study::stability::limit_held;
+use pendularm::study::stability::{limit_held, limits};
 
 fn control(period: f64, delay: bool) -> ControlLoop<2> {
     let setpoint = Setpoint::at([0.4, 0.8]);
@@ -88,6 +89,57 @@ fn the_limit_of_the_timestep_is_the_longest_whole_part_of_the_period_that_is_sta
 }
 
 /// The student's experiment: the period stays, the timestep falls.
+/// The default arm, whose setpoint has a shorter limit with a late effort than without.
+#[test]
+fn the_limits_over_all_poses_and_the_advice_include_a_late_effort() {
+    let at = |delay| {
+        let setpoint = Setpoint::at([0.8, -0.6]);
+        ControlLoop::new(Arm::<2>::default(), Gains::default(), setpoint)
+            .with_period(ControlPeriod { period: 0.0, delay })
+    };
+    let (prompt, late) = (limits(&at(false)), limits(&at(true)));
+    assert!(late.held < prompt.held && late.minimum_held < prompt.minimum_held);
+    assert!(late.minimum_held <= late.held && late.bound.is_none());
+    assert_eq!(late.held, clock_limits(&at(true)).timestep);
+    assert!(late.advised <= late.minimum_held.map(|least| 0.8 * least));
+}
+
+/// A loop whose integral makes it grow has no stable period, with a late effort as without.
+#[test]
+fn a_loop_that_its_integral_drives_has_no_stable_timestep() {
+    let gains = Gains {
+        kp: [60.0, 30.0],
+        ki: [2000.0, 0.0],
+        kd: [25.0, 8.0],
+    };
+    for delay in [false, true] {
+        let control = ControlLoop::new(Arm::<2>::default(), gains, Setpoint::default())
+            .with_period(ControlPeriod { period: 0.0, delay });
+        let found = clock_limits(&control);
+        assert_eq!(
+            (found.period, found.timestep),
+            (Some(0.0), Some(0.0)),
+            "{delay}"
+        );
+    }
+}
+
+/// A longer control period is not that of the limits over all poses.
+#[test]
+fn there_is_advice_for_a_control_period_up_to_it_alone() {
+    let advised = |period: f64| {
+        let control = ControlLoop::new(Arm::<2>::default(), Gains::default(), Setpoint::default())
+            .with_period(ControlPeriod {
+                period,
+                delay: false,
+            });
+        limits(&control).advised_for(&Motion::ahead(&control, &State::rest()))
+    };
+    let every_step = advised(0.0).unwrap();
+    assert_eq!(advised(every_step), Some(every_step));
+    assert_eq!(advised(1.001 * every_step), None);
+}
+
 #[test]
 fn at_one_control_period_a_shorter_timestep_lowers_the_methods_error_by_its_order_and_the_others_not()
  {
