@@ -137,6 +137,27 @@ impl Linear {
         closed
     }
 
+    /// The same if an effort acts one period late. The states are positions, velocities, efforts and active integrals.
+    pub(super) fn closed_late(&self, arm: &Matrix, period: f64) -> Matrix {
+        let n = self.joints();
+        let mut closed = Matrix::zeros(3 * n + self.integrals.len());
+        for (row, column) in (0..2 * n).flat_map(|row| (0..3 * n).map(move |column| (row, column)))
+        {
+            closed[(row, column)] = arm[(row, column)];
+        }
+        for j in 0..n {
+            closed[(2 * n + j, j)] = -self.kp[j] / period;
+            closed[(2 * n + j, n + j)] = -self.kd[j] / period;
+            closed[(2 * n + j, 2 * n + j)] = -1.0 / period;
+        }
+        for (k, &(joint, ki)) in self.integrals.iter().enumerate() {
+            closed[(2 * n + joint, joint)] -= ki;
+            closed[(2 * n + joint, 3 * n + k)] = ki / period;
+            closed[(3 * n + k, joint)] = -1.0;
+        }
+        closed
+    }
+
     /// The matrix of the arm alone under constant efforts: `x` holds positions, velocities, efforts \[N m\].
     pub fn plant(&self) -> Matrix {
         let n = self.joints();

@@ -46,10 +46,6 @@ const SEARCH_STEP: f64 = 1.05;
 /// End of the search. No limit of the explicit methods exceeds 3.
 const SEARCH_END: f64 = 30.0;
 
-/// Growth of a late loop in continuous time that makes it unstable, as a part of its fastest rate: far above the rounding
-/// error of a double mode at zero.
-const LATE_GROWTH: f64 = 1e-6;
-
 /// When the control law is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sampling {
@@ -155,7 +151,7 @@ impl<'a> Stepping<'a> {
     }
 
     /// The law once in a control period of `substeps` steps; its effort acts at once, or one period late, as with a bus
-    /// or a slow controller. A late law has no integral.
+    /// or a slow controller.
     pub fn held(linear: &'a Linear, method: Method, substeps: u32, delayed: bool) -> Self {
         Self {
             substeps: substeps.max(1),
@@ -196,7 +192,9 @@ impl<'a> Stepping<'a> {
         };
         match self.sampling {
             Sampling::Continuous => free,
-            Sampling::Held if self.delayed => self.close_late(self.repeated(&free, h), period),
+            Sampling::Held if self.delayed => {
+                self.linear.closed_late(&self.repeated(&free, h), period)
+            }
             Sampling::Held => self.linear.closed(&self.repeated(&free, h), period),
         }
     }
@@ -228,17 +226,6 @@ impl<'a> Stepping<'a> {
             sum = sum.plus(1.0, step).plus(h, &product);
         }
         sum.scaled(1.0 / f64::from(self.substeps))
-    }
-
-    /// The law acts once a period, for the next period: efforts are states, `u ↦ -kp x - kd v`.
-    fn close_late(&self, mut arm: Matrix, period: f64) -> Matrix {
-        let n = self.linear.joints();
-        for j in 0..n {
-            arm[(2 * n + j, j)] = -self.linear.kp[j] / period;
-            arm[(2 * n + j, n + j)] = -self.linear.kd[j] / period;
-            arm[(2 * n + j, 2 * n + j)] = -1.0 / period;
-        }
-        arm
     }
 
     /// Fastest growth of any mode, `max (2 Re μ + h |μ|²)`, relative to the largest `|μ|`; NaN if not finite.
@@ -274,10 +261,6 @@ impl<'a> Stepping<'a> {
         // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
         // timestep.
         if modes.slow_growth && !self.delayed {
-            return Some(0.0);
-        }
-        // A late law is analysed without its integrals, which may make the loop grow by themselves.
-        if self.delayed && modes.growth() > LATE_GROWTH * rate {
             return Some(0.0);
         }
         let start = SEARCH_START / rate;
