@@ -634,8 +634,6 @@ impl Performer {
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
-                // Over WebSocket, only a client that requested statuses gets this one.
-                self.send_error(&why, id).await;
                 let result = messages::action_result(&action, id, &why, status as u8, false);
                 self.say(result, None).await
             }
