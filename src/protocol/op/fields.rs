@@ -238,6 +238,12 @@ impl<'a> Fields<'a> {
         }
     }
 
+    /// A whole number, 0 or more; `10.0` counts as 10.
+    pub fn whole(&mut self, name: &'static str) -> Option<u64> {
+        let raw = self.take(name)?;
+        json::integer(raw).or_else(|| self.mistyped(name, "an integer, at least 0", raw))
+    }
+
     /// One of `options`, by its name.
     pub fn choice<T: Copy>(
         &mut self,

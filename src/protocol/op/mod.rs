@@ -111,7 +111,7 @@ pub enum Op {
     },
     /// Authenticates the sender, if the runtime requires it.
     Auth {
-        /// The token. A command of this program may have none.
+        /// The token, if given. It may be missing if none is required.
         token: Option<String>,
         /// Whether the sender is a command of this program, which may use a kept place.
         is_command: bool,
@@ -124,7 +124,7 @@ pub enum Op {
         values: Payload,
         /// Whether the call succeeded.
         result: bool,
-        /// The provider's own `status`, if it is a string.
+        /// The provider's own `status`, if given.
         status: Option<String>,
     },
     /// An answer that cannot be forwarded. Its call or goal fails. Without an id, it is the only one that its
@@ -304,7 +304,7 @@ pub enum OpError {
         /// The fault.
         problem: Problem,
     },
-    /// A faulty goal of a named action. It gets an error `status` and an `action_result` with `result: false`.
+    /// A faulty goal of a named action. It gets an `action_result` with `result: false`.
     #[error("{problem}")]
     Goal {
         /// The action of the goal.

@@ -239,17 +239,15 @@ impl<'a> OpReader<'a> {
         })
     }
 
-    /// Reads a client's token. An error does not repeat the token. A command of this program marks
-    /// itself, and sends a token only if it has one.
+    /// Reads a client's token, if there is one. A command of this program marks itself.
     fn auth(&self) -> Result<Op, Problem> {
         let is_command = self.get("command").is_some() && self.boolean("command")?;
-        let has_none = is_command && self.get("token").is_none();
-        let token = if has_none { None } else { Some(self.secret()?) };
+        let token = self.get("token").map(|raw| self.secret(raw)).transpose()?;
         Ok(Op::Auth { token, is_command })
     }
 
-    fn secret(&self) -> Result<String, Problem> {
-        let raw = self.required("token")?;
+    /// A token. An error does not repeat it.
+    fn secret(&self, raw: &RawValue) -> Result<String, Problem> {
         let token = json::text(raw).ok_or(Problem::Mistyped {
             op: self.op,
             field: "token",
@@ -423,10 +421,9 @@ impl OpReader<'_> {
             _ => {
                 self.required("id")?;
                 let is_good = self.boolean("result")?;
-                let values = self.get("values").filter(|raw| raw.get() != "null");
                 ActionServerOp::End {
                     // The values of a failure may be a text with the reason.
-                    values: match values {
+                    values: match self.get("values") {
                         Some(_) if is_good => self.object("values")?,
                         values => Payload::from(values.unwrap_or(RawValue::NULL)),
                     },
@@ -500,7 +497,9 @@ impl OpReader<'_> {
                 self.required("values")?.into()
             },
             result,
-            status: self.get("status").and_then(json::text).map(Cow::into_owned),
+            status: self
+                .optional("status", "a string", json::text)?
+                .map(Cow::into_owned),
         })
     }
 }

@@ -383,6 +383,9 @@ pub enum FrameError {
         /// Index of the first bad byte within the frame.
         at: usize,
     },
+    /// Text of a WebSocket that is not UTF-8.
+    #[error("malformed frame: the text of a WebSocket must be UTF-8")]
+    NotText,
 }
 
 /// The next part of a stream.

@@ -153,7 +153,8 @@ impl<const N: usize> Callable for AskParameters<N> {
             Service::Rosapi(question) => vec![read_rosapi(question, service, &mut fields)],
             Service::ListParameters => {
                 let prefixes = fields.texts("prefixes", MAX_NAMED).unwrap_or_default();
-                // No parameter's name has a full stop, so a prefix can only be the name itself.
+                // No parameter's name has a full stop, so a prefix can only be the name itself, and any depth is enough.
+                let _ = fields.whole("depth");
                 described(|name| prefixes.is_empty() || prefixes.iter().any(|one| one == name))
             }
             Service::SetParameters => read_changes(&mut fields)?,

@@ -48,6 +48,8 @@ use crate::protocol::wire::json::Payload;
 
 /// The error for a frame that takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+/// Stands for the start of a message that could not be read. It may be the answer to the only call that waits.
+const LOST_START: &[u8] = br#"{"op":"service_response","#;
 
 type BoxFuture<T> = Pin<Box<dyn Future<Output = T>>>;
 
@@ -74,6 +76,8 @@ struct ClientReader {
     closed_check: Option<Instant>,
     /// The stream has ended. Earlier bytes may still wait.
     has_ended: bool,
+    /// Why the last message of a WebSocket could not be read. The client is then refused.
+    unreadable: Option<FrameError>,
     /// The last op is being performed.
     is_last: bool,
     turns: Turns,
@@ -138,6 +142,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             waits_since: None,
             closed_check: None,
             has_ended: false,
+            unreadable: None,
             is_last: false,
             turns: Turns::default(),
             timer: Timer::default(),
@@ -179,7 +184,10 @@ impl ClientReader {
             match &mut self.step {
                 ReadStep::Frames => {
                     self.step = match ready!(self.poll_frames(connection, cx)) {
-                        Ok(()) => Self::retire(connection),
+                        Ok(()) => {
+                            connection.is_refused |= self.unreadable.is_some();
+                            Self::retire(connection)
+                        }
                         // A broken stream takes no answers, so pending computations are dropped.
                         Err(lost) => {
                             connection.is_refused |= lost != ClientLost::Gone;
@@ -336,6 +344,11 @@ impl ClientReader {
                 self.is_cut = false;
                 bytes
             }
+            #[cfg(feature = "web")]
+            ReceivedData::Unreadable(error) => {
+                (self.has_ended, self.unreadable) = (true, Some(error));
+                0
+            }
         }
     }
 
@@ -401,16 +414,17 @@ impl ClientReader {
         self.frames.is_unfinished() && self.frames.buffered() > MEDIUM
     }
 
-    /// Handles the end of the stream. An incomplete frame is an error.
+    /// Handles the end of the stream. An incomplete or unreadable frame is an error.
     fn poll_last(&mut self, cx: &mut task::Context<'_>) -> Poll<Result<(), ClientLost>> {
         let performer = self.performer.take();
-        let Some((performer, error)) = performer.zip(self.frames.finish()) else {
+        let lost = self.unreadable.clone().map(|error| (error, LOST_START));
+        let error = lost.or_else(|| Some((self.frames.finish()?, &[])));
+        let Some((performer, (error, start))) = performer.zip(error) else {
             return Poll::Ready(Ok(()));
         };
         self.is_last = true;
-        self.performing = Some(Box::pin(
-            performer.take(FramePart::Error(error, Vec::new())),
-        ));
+        let part = FramePart::Error(error, start.to_vec());
+        self.performing = Some(Box::pin(performer.take(part)));
         self.turns.end(cx);
         Poll::Pending
     }
@@ -634,8 +648,6 @@ impl Performer {
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
-                // Over WebSocket, only a client that requested statuses gets this one.
-                self.send_error(&why, id).await;
                 let result = messages::action_result(&action, id, &why, status as u8, false);
                 self.say(result, None).await
             }

@@ -17,6 +17,8 @@ use crate::actors::gateway::ends::ClientLost;
 use crate::actors::gateway::limits::{READ_BYTES, WRITE_BYTES, WRITE_FRAMES};
 #[cfg(feature = "web")]
 use crate::actors::resources::memory::Permit;
+#[cfg(feature = "web")]
+use crate::protocol::wire::frame::FrameError;
 
 /// The stream of a served client, and its protocol.
 pub(super) enum Transport<S> {
@@ -33,6 +35,9 @@ pub(super) enum ReceivedData {
     /// A message, and its memory permit if it is long.
     #[cfg(feature = "web")]
     Message(Bytes, Option<Permit>),
+    /// A message that is too long, or whose text is not UTF-8. It is the last one.
+    #[cfg(feature = "web")]
+    Unreadable(FrameError),
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
@@ -57,8 +62,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Transport<S> {
                 Err(_) => Err(ClientLost::Gone),
             },
             #[cfg(feature = "web")]
-            Self::WebSocket(socket) => ready!(socket.poll_read(cx))
-                .map(|(message, permit)| ReceivedData::Message(message, permit)),
+            Self::WebSocket(socket) => match ready!(socket.poll_read(cx)) {
+                Ok((message, permit)) => Ok(ReceivedData::Message(message, permit)),
+                Err(ClientLost::Unreadable(error)) => Ok(ReceivedData::Unreadable(error)),
+                Err(lost) => Err(lost),
+            },
         })
     }
 

@@ -24,6 +24,7 @@ use crate::actors::gateway::ends::ClientLost;
 use crate::actors::gateway::limits::{FRAMES_IN_A_ROW, READ_BYTES};
 use crate::actors::resources::memory::{Memory, Permit, SHORT};
 use crate::protocol::limits::{MAX_FRAME, MEDIUM};
+use crate::protocol::wire::frame::FrameError;
 
 /// Input buffer of a WebSocket. It lives as long as the connection, so it is small.
 const READ_BUFFER: usize = 8 * 1024;
@@ -105,7 +106,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> WebSocket<S> {
                 Poll::Ready(None) => return Poll::Ready(Err(ClientLost::Gone)),
                 Poll::Ready(Some(Err(error))) => {
                     self.close_reason = close_reason(&error);
-                    return Poll::Ready(Err(ClientLost::Refused));
+                    return Poll::Ready(Err(match error {
+                        Error::Capacity(_) => {
+                            ClientLost::Unreadable(FrameError::TooLong(MAX_FRAME))
+                        }
+                        Error::Utf8(_) => ClientLost::Unreadable(FrameError::NotText),
+                        _ => ClientLost::Refused,
+                    }));
                 }
                 Poll::Pending => return Poll::Pending,
             };

@@ -63,8 +63,11 @@ impl Callable for RepublishTfs {
             let why = format!("must be {WORLD}, got {target}: the action supports others");
             fields.refuse("target_frame", &why);
         }
-        // The topic has its own rate.
+        // The topic has every frame, and its own rate.
+        let _ = fields.texts("source_frames", MAX_FRAMES);
         let _ = fields.number("rate", Bound::NonNegative);
+        let _ = fields.object("timeout", |_| ());
+        check_thresholds(&mut fields);
         fields.accept(Self)
     }
 }
@@ -72,6 +75,13 @@ impl Callable for RepublishTfs {
 impl Answered for RepublishTfs {
     fn write((): (), to: &Address) -> Bytes {
         to.response(&json!({"topic_name": Topic::TfWeb.name()}), "")
+    }
+}
+
+/// Checks the thresholds, which have no effect.
+fn check_thresholds(fields: &mut Fields<'_>) {
+    for name in ["angular_thres", "trans_thres"] {
+        let _ = fields.number(name, Bound::Finite);
     }
 }
 
@@ -94,6 +104,7 @@ impl<const N: usize> Goal for FrameGoal<N> {
             let why = format!("must be a frame of the arm, got {target}");
             fields.refuse("target_frame", &why);
         }
+        check_thresholds(&mut fields);
         let rate = rate.filter(|rate| *rate > 0.0).unwrap_or(RATE);
         fields.accept(Self {
             sources: sources.unwrap_or_default(),
