@@ -60,6 +60,8 @@ pub mod record;
 pub mod report;
 #[cfg(feature = "services")]
 pub mod services;
+#[cfg(feature = "runtime")]
+pub mod signals;
 pub mod study;
 #[cfg(feature = "runtime")]
 mod value;

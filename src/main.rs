@@ -7,6 +7,7 @@
 use std::fs::File;
 #[cfg(feature = "record")]
 use std::io::BufReader;
+use std::io::ErrorKind;
 #[cfg(feature = "record")]
 use std::path::Path;
 use std::process::ExitCode;
@@ -33,7 +34,7 @@ const BAD_USAGE: u8 = 2;
 fn main() -> ExitCode {
     #[cfg(unix)]
     // Without the handler a file beyond the size limit would kill the process. Nothing else depends on the handler.
-    let _ = pendularm::actors::signals::survive_file_size_limit();
+    let _ = pendularm::signals::survive_file_size_limit();
     match Options::parse(std::env::args_os()) {
         Ok(Parsed::Serve(options)) => serve(&options),
         #[cfg(feature = "report")]
@@ -68,7 +69,9 @@ fn main() -> ExitCode {
 /// Writes to standard output.
 fn show(text: &str) -> ExitCode {
     match output::print(text) {
-        Ok(_) => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::SUCCESS,
+        // A reader may close the pipe early: `pendularm --help | head -1`.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
             print_error(&format_args!("standard output: {error}"));
             ExitCode::FAILURE

@@ -4,24 +4,21 @@
 //! bounded length without control characters.
 
 use std::fmt::Display;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 
 use crate::protocol::wire::text::shortened;
 
 /// Longest error message \[characters\]. Texts of files and servers are cut there.
 const MAX_LINE: usize = 1000;
 
-/// Prints to standard output without buffering. Returns whether the reader is still there.
+/// Prints to standard output without buffering.
 ///
 /// # Errors
 /// The system's error, if the text could not be written.
-pub fn print(text: &str) -> io::Result<bool> {
+pub fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        // A reader may close the pipe early: `pendularm --help | head -1`.
-        Err(why) if why.kind() == ErrorKind::BrokenPipe => Ok(false),
-        written => written.map(|()| true),
-    }
+    out.write_all(text.as_bytes())?;
+    out.flush()
 }
 
 /// Text as one escaped line for a terminal.

@@ -32,7 +32,6 @@ pub mod recorder;
 pub mod resources;
 pub mod ros;
 pub mod runtime;
-pub mod signals;
 pub mod wire;
 
 /// Identifies one client connection during the life of the process. It is never reused.

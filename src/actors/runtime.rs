@@ -17,7 +17,6 @@ use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio::time::{Instant, sleep, timeout_at};
 
-use super::signals::Signals;
 use crate::actors::arm::sim::ArmSim;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::admission::{Admission, Slots};
@@ -38,11 +37,9 @@ use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{DEFAULT_BIND, Links, Options};
+use crate::signals::Signals;
 #[cfg(feature = "web")]
-use crate::{
-    options::WebOptions,
-    web::{Site, access::Access, authority::Host},
-};
+use crate::web::{Site, authority::Host};
 
 /// Most threads for long work of the gateway.
 const LONG_WORK_THREADS: usize = 4;
@@ -175,21 +172,9 @@ fn admission(options: &Options, newcomers: usize) -> Admission {
         token: options.token.clone(),
         #[cfg(feature = "web")]
         site: {
-            let WebOptions {
-                hosts,
-                origins,
-                strict_origin,
-                frames,
-                report,
-            } = options.web.clone();
-            let token = options.token.clone();
-            let access = Access {
-                token,
-                hosts,
-                origins,
-                strict_origin,
-            };
-            Site::new(access, report, &frames)
+            let mut access = options.access.clone();
+            access.token.clone_from(&options.token);
+            Site::new(access, options.report.clone(), &options.allow_frame)
         },
         newcomers: Slots::new(newcomers),
     }
@@ -209,9 +194,9 @@ struct NodeEnds {
 impl NodeEnds {
     /// Starts the requested record, and the recorder for clients' records.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
-        let folder = options.record.folder.as_deref();
+        let folder = options.record_dir.as_deref();
         folder.map(recorder::look_into).transpose()?;
-        if let Some(file) = &options.record.file
+        if let Some(file) = &options.record
             // The recorder lives as long as the registry.
             && let Ok(begun) = self.record.send(RecordTo(file.clone())).await
         {
@@ -251,7 +236,7 @@ fn start_nodes<const N: usize>(
     Rosout::attach(&rosout.start(), nodes);
     #[cfg(feature = "record")]
     let recorder = {
-        let folder = options.record.folder.clone();
+        let folder = options.record_dir.clone();
         let (arm, registry) = (arm.clone().recipient(), registry.clone().recipient());
         Recorder::<N>::new(arm, registry, folder, seed).start()
     };

@@ -3,34 +3,26 @@
 //! **Invariant:** `info` works only for names that the runtime lists. A value has only fields of its type; an unknown type
 //! may have any. The command waits for the end of its goal. A signal cancels the goal first.
 
-use std::io;
-
 use clap::{Args, Subcommand};
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
-#[cfg(unix)]
-use tokio::signal::unix;
-#[cfg(windows)]
-use tokio::signal::windows;
 
 use super::output::{CommandError, Outcome};
-use super::session::Session;
+use super::session::{Session, read_as};
 use super::values::read;
 use crate::output::print_error;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::catalog::{Field, Rosapi, Service, Topic, types};
-use crate::protocol::names::{absolute, are_same};
+use crate::protocol::names::absolute;
 use crate::protocol::ros::rosapi::asked_type;
+use crate::signals::EndRequests;
 
 /// The refusal of a value in several arguments.
 pub(crate) const UNQUOTED: &str = "\
     an argument in YAML or JSON came as several words: put quotes around all of it, such as '{data: true}'";
 
-/// Fields of ROS 1 that the runtime also reads, each with the field of ROS 2 beside it.
+/// Fields of ROS 1 that the runtime also reads, each with its field of ROS 2.
 const ROS_1: [(&str, &str); 3] = [("secs", "sec"), ("nsecs", "nanosec"), ("seq", "stamp")];
-
-/// The topic that moves the arm while the controller is on. For a goal the runtime sends the warning itself.
-const MOVING: &str = Topic::JointTrajectory.name();
 
 /// A type and a value of that type, both optional.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -54,14 +46,12 @@ impl TypedValue {
         let in_type = |one: char| one.is_alphanumeric() || "_/".contains(one);
         let is_type = |text: &&str| text.contains('/') && text.chars().all(in_type);
         let first = self.type_name.as_deref();
-        let type_name = first.filter(is_type);
-        let text = match (&self.value, type_name) {
-            (Some(_), None) => return Err(CommandError::Usage(UNQUOTED.to_owned())),
-            (Some(value), Some(_)) => value,
-            (None, None) => first.unwrap_or("{}"),
-            (None, Some(_)) => "{}",
+        let (type_name, text) = match (first.filter(is_type), self.value.as_deref()) {
+            (None, Some(_)) => return Err(CommandError::Usage(UNQUOTED.to_owned())),
+            (None, None) => (None, first),
+            typed => typed,
         };
-        let value = read(text)?;
+        let value = read(text.unwrap_or("{}"))?;
         let type_name = session.type_of(kind, name, type_name).await?;
         let part = match kind {
             "topic" => Rosapi::MessageDetails,
@@ -72,7 +62,8 @@ impl TypedValue {
             check(layout.fields, &value, "")
                 .map_err(|why| CommandError::Usage(format!("{name} has {why}")))?;
         }
-        if *absolute(name) == *MOVING {
+        // For a goal the runtime sends the warning itself.
+        if *absolute(name) == *Topic::JointTrajectory.name() {
             let enable = Service::Enable.name();
             if let Ok(false) = session.ask(enable, &json!({}), "data").await {
                 print_error(&format_args!(
@@ -151,34 +142,20 @@ waits for its end. The second one ends the command. Exit status: 0 for SUCCEEDED
     },
 }
 
-/// The services of rosapi whose answers describe one of that kind.
-fn questions(kind: &str) -> &'static [&'static str] {
-    match kind {
+pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Session) -> Outcome {
+    let name = match verb {
+        GraphVerb::List { show_types } => return list(kind, *show_types, session).await,
+        GraphVerb::Info { name } => name,
+    };
+    session.find(kind, name).await?;
+    let questions: &[&str] = match kind {
         "topic" => &["topic_type", "publishers", "subscribers"],
         "service" => &["service_type", "service_node"],
         "action" => &["action_type"],
         _ => &["node_details"],
-    }
-}
-
-pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Session) -> Outcome {
-    let question = match kind {
-        "action" => "action_servers".to_owned(),
-        other => format!("{other}s"),
     };
-    let service = format!("{PREFIX}{question}");
-    let names: Vec<String> = session.ask(&service, &json!({}), &question).await?;
-    let name = match verb {
-        GraphVerb::List { show_types } => return list(kind, names, *show_types, session).await,
-        GraphVerb::Info { name } => name,
-    };
-    if !names.iter().any(|one| are_same(one, name)) {
-        return Err(CommandError::Refused(format!(
-            "there is no {kind} {name}; `pendularm {kind} list` lists all"
-        )));
-    }
     let mut members = Vec::new();
-    for question in questions(kind) {
+    for question in questions {
         let service = format!("{PREFIX}{question}");
         let answer = session.call(&service, &json!({kind: name})).await?;
         let inside = answer.get().strip_prefix('{');
@@ -188,8 +165,8 @@ pub(super) async fn run_graph(verb: &GraphVerb, kind: &str, session: &mut Sessio
     session.show(&description, "")
 }
 
-async fn list(kind: &str, names: Vec<String>, show_types: bool, session: &mut Session) -> Outcome {
-    for name in names {
+async fn list(kind: &str, show_types: bool, session: &mut Session) -> Outcome {
+    for name in session.names(kind).await? {
         if show_types && kind != "node" {
             let type_name = session.type_of(kind, &name, None).await?;
             let json = json!({"name": name, "type": type_name});
@@ -229,31 +206,17 @@ pub(super) async fn run_action(verb: &ActionVerb, session: &mut Session) -> Outc
     }
 }
 
-/// SIGINT and SIGTERM.
-#[cfg(unix)]
-fn signals() -> io::Result<(unix::Signal, unix::Signal)> {
-    let terminate = unix::signal(unix::SignalKind::terminate())?;
-    Ok((unix::signal(unix::SignalKind::interrupt())?, terminate))
-}
-
-/// Ctrl-C and Ctrl-Break.
-#[cfg(windows)]
-fn signals() -> io::Result<(windows::CtrlC, windows::CtrlBreak)> {
-    Ok((windows::ctrl_c()?, windows::ctrl_break()?))
-}
-
 /// Waits for the end of a goal. The first signal cancels it, the second ends the command.
 async fn follow(action: &str, session: &mut Session) -> Outcome {
     let cancel = json!({"op": "cancel_action_goal", "id": "goal", "action": action});
-    let (mut interrupt, mut terminate) = signals().map_err(CommandError::system)?;
+    let mut requests = EndRequests::listen().map_err(CommandError::system)?;
     let mut is_canceled = false;
     loop {
         let said = tokio::select! {
             said = session.receive() => said?,
-            _ = async { tokio::select! { _ = interrupt.recv() => {}, _ = terminate.recv() => {} } } => {
+            _ = requests.next() => {
                 if is_canceled {
-                    let why = "ended before the result of the goal";
-                    return Err(CommandError::Refused(why.to_owned()));
+                    return Err(CommandError::Refused("ended before the result of the goal".to_owned()));
                 }
                 is_canceled = true;
                 session.send(&cancel).await?;
@@ -270,7 +233,7 @@ async fn follow(action: &str, session: &mut Session) -> Outcome {
             "action_result" if !said.result => return Err(said.refusal(action)),
             "action_result" => {
                 // The final statuses of `action_msgs/msg/GoalStatus`.
-                let status = match said.status_number() {
+                let status = match read_as(said.status.as_deref()) {
                     Some(4) => "SUCCEEDED",
                     Some(5) => "CANCELED",
                     Some(6) => "ABORTED",
@@ -290,7 +253,6 @@ async fn follow(action: &str, session: &mut Session) -> Outcome {
 
 /// Refuses the first member of `value`, at `path`, that is not one of the fields.
 fn check(fields: &[Field], value: &Value, path: &str) -> Result<(), String> {
-    let has = |name: &str| fields.iter().find(|field| field.name == name);
     match value {
         // As the whole value, a list has the values of all fields in order.
         Value::Array(items) if path.is_empty() => {
@@ -302,35 +264,32 @@ fn check(fields: &[Field], value: &Value, path: &str) -> Result<(), String> {
             .zip(items)
             .try_for_each(|(at, item)| check(fields, item, &format!("{path}[{at}]"))),
         Value::Object(members) => members.iter().try_for_each(|(name, member)| {
-            let path = format!("{path}.{name}");
-            match has(name) {
+            let dot = if path.is_empty() { "" } else { "." };
+            let path = format!("{path}{dot}{name}");
+            let renamed = ROS_1.iter().find(|(old, _)| old == name);
+            let name = renamed.map_or(name.as_str(), |(_, new)| new);
+            match fields.iter().find(|field| field.name == name) {
                 Some(field) => types::find(field.element().0)
                     .map_or(Ok(()), |layout| check(layout.fields, member, &path)),
-                None if ROS_1
-                    .iter()
-                    .any(|(old, new)| old == name && has(new).is_some()) =>
-                {
-                    Ok(())
-                }
                 None => Err(unknown_field(fields, name, &path)),
             }
         }),
-        Value::String(text) if text.contains(':') => Err(unknown_field(fields, text, text)),
+        // In YAML, a name and a value without a space after the colon are one text.
+        Value::String(text) if text.contains(':') => check(fields, &json!({text: null}), path),
         _ => Ok(()),
     }
 }
 
-/// The refusal of a field. In YAML, a name and a value without a space after the colon are one name.
+/// The refusal of a field.
 fn unknown_field(fields: &[Field], name: &str, path: &str) -> String {
-    let mut known: Vec<&str> = fields.iter().map(|field| field.name).collect();
-    if known.is_empty() {
-        known.push("none");
-    }
-    let (path, known) = (path.trim_start_matches('.'), known.join(", "));
-    let hint = name.replacen(':', ": ", 1);
-    let hint = match hint == name {
-        true => String::new(),
-        false => format!(". Put a space after the colon: {{{hint}}}"),
+    let known: Vec<&str> = fields.iter().map(|field| field.name).collect();
+    let known = match &known[..] {
+        [] => "none".to_owned(),
+        known => known.join(", "),
+    };
+    let hint = match name.split_once(':') {
+        Some((name, value)) => format!(". Put a space after the colon: {{{name}: {value}}}"),
+        None => String::new(),
     };
     format!("unknown field {path:?}; known fields: {known}{hint}")
 }

@@ -4,8 +4,9 @@
 //! output ends the command without an error.
 
 use std::fmt::Display;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind};
 
+use crate::output;
 use crate::protocol::wire::text::shortened;
 
 /// The result of a command or of a part of it.
@@ -30,8 +31,7 @@ pub enum CommandError {
 
 impl CommandError {
     /// The system refused a thread or a descriptor.
-    #[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
-    pub(super) fn system(why: io::Error) -> Self {
+    pub(super) fn system(why: impl Display) -> Self {
         Self::Refused(format!("the system refused: {why}"))
     }
 
@@ -64,9 +64,7 @@ pub(super) fn plain(text: &str) -> String {
     shortened(text, usize::MAX)
 }
 
-/// Prints to standard output without buffering.
+/// Prints to standard output.
 pub(super) fn print(text: &str) -> Outcome {
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    Ok(out.flush()?)
+    Ok(output::print(text)?)
 }

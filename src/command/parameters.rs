@@ -1,5 +1,4 @@
-//! `pendularm param`, the arm's parameters by name, and `pendularm diagnostics`, a summary of its
-//! state.
+//! `pendularm param`, the arm's parameters by name, and `pendularm diagnostics`, a summary of its state.
 //!
 //! **Invariant:** a printed parameter can be set again in the same form. The exit status of diagnostics is 0 only if
 //! every part is OK.
@@ -10,7 +9,7 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::output::{CommandError, Outcome, plain, print};
-use super::session::Session;
+use super::session::{Session, member_of};
 use super::values::read;
 use crate::protocol::catalog::{Rosapi, Service, Topic};
 use crate::protocol::ros::parameters::NO_SUCH;
@@ -26,7 +25,6 @@ const KEY_WIDTH: usize = 24;
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum ParamVerb {
     /// List the parameters, each after its node
-    #[command(after_help = "Example:\n  pendularm param list")]
     List,
     /// Print a parameter's value
     #[command(after_help = "\
@@ -122,12 +120,7 @@ async fn call(session: &mut Session, question: Rosapi, args: &Value) -> Outcome<
     }
 }
 
-/// The printed parts of a message of the diagnostics.
-#[derive(Deserialize)]
-struct Diagnostics {
-    status: Vec<DiagnosedPart>,
-}
-
+/// A part in a message of the diagnostics.
 #[derive(Deserialize)]
 struct DiagnosedPart {
     level: usize,
@@ -145,7 +138,8 @@ struct Detail {
 pub(super) async fn diagnostics(session: &mut Session) -> Outcome {
     session.subscribe(TOPIC, None).await?;
     let message = session.message(TOPIC).await?;
-    let Diagnostics { status } = serde_json::from_str(message.get())?;
+    let status = member_of(&message, "status").map_or("null", RawValue::get);
+    let status: Vec<DiagnosedPart> = serde_json::from_str(status)?;
     match session.is_json {
         true => session.show(&message, "")?,
         false => print(&status.iter().map(page).collect::<String>())?,

@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::net::ToSocketAddrs as _;
 use std::time::Duration;
 
 use clap::Args;
@@ -22,7 +21,6 @@ use super::values::{json_line, write_yaml};
 use crate::address;
 use crate::output::print_error;
 use crate::protocol::catalog::rosapi::PREFIX;
-use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::names::{are_same, same_type};
 use crate::protocol::op::token::Token;
 use crate::value::{ValueReader, needed, within};
@@ -95,7 +93,7 @@ pub(super) struct Received {
     #[serde(default)]
     pub(super) result: bool,
     /// A text, or the number of an action's status.
-    status: Option<Box<RawValue>>,
+    pub(super) status: Option<Box<RawValue>>,
 }
 
 impl Received {
@@ -106,28 +104,31 @@ impl Received {
         let why = status.or_else(|| read_as(self.values.as_deref()));
         CommandError::Refused(why.unwrap_or_else(|| format!("{name} failed without a reason")))
     }
-
-    /// The number of an action's status.
-    pub(super) fn status_number(&self) -> Option<usize> {
-        read_as(self.status.as_deref())
-    }
 }
 
-fn read_as<T: DeserializeOwned>(raw: Option<&RawValue>) -> Option<T> {
+pub(super) fn read_as<'a, T: Deserialize<'a>>(raw: Option<&'a RawValue>) -> Option<T> {
     serde_json::from_str(raw?.get()).ok()
+}
+
+/// The member of an object.
+pub(super) fn member_of<'a>(object: &'a RawValue, name: &str) -> Option<&'a RawValue> {
+    let members: BTreeMap<String, &RawValue> = read_as(Some(object))?;
+    members.get(name).copied()
 }
 
 impl RuntimeOptions {
     /// Connects. The first frame has the token and marks a command, which may use a kept place.
     pub(super) async fn open(&self) -> Outcome<Session> {
         let patience = self.timeout.map_or(NO_LIMIT, Duration::from_secs_f64);
-        let stream = dial(&self.connect, patience.min(CONNECT)).await;
+        let connecting = timeout(patience.min(CONNECT), TcpStream::connect(&self.connect));
+        let stream = connecting.await.unwrap_or_else(|late| Err(late.into()));
         let stream = stream.map_err(|why| {
             CommandError::Lost(format!(
                 "cannot connect to {}: {why}; start pendularm there, or name its address with --connect",
                 self.connect
             ))
         })?;
+        stream.set_nodelay(true).map_err(CommandError::lost)?;
         let mut session = Session {
             stream: BufReader::new(stream),
             line: Vec::new(),
@@ -143,12 +144,6 @@ impl RuntimeOptions {
         session.send(&opening).await?;
         Ok(session)
     }
-}
-
-async fn dial(address: &str, patience: Duration) -> io::Result<TcpStream> {
-    let addresses: Vec<_> = address.to_socket_addrs()?.collect();
-    let stream = timeout(patience, TcpStream::connect(&*addresses)).await??;
-    stream.set_nodelay(true).map(|()| stream)
 }
 
 impl Session {
@@ -231,9 +226,7 @@ impl Session {
         member: &str,
     ) -> Outcome<T> {
         let values = self.call(service, args).await?;
-        let values: BTreeMap<String, &RawValue> =
-            serde_json::from_str(values.get()).unwrap_or_default();
-        let value = values.get(member).map_or("null", |value| value.get());
+        let value = member_of(&values, member).map_or("null", RawValue::get);
         Ok(serde_json::from_str(value)?)
     }
 
@@ -244,13 +237,8 @@ impl Session {
         name: &str,
         given: Option<&str>,
     ) -> Outcome<String> {
-        let known: String = self
-            .ask(
-                &format!("{PREFIX}{kind}_type"),
-                &json!({kind: name}),
-                "type",
-            )
-            .await?;
+        let service = format!("{PREFIX}{kind}_type");
+        let known: String = self.ask(&service, &json!({kind: name}), "type").await?;
         match given {
             Some(given) if known.is_empty() => Ok(given.to_owned()),
             Some(given) if !same_type(given, &known) => Err(CommandError::Refused(format!(
@@ -260,18 +248,32 @@ impl Session {
         }
     }
 
+    /// The names of all topics, services, actions or nodes.
+    pub(super) async fn names(&mut self, kind: &str) -> Outcome<Vec<String>> {
+        let member = match kind {
+            "action" => "action_servers".to_owned(),
+            other => format!("{other}s"),
+        };
+        let service = format!("{PREFIX}{member}");
+        self.ask(&service, &json!({}), &member).await
+    }
+
+    /// Refuses a name that the runtime does not list.
+    pub(super) async fn find(&mut self, kind: &str, name: &str) -> Outcome {
+        let names = self.names(kind).await?;
+        match names.iter().any(|one| are_same(one, name)) {
+            true => Ok(()),
+            false => Err(CommandError::Refused(format!(
+                "there is no {kind} {name}; `pendularm {kind} list` lists all"
+            ))),
+        }
+    }
+
     /// Subscribes to a topic that exists or whose type is given.
     pub(super) async fn subscribe(&mut self, topic: &str, given: Option<&str>) -> Outcome {
-        let type_name = self.type_of("topic", topic, given).await?;
-        let list = Service::Rosapi(Rosapi::Topics).name();
-        let topics: Vec<String> = match type_name.is_empty() {
-            true => self.ask(list, &json!({}), "topics").await?,
-            false => vec![topic.to_owned()],
-        };
-        if !topics.iter().any(|one| are_same(one, topic)) {
-            return Err(CommandError::Refused(format!(
-                "there is no topic {topic} yet; `pendularm topic list` lists all, and with a TYPE the command waits"
-            )));
+        match given {
+            Some(_) => drop(self.type_of("topic", topic, given).await?),
+            None => self.find("topic", topic).await?,
         }
         // Without a type the messages have the form of ROS 2, also if the given type is one of ROS 1.
         self.send(&json!({"op": "subscribe", "topic": topic})).await
@@ -291,7 +293,7 @@ impl Session {
     /// Prints an answer, in YAML with `end` after it: each of several answers ends with `---`.
     pub(super) fn show(&self, raw: &RawValue, end: &str) -> Outcome {
         match self.is_json {
-            true => print(&json_line(raw)),
+            true => print(&(json_line(raw.get()) + "\n")),
             false => write_yaml(raw, end, io::stdout().lock()),
         }
     }
@@ -299,7 +301,7 @@ impl Session {
     /// Prints a line: the JSON, or the same as text.
     pub(super) fn show_line(&self, json: &Value, text: &str) -> Outcome {
         match self.is_json {
-            true => print(&format!("{json}\n")),
+            true => print(&(json_line(&json.to_string()) + "\n")),
             false => print(&(plain(text) + "\n")),
         }
     }

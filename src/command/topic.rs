@@ -2,18 +2,17 @@
 //!
 //! **Invariant:** a publisher waits until the runtime has handled each message, so it gets every refusal.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde_json::json;
-use serde_json::value::{RawValue, to_raw_value};
+use serde_json::value::RawValue;
 use tokio::time::{Instant, sleep_until};
 
 use super::call::{GraphVerb, TypedValue, run_graph};
 use super::output::{CommandError, Outcome, print};
-use super::session::{Session, read_positive};
-use super::values::json_line;
+use super::session::{Session, member_of, read_as, read_positive};
 use crate::protocol::catalog::{Rosapi, Service};
 use crate::value::{ValueReader, within};
 
@@ -32,8 +31,7 @@ Examples:
   pendularm topic echo /joint_states --field position -n 3
   pendularm topic echo --json /clock | head -n 3
 
-Each message is a YAML document that ends with ---, or with --json a line. If the reader closes
-the pipe, the command ends with status 0.")]
+Each message is a YAML document that ends with ---, or with --json a line.")]
     Echo {
         #[command(flatten)]
         source: SubscribedTopic,
@@ -105,12 +103,11 @@ pub(super) async fn run(verb: &TopicVerb, session: &mut Session) -> Outcome {
     match verb {
         TopicVerb::Graph(verb) => run_graph(verb, "topic", session).await,
         TopicVerb::Echo {
-            source,
+            source: SubscribedTopic { topic, type_name },
             field,
             once,
             times,
         } => {
-            let SubscribedTopic { topic, type_name } = source;
             session.subscribe(topic, type_name.as_deref()).await?;
             let mut left = times.or(once.then_some(1));
             while left != Some(0) {
@@ -123,8 +120,10 @@ pub(super) async fn run(verb: &TopicVerb, session: &mut Session) -> Outcome {
             }
             Ok(())
         }
-        TopicVerb::Hz { source, window } => {
-            let SubscribedTopic { topic, type_name } = source;
+        TopicVerb::Hz {
+            source: SubscribedTopic { topic, type_name },
+            window,
+        } => {
             session.subscribe(topic, type_name.as_deref()).await?;
             measure(topic, *window, session).await
         }
@@ -136,20 +135,41 @@ pub(super) async fn run(verb: &TopicVerb, session: &mut Session) -> Outcome {
             rate,
         } => {
             let times = times.or(once.then_some(1));
-            publish(topic, message, times, *rate, session).await
+            let (type_name, message) = message.checked("topic", topic, session).await?;
+            let advertise = match &*type_name {
+                "" => json!({"op": "advertise", "topic": topic}),
+                name => json!({"op": "advertise", "topic": topic, "type": name}),
+            };
+            session.send(&advertise).await?;
+            let publish = json!({"op": "publish", "topic": topic, "msg": message});
+            let period = Duration::from_secs_f64(rate.recip());
+            let mut due = Instant::now();
+            for count in 1.. {
+                session.send(&publish).await?;
+                // The answer to this call arrives after the message has been handled. A refusal arrives before it.
+                session
+                    .call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))
+                    .await?;
+                session.show_line(&message, &format!("publishing #{count}: {message}"))?;
+                if times == Some(count) {
+                    break;
+                }
+                due += period;
+                sleep_until(due).await;
+            }
+            Ok(())
         }
     }
 }
 
 /// The part of a message at a path: names separated by dots, items in brackets. Numbers keep their spelling.
 fn part<'a>(message: &'a RawValue, path: &str) -> Result<&'a RawValue, CommandError> {
-    let step = |value: &'a RawValue, step: &str| -> Option<&'a RawValue> {
-        if let Some(index) = step.strip_suffix(']') {
-            let items: Vec<&RawValue> = serde_json::from_str(value.get()).ok()?;
-            return items.get(index.parse::<usize>().ok()?).copied();
+    let step = |value: &'a RawValue, step: &str| match step.strip_suffix(']') {
+        Some(index) => {
+            let items: Vec<&RawValue> = read_as(Some(value))?;
+            items.get(index.parse::<usize>().ok()?).copied()
         }
-        let members: BTreeMap<String, &RawValue> = serde_json::from_str(value.get()).ok()?;
-        members.get(step).copied()
+        None => member_of(value, step),
     };
     let part = path.split(['.', '[']).try_fold(message, step);
     part.ok_or_else(|| CommandError::Refused(format!("the message has no {path}")))
@@ -192,40 +212,4 @@ fn rhythm(spans: &VecDeque<f64>, is_json: bool) -> String {
     format!(
         "average rate: {rate:.3}\n\tmin: {least:.3}s max: {most:.3}s std dev: {deviation:.5}s window: {window}\n"
     )
-}
-
-async fn publish(
-    topic: &str,
-    message: &TypedValue,
-    times: Option<usize>,
-    rate: f64,
-    session: &mut Session,
-) -> Outcome {
-    let (type_name, message) = message.checked("topic", topic, session).await?;
-    let advertise = match &*type_name {
-        "" => json!({"op": "advertise", "topic": topic}),
-        name => json!({"op": "advertise", "topic": topic, "type": name}),
-    };
-    session.send(&advertise).await?;
-    let publish = json!({"op": "publish", "topic": topic, "msg": message});
-    let spelled = to_raw_value(&message)?;
-    let period = Duration::from_secs_f64(rate.recip());
-    let mut due = Instant::now();
-    for count in 1.. {
-        session.send(&publish).await?;
-        // The answer to this call arrives after the message has been handled. A refusal arrives before it.
-        session
-            .call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))
-            .await?;
-        match session.is_json {
-            true => session.show(&spelled, "")?,
-            false => print(&format!("publishing #{count}: {}", json_line(&spelled)))?,
-        }
-        if times.is_some_and(|times| count >= times) {
-            break;
-        }
-        due += period;
-        sleep_until(due).await;
-    }
-    Ok(())
 }

@@ -23,11 +23,8 @@ use crate::protocol::wire::text::acts;
 /// [`CommandError::Usage`] with the reader's message.
 pub fn read(text: &str) -> Outcome<Value> {
     // JSON has its own reader, because in YAML a pair of `\u` escapes is not one character.
-    serde_json::from_str(text).or_else(|_| {
-        read_yaml(text).map_err(|why| {
-            CommandError::Usage(format!("VALUE cannot be read as JSON or YAML: {why}"))
-        })
-    })
+    let value = serde_json::from_str(text).or_else(|_| read_yaml(text));
+    value.map_err(|why| CommandError::Usage(format!("VALUE cannot be read as JSON or YAML: {why}")))
 }
 
 fn read_yaml(text: &str) -> Result<Value, String> {
@@ -91,14 +88,9 @@ pub const WORDS: [&str; 10] = [
     "true", "false", "null", "yes", "no", "on", "off", "y", "n", "~",
 ];
 
-/// JSON on one line, unchanged except for escaped control characters.
+/// JSON on one line, unchanged except for escaped control characters. YAML reads the escapes of its texts too.
 #[must_use]
-pub fn json_line(raw: &RawValue) -> String {
-    escaped(raw.get()) + "\n"
-}
-
-/// JSON without control characters. YAML reads the escapes of its texts too.
-fn escaped(json: &str) -> String {
+pub fn json_line(json: &str) -> String {
     let mut line = String::with_capacity(json.len() + 1);
     for character in json.chars() {
         match character {
@@ -120,19 +112,9 @@ pub fn write_yaml(raw: &RawValue, end: &str, out: impl Write) -> Outcome {
     let mut out = BufWriter::new(out);
     let mut rest = raw.get();
     let token = next_token(&mut rest);
-    write_value(token, &mut rest, 0, &Place::Top, &mut out)?;
+    write_value("", token, &mut rest, 0, &mut out)?;
     out.write_all(end.as_bytes())?;
     Ok(out.flush()?)
-}
-
-/// The place of a value: the text before it on its line.
-#[derive(PartialEq)]
-enum Place {
-    Top,
-    /// The name of a member.
-    Member,
-    /// The dash of an item.
-    Item,
 }
 
 /// Cuts the next token from valid JSON: a bracket, or a scalar.
@@ -151,18 +133,19 @@ fn next_token<'a>(rest: &mut &'a str) -> &'a str {
     token
 }
 
-/// Writes the value that begins with `token`, and whose name or dash follows `indent` spaces.
+/// Writes the value that begins with `token`, after its name or dash, which follows `indent` spaces.
 fn write_value(
+    name: &str,
     token: &str,
     rest: &mut &str,
     indent: usize,
-    place: &Place,
     out: &mut dyn Write,
 ) -> Outcome {
     if indent > 2 * MAX_NESTING {
         let why = format_args!("a frame is nested more than {MAX_NESTING} deep");
         return Err(CommandError::lost(why));
     }
+    write!(out, "{name}")?;
     let is_list = token == "[";
     let mut next = match is_list || token == "{" {
         true => next_token(rest),
@@ -170,29 +153,27 @@ fn write_value(
     };
     let is_end = |token: &str| matches!(token, "" | "]" | "}");
     if is_end(next) {
-        let space = if *place == Place::Top { "" } else { " " };
+        let space = if name.is_empty() { "" } else { " " };
         return Ok(writeln!(out, "{space}{}{next}", scalar(token)?)?);
     }
+    let is_item = name == "-";
     // The dashes of a member are below its name.
-    let indent = match place {
-        Place::Top => indent,
-        Place::Member if is_list => indent,
-        _ => indent + 2,
+    let is_level = name.is_empty() || (is_list && !is_item);
+    let indent = if is_level { indent } else { indent + 2 };
+    let line = " ".repeat(indent);
+    let mut start = match name {
+        "" => String::new(),
+        "-" => " ".to_owned(),
+        _ => format!("\n{line}"),
     };
-    let mut is_first = true;
     while !is_end(next) {
-        match place {
-            Place::Item if is_first => write!(out, " ")?,
-            Place::Member if is_first => write!(out, "\n{:indent$}", "")?,
-            _ => write!(out, "{:indent$}", "")?,
-        }
-        is_first = false;
+        write!(out, "{start}")?;
+        start.clone_from(&line);
         if is_list {
-            write!(out, "-")?;
-            write_value(next, rest, indent, &Place::Item, out)?;
+            write_value("-", next, rest, indent, out)?;
         } else {
-            write!(out, "{}:", scalar(next)?)?;
-            write_value(next_token(rest), rest, indent, &Place::Member, out)?;
+            let name = scalar(next)? + ":";
+            write_value(&name, next_token(rest), rest, indent, out)?;
         }
         next = next_token(rest);
     }
@@ -225,5 +206,5 @@ fn text(value: &str) -> String {
     {
         return value.to_owned();
     }
-    escaped(&Value::from(value).to_string())
+    json_line(&Value::from(value).to_string())
 }

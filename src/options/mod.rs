@@ -30,7 +30,10 @@ use crate::report::ReportOptions;
 pub use crate::value::Links;
 use crate::value::{ValueReader, needed, one_of, read_links, within};
 #[cfg(feature = "web")]
-use crate::web::{DEFAULT_REPORT, authority::Authority};
+use crate::web::{
+    DEFAULT_REPORT,
+    access::{Access, read_origin},
+};
 
 /// Default address of the runtime. With it, the runtime also listens on `[::1]`.
 pub const DEFAULT_BIND: SocketAddr =
@@ -87,53 +90,25 @@ pub struct Options {
     /// Secret token of at least 16 characters; prefer the variable, because other users can see options
     #[arg(long, env = "ARM_SIM_TOKEN", value_name = "TOKEN", value_parser = ValueReader(Token::read))]
     pub token: Option<Token>,
-    /// Options of records.
+    /// Record the run as MCAP into this file, which must not exist
     #[cfg(feature = "record")]
-    #[command(flatten)]
-    pub record: RecordOptions,
-    /// Options of the site.
+    #[arg(long, env = "ARM_SIM_RECORD", value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Existing folder for records that clients start by /recorder/start
+    #[cfg(feature = "record")]
+    #[arg(long, env = "ARM_SIM_RECORD_DIR", value_name = "FOLDER")]
+    pub record_dir: Option<PathBuf>,
+    /// The rules of admission.
     #[cfg(feature = "web")]
     #[command(flatten)]
-    pub web: WebOptions,
-}
-
-/// The options of records.
-#[cfg(feature = "record")]
-#[derive(Debug, Clone, PartialEq, Eq, Args)]
-pub struct RecordOptions {
-    /// Record the run as MCAP into this file, which must not exist
-    #[arg(long = "record", env = "ARM_SIM_RECORD", value_name = "FILE")]
-    pub file: Option<PathBuf>,
-    /// Existing folder for records that clients start by /recorder/start
-    #[arg(long = "record-dir", env = "ARM_SIM_RECORD_DIR", value_name = "FOLDER")]
-    pub folder: Option<PathBuf>,
-}
-
-/// The options of the site.
-#[cfg(feature = "web")]
-#[derive(Debug, Clone, PartialEq, Eq, Args)]
-pub struct WebOptions {
-    /// Other host names for browsers, separated by commas; a name with a port is allowed only at that port
-    #[arg(long = "allow-host", env = "ARM_SIM_ALLOW_HOST", value_name = "HOSTS")]
-    #[arg(value_delimiter = ',', value_parser = ValueReader(read_host))]
-    pub hosts: Vec<Authority>,
-    /// Origins of other machines' pages that may open a WebSocket, separated by commas
-    #[arg(long = "allow-origin", env = "ARM_SIM_ALLOW_ORIGIN")]
-    #[arg(value_name = "ORIGINS")]
-    #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
-    pub origins: Vec<Box<str>>,
-    /// Allow a WebSocket only to the runtime's own page and to --allow-origin, as with a token
-    #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "BOOL")]
-    #[arg(default_value = "false")]
-    #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
-    #[arg(value_parser = ValueReader(|text| needed(text.parse::<bool>().ok(), "true or false", text)))]
-    pub strict_origin: bool,
+    pub access: Access,
     /// Origins of pages that may show the page and the report in a frame, separated by commas
-    #[arg(long = "allow-frame", env = "ARM_SIM_ALLOW_FRAME")]
-    #[arg(value_name = "ORIGINS")]
+    #[cfg(feature = "web")]
+    #[arg(long, env = "ARM_SIM_ALLOW_FRAME", value_name = "ORIGINS")]
     #[arg(value_delimiter = ',', value_parser = ValueReader(read_frame))]
-    pub frames: Vec<Box<str>>,
+    pub allow_frame: Vec<Box<str>>,
     /// Folder of the report at /report/
+    #[cfg(feature = "web")]
     #[arg(long, env = "ARM_SIM_REPORT", value_name = "FOLDER", default_value = DEFAULT_REPORT)]
     pub report: PathBuf,
 }
@@ -304,36 +279,12 @@ fn read_level(text: &str) -> Result<LevelFilter, String> {
     needed(level, "off, error, warn, info, debug or trace", text)
 }
 
-#[cfg(feature = "web")]
-fn read_host(text: &str) -> Result<Authority, String> {
-    let needs = "host names, with or without a port, separated by commas";
-    needed(Authority::parse(text.trim()), needs, text)
-}
-
-#[cfg(feature = "web")]
-fn read_origin(text: &str) -> Result<Box<str>, String> {
-    let origin = text.trim().to_ascii_lowercase();
-    let in_scheme = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'-' | b'.');
-    let is_origin = match origin.split_once("://") {
-        Some(("file", "")) => true,
-        Some((scheme, host)) => {
-            !scheme.is_empty() && scheme.bytes().all(in_scheme) && Authority::parse(host).is_some()
-        }
-        None => origin == "null",
-    };
-    let needs = "origins, such as https://example.org, null or file://, separated by commas";
-    needed(is_origin.then(|| origin.into()), needs, text)
-}
-
 /// The origin of a page that may show this one in a frame. A browser compares scheme, host and port, so it needs a
 /// host.
 #[cfg(feature = "web")]
 fn read_frame(text: &str) -> Result<Box<str>, String> {
-    let origin = text.trim().to_ascii_lowercase();
-    let host = ["http://", "https://"]
-        .iter()
-        .find_map(|scheme| origin.strip_prefix(scheme));
-    let is_page = host.and_then(Authority::parse).is_some();
+    let origin = read_origin(text).ok();
+    let page = origin.filter(|one| one.starts_with("http://") || one.starts_with("https://"));
     let needs = "origins of web pages, such as https://example.org, separated by commas";
-    needed(is_page.then(|| origin.into()), needs, text)
+    needed(page, needs, text)
 }

@@ -8,6 +8,7 @@
 
 use std::net::SocketAddr;
 
+use clap::Args;
 use hyper::StatusCode;
 use hyper::header::ALLOW;
 
@@ -16,21 +17,54 @@ use super::head::RequestHead;
 use super::response::{HttpResponse, set, text};
 use crate::protocol::op::token::Token;
 use crate::protocol::wire::text::shortened;
+use crate::value::{ValueReader, needed};
 
 /// Most characters of a header in a refusal.
 const MAX_SHOWN: usize = 80;
 
-/// The rules.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+/// The rules, with their options.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct Access {
-    /// The required token, if there is one.
+    /// The required token, if there is one. It is an option of the whole server.
+    #[arg(skip)]
     pub token: Option<Token>,
-    /// Names allowed in `Host` besides loopback's. A name without a port is allowed at every port.
+    /// Other host names for browsers, separated by commas; a name with a port is allowed only at that port
+    #[arg(long = "allow-host", env = "ARM_SIM_ALLOW_HOST", value_name = "HOSTS")]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_host))]
     pub hosts: Vec<Authority>,
-    /// Origins that may open a WebSocket besides loopback's, in lower case.
+    /// Origins of other machines' pages that may open a WebSocket, separated by commas
+    #[arg(
+        long = "allow-origin",
+        env = "ARM_SIM_ALLOW_ORIGIN",
+        value_name = "ORIGINS"
+    )]
+    #[arg(value_delimiter = ',', value_parser = ValueReader(read_origin))]
     pub origins: Vec<Box<str>>,
-    /// Only the runtime's own pages and the named ones may open a WebSocket. The same applies with a token.
+    /// Allow a WebSocket only to the runtime's own page and to --allow-origin, as with a token
+    #[arg(long, env = "ARM_SIM_STRICT_ORIGIN", value_name = "BOOL")]
+    #[arg(default_value = "false")]
+    #[arg(action = clap::ArgAction::Set, num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(value_parser = ValueReader(|text| needed(text.parse::<bool>().ok(), "true or false", text)))]
     pub strict_origin: bool,
+}
+
+fn read_host(text: &str) -> Result<Authority, String> {
+    let needs = "host names, with or without a port, separated by commas";
+    needed(Authority::parse(text.trim()), needs, text)
+}
+
+pub(crate) fn read_origin(text: &str) -> Result<Box<str>, String> {
+    let origin = text.trim().to_ascii_lowercase();
+    let in_scheme = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'-' | b'.');
+    let is_origin = match origin.split_once("://") {
+        Some(("file", "")) => true,
+        Some((scheme, host)) => {
+            !scheme.is_empty() && scheme.bytes().all(in_scheme) && Authority::parse(host).is_some()
+        }
+        None => origin == "null",
+    };
+    let needs = "origins, such as https://example.org, null or file://, separated by commas";
+    needed(is_origin.then(|| origin.into()), needs, text)
 }
 
 /// Why a request is refused, and the connection closed.

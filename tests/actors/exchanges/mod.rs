@@ -73,7 +73,7 @@ use pendularm::actors::resources::memory::Memory;
 use pendularm::options::{Options, Parsed};
 use pendularm::protocol::catalog::{Rosapi, Service};
 #[cfg(feature = "web")]
-use pendularm::web::{Site, access::Access};
+use pendularm::web::Site;
 use pendularm_client::pipe;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
@@ -110,13 +110,9 @@ fn admission(options: &str) -> Result<Admission, String> {
     Ok(Admission {
         #[cfg(feature = "web")]
         site: {
-            let access = Access {
-                token: options.token.clone(),
-                hosts: options.web.hosts,
-                origins: options.web.origins,
-                strict_origin: options.web.strict_origin,
-            };
-            Site::new(access, "no-report".into(), &options.web.frames)
+            let mut access = options.access;
+            access.token.clone_from(&options.token);
+            Site::new(access, "no-report".into(), &options.allow_frame)
         },
         token: options.token,
         ..Admission::default()

@@ -5,20 +5,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::{PENDULARM, SourceTree};
 
 /// Layers that a layer may import, besides itself. A row names only rows above it.
-const LAYERS: [(&str, &[&str]); 18] = [
+const LAYERS: [(&str, &[&str]); 19] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
     ("output", &["protocol"]),
     ("address", &[]),
     ("value", &[]),
+    ("signals", &[]),
     ("study", &["math"]),
     ("services", &["math", "protocol", "study"]),
     ("live", &["math", "protocol", "services", "study"]),
     ("record", &["math", "protocol"]),
-    ("web", &["protocol"]),
+    ("web", &["protocol", "value"]),
     ("report", &["math", "study"]),
-    ("command", &["protocol", "output", "address", "value"]),
+    (
+        "command",
+        &["protocol", "output", "address", "value", "signals"],
+    ),
     ("plan", &["math", "study", "value"]),
     (
         "options",
@@ -30,7 +34,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
         "actors",
         &[
             "math", "protocol", "logging", "study", "services", "live", "record", "web", "options",
-            "value",
+            "value", "signals",
         ],
     ),
     ("lib", &[]),
@@ -38,6 +42,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
         "main",
         &[
             "command", "logging", "output", "record", "report", "options", "plan", "actors",
+            "signals",
         ],
     ),
 ];

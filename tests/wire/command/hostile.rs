@@ -28,7 +28,8 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
                 return then(&mut stream);
             }
             let value = json!("one\u{1b}[2J\nother").to_string();
-            let values = json!({"type": "std_msgs/msg/String", "successful": true, "reason": "", "value": value});
+            let values = json!({"type": "std_msgs/msg/String", "topics": ["/t", "/diagnostics"], "successful": true,
+                "reason": "", "value": value});
             let answer = json!({"op": "service_response", "id": said["id"], "values": values, "result": true});
             stream.write_all(format!("{answer}\n").as_bytes()).unwrap();
         }

@@ -147,14 +147,14 @@ fn hosts_and_origins_are_lists_and_the_switch_needs_no_value() {
         "--strict-origin",
         "--report=somewhere",
     ]);
-    let hosts: Vec<String> = given.web.hosts.iter().map(ToString::to_string).collect();
+    let hosts: Vec<String> = given.access.hosts.iter().map(ToString::to_string).collect();
     assert_eq!(hosts, ["arm.example", "other:80"]);
-    let origins: Vec<&str> = given.web.origins.iter().map(|one| &**one).collect();
+    let origins: Vec<&str> = given.access.origins.iter().map(|one| &**one).collect();
     assert_eq!(origins, ["https://example.org", "null", "file://"]);
-    assert!(given.web.strict_origin);
-    assert_eq!(given.web.report.to_str(), Some("somewhere"));
+    assert!(given.access.strict_origin);
+    assert_eq!(given.report.to_str(), Some("somewhere"));
     for (value, on) in [("true", true), ("false", false)] {
         let options = options(&[&format!("--strict-origin={value}")]);
-        assert_eq!(options.web.strict_origin, on);
+        assert_eq!(options.access.strict_origin, on);
     }
 }

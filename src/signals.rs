@@ -27,6 +27,26 @@ pub const MAX_SHUTDOWN_TIME: Duration = Duration::from_millis(850);
 /// The name of the request that has arrived; otherwise the task is woken when one arrives.
 type Arrivals = Box<dyn FnMut(&mut Context<'_>) -> Poll<&'static str> + Send>;
 
+/// The requests to end that this process receives from now on. It needs a Tokio runtime.
+pub(crate) struct EndRequests(Vec<Arrivals>);
+
+impl EndRequests {
+    /// # Errors
+    /// If the operating system refuses a signal handler.
+    pub(crate) fn listen() -> io::Result<Self> {
+        arrivals().map(Self)
+    }
+
+    /// Waits for the next request, and returns its name.
+    pub(crate) async fn next(&mut self) -> &'static str {
+        poll_fn(|cx| {
+            let mut all = self.0.iter_mut().map(|poll| poll(cx));
+            all.find(Poll::is_ready).unwrap_or(Poll::Pending)
+        })
+        .await
+    }
+}
+
 /// Requests to end. They apply even if they were ignored at the start, as in a shell's background jobs.
 #[cfg(unix)]
 const REQUESTS: [(&str, Signal); 2] = [("SIGINT", Signal::INT), ("SIGTERM", Signal::TERM)];
@@ -75,7 +95,7 @@ fn further() -> impl Iterator<Item = (&'static str, Signal)> {
     FATAL.iter().copied().filter(move |(_, one)| is_heard(*one))
 }
 
-/// The signals of this process from now on. It needs a Tokio runtime.
+/// The signals of this process.
 #[cfg(unix)]
 fn arrivals() -> io::Result<Vec<Arrivals>> {
     let all = REQUESTS.into_iter().chain(further());
@@ -87,7 +107,7 @@ fn arrivals() -> io::Result<Vec<Arrivals>> {
     .collect()
 }
 
-/// The console events that end a process by default, from now on. It needs a Tokio runtime.
+/// The console events that end a process by default.
 #[cfg(windows)]
 fn arrivals() -> io::Result<Vec<Arrivals>> {
     let mut ctrl_c = windows::ctrl_c()?;
@@ -114,9 +134,9 @@ fn ignored_at_start() -> u64 {
 }
 
 /// Handles the signals of this process while this value exists.
-pub(super) struct Signals {
+pub(crate) struct Signals {
     /// Receives a signal.
-    pub(super) came: oneshot::Receiver<()>,
+    pub(crate) came: oneshot::Receiver<()>,
     /// An orderly end drops this, and so cancels the last resort.
     _orderly: mpsc::Sender<()>,
 }
@@ -126,19 +146,16 @@ impl Signals {
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.
-    pub(super) fn listen(force_exit: Box<dyn FnOnce() + Send>) -> io::Result<Self> {
+    pub(crate) fn listen(force_exit: Box<dyn FnOnce() + Send>) -> io::Result<Self> {
         let runtime = runtime()?;
-        let mut arrivals = {
+        let mut requests = {
             let _entered = runtime.enter();
-            arrivals()?
+            EndRequests::listen()?
         };
         let (come, came) = oneshot::channel();
         let (orderly, has_ended) = mpsc::channel::<()>();
         let wait = move || {
-            let name = runtime.block_on(poll_fn(|cx| {
-                let mut all = arrivals.iter_mut().map(|poll| poll(cx));
-                all.find(Poll::is_ready).unwrap_or(Poll::Pending)
-            }));
+            let name = runtime.block_on(requests.next());
             // There is no receiver if the runtime has already ended.
             let _ = come.send(());
             tracing::info!("{name}: shutting down");
@@ -155,8 +172,8 @@ impl Signals {
     }
 }
 
-#[cfg(test)]
 #[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use std::time::Instant;
