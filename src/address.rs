@@ -21,6 +21,9 @@ pub fn read(text: &str) -> Option<String> {
         None => &text,
     };
     let authority = rest.split(['/', '?', '#']).next()?;
+    if let Ok(address) = authority.parse::<Ipv6Addr>() {
+        return Some(format!("[{address}]:{PORT}"));
+    }
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|one| one.is_ascii_digit());
     let (host, port) = match authority.rsplit_once(':') {
         Some((host, port)) if is_number(port) => (host, port.parse().ok()?),
@@ -52,6 +55,7 @@ mod tests {
             (":9096", "127.0.0.1:9096"),
             ("127.0.0.1", "127.0.0.1:9095"),
             ("LocalHost:80", "localhost:80"),
+            ("::1", "[::1]:9095"),
             ("[::1]", "[::1]:9095"),
             ("[::1]:9096/", "[::1]:9096"),
             ("ws://127.0.0.1:9096/", "127.0.0.1:9096"),
@@ -68,7 +72,6 @@ mod tests {
             "localhost:",
             "localhost:x",
             "localhost:+80",
-            "::1",
             "[::1",
             "[::g]:80",
             "https://a:80",

@@ -55,8 +55,10 @@ fn check_yaml(text: &str) -> Result<(), String> {
             }
             _ => {}
         }
-        if depth > MAX_NESTING {
-            return Err(format!("it is nested more than {MAX_NESTING} deep"));
+        // The frame around it is a level too.
+        if depth >= MAX_NESTING {
+            let most = MAX_NESTING - 1;
+            return Err(format!("it is nested more than {most} deep"));
         }
     }
 }
