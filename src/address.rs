@@ -1,8 +1,11 @@
-//! Addresses as people type them: a port, a host, both, or a URL.
+//! Addresses as people type them (a port, a host, both, or a URL), and hosts with ports as in the `Host` and `Origin`
+//! headers.
 //!
-//! **Invariant:** no name is looked up here.
+//! **Invariant:** no name is looked up here. Two spellings of the same host are equal values. Case, the brackets of IPv6
+//! and a default port make no difference.
 
-use std::net::Ipv6Addr;
+use std::fmt;
+use std::net::{IpAddr, Ipv6Addr};
 
 /// The port where none is given.
 const PORT: u16 = 9095;
@@ -10,6 +13,13 @@ const PORT: u16 = 9095;
 const HOST: &str = "127.0.0.1";
 /// The schemes of a URL that can be meant. TLS is for a proxy.
 const SCHEMES: [&str; 3] = ["ws", "http", "tcp"];
+
+/// Longest name of a host that DNS allows, in bytes.
+const MAX_NAME: usize = 253;
+/// The default port of `http`.
+const HTTP_PORT: u16 = 80;
+/// The default port of `https`, which a proxy may use.
+const HTTPS_PORT: u16 = 443;
 
 /// Reads an address as `host:port`, the host in lower case; a URL's path is left out.
 #[must_use]
@@ -21,9 +31,6 @@ pub fn read(text: &str) -> Option<String> {
         None => &text,
     };
     let authority = rest.split(['/', '?', '#']).next()?;
-    if let Ok(address) = authority.parse::<Ipv6Addr>() {
-        return Some(format!("[{address}]:{PORT}"));
-    }
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|one| one.is_ascii_digit());
     let (host, port) = match authority.rsplit_once(':') {
         Some((host, port)) if is_number(port) => (host, port.parse().ok()?),
@@ -31,17 +38,109 @@ pub fn read(text: &str) -> Option<String> {
         _ if authority.is_empty() => return None,
         _ => (authority, PORT),
     };
-    let host = if host.is_empty() { HOST } else { host };
-    let address = host
-        .strip_prefix('[')
-        .and_then(|host| host.strip_suffix(']'));
-    let valid = match address {
-        Some(address) => address.parse::<Ipv6Addr>().is_ok(),
-        None => host
-            .chars()
-            .all(|one| one.is_alphanumeric() || "-_.".contains(one)),
-    };
-    valid.then(|| format!("{host}:{port}"))
+    let host = Host::parse(if host.is_empty() { HOST } else { host })?;
+    Some(format!("{host}:{port}"))
+}
+
+/// A host: a name, or an address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Host {
+    /// A name, in lower case.
+    Name(Box<str>),
+    /// An address.
+    Address(IpAddr),
+}
+
+impl Host {
+    /// Reads a name or an address, IPv6 in brackets; letters, digits, `-`, `_` and `.` only.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        if let Some(inner) = text.strip_prefix('[') {
+            let address: Ipv6Addr = inner.strip_suffix(']')?.parse().ok()?;
+            return Some(Self::Address(address.into()));
+        }
+        if let Ok(address) = text.parse::<std::net::Ipv4Addr>() {
+            return Some(Self::Address(address.into()));
+        }
+        let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
+        let is_name = (1..=MAX_NAME).contains(&text.len()) && text.bytes().all(plain);
+        is_name.then(|| Self::Name(text.to_ascii_lowercase().into()))
+    }
+
+    /// The host's text without a final full stop, which does not change the name.
+    fn bare(&self) -> String {
+        let text = self.to_string();
+        text.strip_suffix('.').unwrap_or(&text).to_owned()
+    }
+
+    /// Whether the name means this machine, independent of any name server.
+    #[must_use]
+    pub fn is_loopback(&self) -> bool {
+        match self {
+            Self::Name(name) => &**name == "localhost",
+            Self::Address(address) => address.is_loopback(),
+        }
+    }
+}
+
+impl fmt::Display for Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => f.write_str(name),
+            Self::Address(IpAddr::V4(address)) => address.fmt(f),
+            Self::Address(IpAddr::V6(address)) => write!(f, "[{address}]"),
+        }
+    }
+}
+
+/// A host with an optional port: `arm.example:9095`, `127.0.0.1`, `[::1]:9095`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Authority {
+    /// The host.
+    pub host: Host,
+    /// The port, if one is written.
+    pub port: Option<u16>,
+}
+
+impl Authority {
+    /// Reads a host with or without a port.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let (host, port) = match text.rsplit_once(':') {
+            // The last colon of `[::1]` does not begin a port.
+            Some((host, port)) if !port.ends_with(']') => {
+                // `parse` also accepts a plus sign.
+                let is_number = port.bytes().all(|byte| byte.is_ascii_digit());
+                (host, Some(port.parse().ok().filter(|_| is_number)?))
+            }
+            _ => (text, None),
+        };
+        let host = Host::parse(host)?;
+        Some(Self { host, port })
+    }
+
+    /// Whether this entry of an option allows `asked`. Without a port it allows every port.
+    #[must_use]
+    pub fn allows(&self, asked: &Self) -> bool {
+        let is_default = |port| asked.port.is_none() && [HTTP_PORT, HTTPS_PORT].contains(&port);
+        let has_port = |port| asked.port == Some(port) || is_default(port);
+        self.host.bare() == asked.host.bare() && self.port.is_none_or(has_port)
+    }
+
+    /// The port, or the default one of `http`.
+    #[must_use]
+    pub fn http_port(&self) -> u16 {
+        self.port.unwrap_or(HTTP_PORT)
+    }
+}
+
+impl fmt::Display for Authority {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.port {
+            Some(port) => write!(f, "{}:{port}", self.host),
+            None => self.host.fmt(f),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -55,7 +154,6 @@ mod tests {
             (":9096", "127.0.0.1:9096"),
             ("127.0.0.1", "127.0.0.1:9095"),
             ("LocalHost:80", "localhost:80"),
-            ("::1", "[::1]:9095"),
             ("[::1]", "[::1]:9095"),
             ("[::1]:9096/", "[::1]:9096"),
             ("ws://127.0.0.1:9096/", "127.0.0.1:9096"),
@@ -72,6 +170,7 @@ mod tests {
             "localhost:",
             "localhost:x",
             "localhost:+80",
+            "::1",
             "[::1",
             "[::g]:80",
             "https://a:80",

@@ -16,7 +16,7 @@ use pendularm::actors::resources::memory::Memory;
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Site;
 use pendularm::web::access::Access;
-use pendularm::web::authority::Authority;
+use pendularm::address::Authority;
 use pendularm_client::codec::{Codec, Framing};
 use pendularm_fuzz::json::Json;
 use pendularm_fuzz::limits::{Allowance, hold};

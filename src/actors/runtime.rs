@@ -34,12 +34,14 @@ use crate::actors::resources::gauges::Gauges;
 use crate::actors::resources::priority::lower_priority;
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::wire::Nodes;
+#[cfg(feature = "web")]
+use crate::address::Host;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{DEFAULT_BIND, Links, Options};
 use crate::signals::Signals;
 #[cfg(feature = "web")]
-use crate::web::{Site, authority::Host};
+use crate::web::Site;
 
 /// Most threads for long work of the gateway.
 const LONG_WORK_THREADS: usize = 4;

@@ -12,9 +12,9 @@ use clap::Args;
 use hyper::StatusCode;
 use hyper::header::ALLOW;
 
-use super::authority::{Authority, Host};
 use super::head::RequestHead;
 use super::response::{HttpResponse, set, text};
+use crate::address::{Authority, Host};
 use crate::protocol::op::token::Token;
 use crate::protocol::wire::text::shortened;
 use crate::value::{ValueReader, needed};

@@ -3,7 +3,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`head`] | the head of a request |
-//! | [`authority`], [`access`] | admission: `Host`, `Origin`, the token |
+//! | [`access`] | admission: `Host`, `Origin`, the token |
 //! | [`page`], [`report`] | the served files |
 //! | [`upgrade`] | the WebSocket handshake |
 //! | [`response`] | answers, with the headers that keep a browser strict |
@@ -16,7 +16,6 @@
 //! **Invariant:** a connection that has begun with a request is never read as JSON, unless it becomes a WebSocket.
 
 pub mod access;
-pub mod authority;
 pub mod head;
 pub mod page;
 pub mod report;

@@ -5,9 +5,9 @@
 
 use bytes::Bytes;
 
-use super::authority::Authority;
 use super::response::{HttpResponse, file};
 use super::{Site, report};
+use crate::address::Authority;
 
 /// The name of the document, which is served as `/`.
 const DOCUMENT: &str = "index.html";

@@ -21,11 +21,11 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, timeout};
 
 use super::access::AccessError;
-use super::authority::Authority;
 use super::head::{MAX_HEAD, MAX_HEADERS, RequestHead};
 use super::response::{AnswerBody, HttpResponse, file, permit_frames, refusal, set, text};
 use super::stream::{Deadline, HttpStream};
 use super::{Site, page, report, upgrade};
+use crate::address::Authority;
 
 /// Time for the end of a connection, and most further bytes of the client that are read there.
 const DISCARD_TIME: Duration = Duration::from_secs(1);

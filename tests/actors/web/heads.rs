@@ -1,6 +1,6 @@
 //! The parts of a head: headers, escapes and the length of a host. `exchanges/http.txt` has the hosts that are refused.
 
-use pendularm::web::authority::Host;
+use pendularm::address::Host;
 use pendularm::web::head::{RequestHead, decode};
 
 /// Longest name of a host that DNS allows, in bytes.

@@ -17,7 +17,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
     ("services", &["math", "protocol", "study"]),
     ("live", &["math", "protocol", "services", "study"]),
     ("record", &["math", "protocol"]),
-    ("web", &["protocol", "value"]),
+    ("web", &["protocol", "address", "value"]),
     ("report", &["math", "study"]),
     (
         "command",
@@ -34,7 +34,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
         "actors",
         &[
             "math", "protocol", "logging", "study", "services", "live", "record", "web", "options",
-            "value", "signals",
+            "address", "value", "signals",
         ],
     ),
     ("lib", &[]),
