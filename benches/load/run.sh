@@ -9,8 +9,8 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
 
-# Three servers with 1,000 clients each, and both ends of a connection need a file.
-needed_files=4096
+# Three servers with 250 clients each, and both ends of a connection need a file.
+needed_files=1024
 [ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
 
 scratch=$(mktemp -d)

@@ -42,15 +42,15 @@ const SCENES: [Scene; 8] = [
         traffic: RATE,
     },
     Scene {
-        name: "60 Hz to 1000",
+        name: "60 Hz to 250",
         topics: 1,
-        subscribers: 1000,
+        subscribers: 250,
         traffic: RATE,
     },
     Scene {
-        name: "the arm to 1000",
+        name: "the arm to 250",
         topics: 1,
-        subscribers: 1000,
+        subscribers: 250,
         traffic: Traffic::Arm,
     },
     Scene {
@@ -103,7 +103,7 @@ pub struct Played {
 
 /// Whether the arm's time and a caller's time are also measured.
 fn is_probed(scene: &Scene) -> bool {
-    scene.subscribers >= 1000 || scene.traffic == Traffic::Flood
+    scene.subscribers >= 250 || scene.traffic == Traffic::Flood
 }
 
 fn main() {
@@ -121,14 +121,8 @@ fn main() {
         .iter()
         .filter(|argument| !argument.starts_with("--"));
     let path = words.next().expect("the path of the pendularm binary");
-    let options = [
-        "--bind",
-        "127.0.0.1:0",
-        "--clients",
-        "1100",
-        "--log",
-        "warn",
-    ];
+    // Some places are kept for HTTP.
+    let options = ["--bind", "127.0.0.1:0", "--clients", "300", "--log", "warn"];
     let program = Program::start(path, &options).expect("the runtime starts");
     let ours = Server {
         protocol: Protocol::Pendularm,

@@ -95,7 +95,7 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     // The arm's own topic has no peers. It is compared with the same fan-out between clients.
     let peers_of = |scene: &Scene| {
         let name = if scene.traffic == Traffic::Arm {
-            "60 Hz to 1000"
+            "60 Hz to 250"
         } else {
             scene.name
         };
