@@ -260,7 +260,7 @@ impl<'a> Stepping<'a> {
         }
         // At timesteps at which the fast modes are stable, the stability of the slow ones does not depend on the
         // timestep.
-        if modes.slow_growth && !self.delayed {
+        if modes.slow_growth {
             return Some(0.0);
         }
         let start = SEARCH_START / rate;
