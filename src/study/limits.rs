@@ -125,7 +125,9 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
     // A joint without a restoring force drifts, but a loop that is stable at some timestep is not unstable in
     // continuous time.
     let mut runs_away = held == Some(0.0) && Modes::of(&linear).run_away();
+    pause().await;
     let continuous = largest_timestep(&linear, method, Sampling::Continuous);
+    pause().await;
     let here = PoseCandidate::as_it_is(equilibrium);
     let (mut least, mut worst) = (held, here);
     let (mut bound, mut runaway) = (None, None);
@@ -133,8 +135,7 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         bound = Some(timestep);
         // The pose at which the bound is tightest.
         let nearest = PoseCandidate::as_it_is(pose);
-        let there = nearest.linear(&control);
-        let there = Stepping::of(&there, &control, Sampling::Held).limit();
+        let there = Stepping::of(&nearest.linear(&control), &control, Sampling::Held).limit();
         if there.is_some_and(|there| there > 0.0 && least.is_none_or(|least| there < least)) {
             (least, worst) = (there, nearest);
         }
@@ -175,22 +176,21 @@ pub async fn search_limits<const N: usize>(control: ControlLoop<N>) -> Limits<N>
         advised: None,
         period: control.given_period(),
     };
-    if let Some(pose) = runaway {
-        limits.advised = least.map(|limit| ADVISED_PART * limit);
-        limits.minimum_held = Some(0.0);
-        limits.worst_pose = Some(pose.pose);
-        limits.critical = critical(&pose.linear(&control), &control, 0.0);
-        return limits;
-    }
     limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
+    if let Some(pose) = runaway {
+        (least, worst) = (Some(0.0), pose);
+        limits.minimum_held = least;
+    }
     if let Some(limit) = least {
         limits.worst_pose = Some(worst.pose);
         limits.critical = critical(&worst.linear(&control), &control, limit);
     }
+    if runaway.is_some() {
+        return limits;
+    }
     pause().await;
-    let known = (continuous, here);
-    (limits.minimum_continuous, _) =
-        smallest_of_all_poses(control, Some(Sampling::Continuous), known).await;
+    let search = smallest_of_all_poses(control, Some(Sampling::Continuous), (continuous, here));
+    (limits.minimum_continuous, _) = search.await;
     limits
 }
 

@@ -37,7 +37,7 @@ use super::control_loop::ControlLoop;
 use super::equilibrium::hanging;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{
-    energy, forward_dynamics, gravity_load, kinetic_energy, mass_matrix, potential_energy,
+    forward_dynamics, gravity_load, kinetic_energy, mass_matrix, potential_energy,
 };
 use crate::math::pid::INTEGRAL_LIMIT;
 
@@ -92,10 +92,10 @@ impl Motion {
             stored += 0.5 * kp * off * off + gathered * off;
             driven += setpoint.velocity[j].abs();
         }
-        let falling = energy(arm, state) - lowest(arm) + stored;
+        let kinetic = kinetic_energy(arm, &state.position, &state.velocity);
+        let falling = kinetic + potential_energy(arm, &state.position) - lowest(arm) + stored;
         let agility = agility(&weightless);
         let by_energy = driven + (2.0 * falling.max(0.0) * agility).sqrt();
-        let kinetic = kinetic_energy(arm, &state.position, &state.velocity);
         let present = (2.0 * kinetic * agility).sqrt();
         let fastest_pace = paces.iter().copied().fold(0.0, f64::max);
         let speed = if gains.kp.contains(&0.0) {
