@@ -76,7 +76,7 @@ class Stability:
     """The speed of the fastest link in that motion [rad/s]."""
     advised_timestep: float | None
     """0.8 of the smaller of that and the minimum over poses. If the minimum is 0, the advice is only for this
-    setpoint."""
+    setpoint. `None` also for a control period longer than the advice."""
     advised_duration: float | None
     """Time in which a free arm's energy stays within a factor of two at that timestep [s]; `None` under control."""
 
