@@ -32,6 +32,8 @@ mod kinematics;
 mod pacer;
 mod particle;
 mod simulation;
+#[path = "../support/stored.rs"]
+mod stored;
 mod trajectory;
 mod trial;
 mod trig;

@@ -26,8 +26,6 @@ mod fewest;
 #[cfg(feature = "report")]
 #[path = "../support/folder.rs"]
 mod folder;
-#[path = "../support/json.rs"]
-mod json;
 mod matrix;
 mod motion;
 mod planner;
@@ -39,4 +37,6 @@ mod report;
 mod rollout;
 mod scenarios;
 mod stability;
+#[path = "../support/stored.rs"]
+mod stored;
 mod taylor;

@@ -10,12 +10,10 @@ use pendularm::math::integrator::{Method, increment, two_sum};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 
+use crate::stored::gains;
+
 fn no_gains<const N: usize>() -> Gains<N> {
-    Gains {
-        kp: [0.0; N],
-        ki: [0.0; N],
-        kd: [0.0; N],
-    }
+    gains([0.0; N], [0.0; N], [0.0; N])
 }
 
 /// Steps under constant efforts with only the method and the dynamics, summed like in the simulation.
@@ -29,6 +27,18 @@ struct Offline<const N: usize> {
 }
 
 impl<const N: usize> Offline<N> {
+    /// Without effort.
+    fn new(arm: Arm<N>, method: Method, dt: f64, state: State<N>) -> Self {
+        Self {
+            arm,
+            method,
+            dt,
+            tau: [0.0; N],
+            state,
+            carry: State::rest(),
+        }
+    }
+
     fn step(&mut self) {
         let State {
             position: q,

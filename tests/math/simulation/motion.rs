@@ -1,93 +1,50 @@
 //! Motion against stored 50-digit references, and against a stepper of method and dynamics alone.
 
-use std::collections::HashMap;
-
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::Simulation;
-use serde::Deserialize;
+use serde_json::Value;
 
 use super::{Offline, no_gains};
-
-/// A motion under constant efforts, with the truncation error of each method: `[q, q̇, energy]` at each sample.
-#[derive(Deserialize)]
-struct Case {
-    name: String,
-    n: usize,
-    masses: Vec<f64>,
-    lengths: Vec<f64>,
-    gravity: f64,
-    tau: Vec<f64>,
-    q0: Vec<f64>,
-    qdot0: Vec<f64>,
-    times: Vec<f64>,
-    q: Vec<Vec<f64>>,
-    qdot: Vec<Vec<f64>>,
-    growth_max: Vec<f64>,
-    #[serde(rename = "method_error_dt")]
-    dt: f64,
-    /// A method that is not among them is held to what halving its timestep makes of its motion.
-    method_error: HashMap<String, Vec<[f64; 3]>>,
-}
-
-#[derive(Deserialize)]
-struct Oracle {
-    cases: Vec<Case>,
-}
-
-fn array<const N: usize>(values: &[f64]) -> [f64; N] {
-    values.try_into().unwrap()
-}
+use crate::stored::{arm, array, entries, for_links, list, number, start};
 
 #[test]
 fn motion_shows_each_methods_truncation_error_and_nothing_else() {
-    let oracle: Oracle =
-        serde_json::from_str(include_str!("../../data/trajectories.json")).unwrap();
-    for case in oracle.cases {
-        match case.n {
-            2 => check_motion::<2>(&case),
-            3 => check_motion::<3>(&case),
-            n => panic!("{n} links"),
-        }
+    for case in entries(include_str!("../../data/trajectories.json"), "cases") {
+        for_links!(case, check_motion(&case));
     }
 }
 
-fn check_motion<const N: usize>(case: &Case) {
-    let arm = Arm::<N>::new(array(&case.lengths), array(&case.masses), case.gravity).unwrap();
-    let start = State {
-        position: array(&case.q0),
-        velocity: array(&case.qdot0),
-    };
+/// A motion under constant efforts. A method without stored truncation errors is held to what halving its timestep makes
+/// of its motion.
+fn check_motion<const N: usize>(case: &Value) {
+    let dt = number(&case["method_error_dt"]);
     for method in Method::ALL {
-        let mut live = Simulation::new(arm, no_gains());
+        let mut live = Simulation::new(arm(case), no_gains());
         live.set_method(method);
-        live.set_timestep(case.dt);
-        live.set_state(start);
-        let stepper = |dt: f64| Offline {
-            arm,
-            method,
-            dt,
-            tau: array(&case.tau),
-            state: start,
-            carry: State::rest(),
+        live.set_timestep(dt);
+        live.set_state(start(case));
+        let stepper = |dt: f64| Offline::<N> {
+            tau: array(&case["tau"]),
+            ..Offline::new(arm(case), method, dt, start(case))
         };
-        let (mut offline, mut finer) = (stepper(case.dt), stepper(0.5 * case.dt));
-        let stored = case.method_error.get(method.name());
+        let (mut offline, mut finer) = (stepper(dt), stepper(0.5 * dt));
         let mut steps = 0;
-        for (sample, time) in case.times.iter().enumerate() {
-            let more = (time / case.dt).round() as u64 - steps;
+        for (sample, time) in list(&case["times"]).into_iter().enumerate() {
+            let more = (time / dt).round() as u64 - steps;
             steps += more;
             (0..more).for_each(|_| offline.step());
             (0..2 * more).for_each(|_| finer.step());
             let halved = Truncation::by_halving(method, &offline.state, &finer.state);
-            let stored = stored.map(|errors| Truncation::stored(errors[sample]));
+            let stored = case["method_error"].get(method.name());
+            let stored = stored.map(|errors| Truncation::stored(array(&errors[sample])));
             for expected in stored.into_iter().chain([halved]) {
                 check_sample(case, method, sample, &offline.state, &expected);
             }
             // The live arm has no effort but its controller's, which is off.
             if offline.tau == [0.0; N] {
                 live.advance(more);
-                assert_eq!(live.state(), &offline.state, "{} {method}", case.name);
+                assert_eq!(live.state(), &offline.state, "{} {method}", case["name"]);
             }
         }
     }
@@ -106,14 +63,7 @@ fn without_gravity_an_arm_moves_by_the_same_bits() {
             let mut live = Simulation::new(arm, no_gains());
             live.set_method(method);
             live.set_state(start);
-            let mut offline = Offline {
-                arm,
-                method,
-                dt: live.timestep(),
-                tau: [0.0; N],
-                state: start,
-                carry: State::rest(),
-            };
+            let mut offline = Offline::new(arm, method, live.timestep(), start);
             (0..5000).for_each(|_| offline.step());
             live.advance(5000);
             assert_eq!(live.state(), &offline.state, "{N} links, {method}");
@@ -146,7 +96,8 @@ impl Truncation {
         let q = error(&whole.position, &halves.position);
         let qd = error(&whole.velocity, &halves.velocity);
         let larger = q.max(qd);
-        let doubt = if larger < 1e-3 {
+        let is_small = larger < 1e-3;
+        let doubt = if is_small {
             0.2 * larger
         } else {
             f64::INFINITY
@@ -158,37 +109,36 @@ impl Truncation {
     }
 }
 
-fn apart<const N: usize>(one: &[f64; N], other: &[f64]) -> f64 {
-    (0..N)
-        .map(|i| (one[i] - other[i]).abs())
-        .fold(0.0, f64::max)
+fn apart<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
+    let pairs = one.iter().zip(other);
+    pairs.fold(0.0, |most, (one, other)| most.max((one - other).abs()))
 }
 
 /// The tolerance adds the effect of rounding, which no method can avoid: a unit in the last place, amplified as in the
 /// oracle.
 fn check_sample<const N: usize>(
-    case: &Case,
+    case: &Value,
     method: Method,
     sample: usize,
     state: &State<N>,
     expected: &Truncation,
 ) {
-    let (q, qd) = (&case.q[sample], &case.qdot[sample]);
+    let [q, qd] = ["q", "qdot"].map(|name| array::<N>(&case[name][sample]));
     let size = q
         .iter()
-        .chain(qd)
+        .chain(&qd)
         .fold(1.0, |size: f64, x| size.max(x.abs()));
-    let rounding = 1e-15 * case.growth_max[sample] * size;
+    let rounding = 1e-15 * number(&case["growth_max"][sample]) * size;
     for (name, got, want, [error, doubt]) in [
         ("q", &state.position, q, expected.q),
         ("qd", &state.velocity, qd, expected.qd),
     ] {
-        let off = apart(got, want);
+        let off = apart(got, &want);
         assert!(
             (off - error).abs() <= doubt + rounding,
             "{} n={N} {method} {name} at {} s: off by {off}, expected {error}",
-            case.name,
-            case.times[sample],
+            case["name"],
+            case["times"][sample],
         );
     }
 }
