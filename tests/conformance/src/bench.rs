@@ -13,7 +13,7 @@ use crate::Got;
 use crate::arm::{Arm, State};
 use crate::method::step;
 use crate::peer::{Answer, PATIENCE, Peer, Trouble, is_message};
-use crate::values::{boolean, largest, list, minus, must, near, number, numbers, numbers_of, text};
+use crate::values::{largest, list, minus, must, near, number, numbers, numbers_of, text};
 
 /// Standard gravity of the specification.
 pub const GRAVITY: f64 = 9.81;
@@ -265,6 +265,15 @@ impl Bench {
         Ok(found)
     }
 
+    /// Passes if the arm stays at a pose for a time, without effort.
+    pub fn stays_at(&mut self, pose: &[f64], seconds: f64, tolerance: f64) -> Got {
+        for joints in self.joints_for(seconds)? {
+            near("effort", &joints.effort, &self.each(0.0), tolerance)?;
+            near("position", &joints.position, pose, tolerance)?;
+        }
+        Ok("no effort and no motion".to_owned())
+    }
+
     /// Joint states until the arm has been at rest for a while; the last ones.
     pub fn at_rest(&mut self) -> Result<Joints, String> {
         self.fresh()?;
@@ -400,11 +409,6 @@ impl Bench {
         let count = usize::try_from(steps).unwrap_or(usize::MAX).saturating_add(1);
         let read = |name| numbers_of(&values, name, count);
         Ok([read("times")?, read("positions")?, read("velocities")?])
-    }
-
-    /// Whether the controller is on.
-    pub fn is_enabled(&mut self) -> Result<bool, String> {
-        boolean(&self.accepted("/pid_controller/enable", &json!({}))?, "data")
     }
 
     /// Sends a goal; its id.

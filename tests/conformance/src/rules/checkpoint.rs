@@ -5,42 +5,23 @@ use serde_json::{Value, json};
 use crate::bench::{Bench, same};
 use crate::method::METHODS;
 use crate::values::{list, near};
-use crate::{Got, REJECTED, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule(
-        "checkpoint-1",
-        "times, positions and velocities have one entry per step and the starting point",
-        "steps + 1 entries each, for every integrator",
-        lengths,
-    ),
-    rule("checkpoint-2", "Index 0 is the starting point", "times[0] = 0, positions[0] = x0, velocities[0] = xdot0", start),
-    rule("checkpoint-3", "xdot0 is 0 if it is left out", "velocities[0] = 0", default_velocity),
-    rule("checkpoint-4", "times advance by dt", "times[k] = k dt", times),
-    rule(
-        "checkpoint-5",
-        "A constant force has the closed form",
-        "x = x0 + v0 t + a t^2 / 2 to 1e-9 by midpoint, verlet and rk4; v = v0 + a t by all",
-        constant_force,
-    ),
-    rule("checkpoint-6", "The service does not read the live arm", "the same answer for another gravity, method and pose", reads_nothing),
-    rule(
-        "checkpoint-7",
-        "The service does not write to the live arm",
-        "the same joint states and settings before and after",
-        writes_nothing,
-    ),
-    rule("checkpoint-8", "An unknown integrator is rejected", REJECTED, |bench| {
-        rejects(bench, &[("integrator", json!("rk5")), ("integrator", json!(""))])
-    }),
-    rule("checkpoint-9", "dt = 0 and dt < 0 are rejected", REJECTED, |bench| rejects(bench, &[("dt", json!(0.0)), ("dt", json!(-0.1))])),
-    rule("checkpoint-10", "steps = 0 is rejected", REJECTED, |bench| rejects(bench, &[("steps", json!(0))])),
-    rule("checkpoint-11", "A function that does not parse is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])
-    }),
-    rule("checkpoint-12", "The server answers later calls after rejected ones", "an accepted call after 20 rejected ones", lives_on),
-    rule("function-1", "+ - * / are left-associative and * / bind tighter than + -", "10-4-3 = 3, 16/4/2 = 2, 2+3*4 = 14, ...", |bench| {
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("checkpoint-1", lengths),
+    ("checkpoint-2", start),
+    ("checkpoint-3", default_velocity),
+    ("checkpoint-4", times),
+    ("checkpoint-5", constant_force),
+    ("checkpoint-6", reads_nothing),
+    ("checkpoint-7", writes_nothing),
+    ("checkpoint-8", |bench| rejects(bench, &[("integrator", json!("rk5")), ("integrator", json!(""))])),
+    ("checkpoint-9", |bench| rejects(bench, &[("dt", json!(0.0)), ("dt", json!(-0.1))])),
+    ("checkpoint-10", |bench| rejects(bench, &[("steps", json!(0))])),
+    ("checkpoint-11", |bench| rejects_functions(bench, &["2 +", "* t", "sin", "sin()", "t t"])),
+    ("checkpoint-12", lives_on),
+    ("function-1", |bench| {
         evaluates(
             bench,
             &[
@@ -55,10 +36,10 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-2", "^ is right-associative and binds tighter than * /", "2^3^2 = 512, 2*3^2 = 18, ...", |bench| {
+    ("function-2", |bench| {
         evaluates(bench, &[("2^3^2", |_| 512.0), ("2*3^2", |_| 18.0), ("12/2^2", |_| 3.0), ("t^3", |t| t.powi(3)), ("2^t", f64::exp2)])
     }),
-    rule("function-3", "Unary minus binds tighter than ^", "-3^2 = 9, 2^-1 = 0.5, ...", |bench| {
+    ("function-3", |bench| {
         evaluates(
             bench,
             &[
@@ -71,16 +52,14 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-4", "Parentheses group", "(1+2)*3 = 9, 2^(1+2) = 8, ...", |bench| {
+    ("function-4", |bench| {
         evaluates(
             bench,
             &[("(1+2)*3", |_| 9.0), ("10-(4-3)", |_| 9.0), ("2^(1+2)", |_| 8.0), ("(2^3)^2", |_| 64.0), ("((t))*(t+1)", |t| t * (t + 1.0))],
         )
     }),
-    rule("function-5", "Numbers may have a fraction", "0.25, 12.5, 3", |bench| {
-        evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])
-    }),
-    rule("function-6", "sin cos tan exp sqrt ln abs are known", "their values to 1e-9", |bench| {
+    ("function-5", |bench| evaluates(bench, &[("0.25", |_| 0.25), ("12.5", |_| 12.5), ("3", |_| 3.0)])),
+    ("function-6", |bench| {
         evaluates(
             bench,
             &[
@@ -95,31 +74,16 @@ pub const RULES: &[Rule] = &[
             ],
         )
     }),
-    rule("function-7", "t is the free variable; the specification's examples are valid", "t, sin(t), t^2 + 3*t - 1, -t + 1", |bench| {
+    ("function-7", |bench| {
         evaluates(bench, &[("t", |t| t), ("sin(t)", f64::sin), ("t^2 + 3*t - 1", |t| t * t + 3.0 * t - 1.0), ("-t + 1", |t| 1.0 - t)])
     }),
-    rule("function-8", "An empty function is rejected", REJECTED, |bench| rejects_functions(bench, &["", "  "])),
-    rule("function-9", "Unbalanced parentheses are rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])
-    }),
-    rule("function-10", "An unknown identifier is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])
-    }),
-    rule("function-11", "Text after a complete expression is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])
-    }),
-    rule("function-12", "Adjacent tokens without an operator are rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["1 2", "t t", "(t)(t)"])
-    }),
-    rule("function-13", "An unrecognized character is rejected", REJECTED, |bench| {
-        rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])
-    }),
-    rule(
-        "function-14",
-        "A domain error at evaluation does not stop the service",
-        "an answer to sqrt(-1), then an accepted call",
-        domain_error,
-    ),
+    ("function-8", |bench| rejects_functions(bench, &["", "  "])),
+    ("function-9", |bench| rejects_functions(bench, &["(t", "t)", "sin(t", "((t)", ")("])),
+    ("function-10", |bench| rejects_functions(bench, &["x", "foo(t)", "tt", "sinus(t)"])),
+    ("function-11", |bench| rejects_functions(bench, &["t + 1 )", "t + 1 garbage", "sin(t) 5"])),
+    ("function-12", |bench| rejects_functions(bench, &["1 2", "t t", "(t)(t)"])),
+    ("function-13", |bench| rejects_functions(bench, &["t $ 2", "t @ 1", "#", "t ? 1"])),
+    ("function-14", domain_error),
 ];
 
 fn request() -> Value {

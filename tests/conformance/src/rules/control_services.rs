@@ -7,77 +7,49 @@ use serde_json::{Value, json};
 
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, apply_alone, has, point, same, shifted};
-use crate::values::{boolean, fine, largest, list, must, near, number, numbers_of};
-use crate::{Got, Rule, rule};
+use crate::rules::pid::{SMALL, changes, wound_up};
+use crate::values::{boolean, largest, list, must, near, number, numbers_of};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("set_integrator-1", "Each method is accepted and read back", "the four names", methods),
-    rule("set_integrator-2", "method and timestep are optional and apply alone", "the other one stays", fields_alone),
-    rule("set_integrator-3", "An empty request changes nothing", "the same values twice", |bench| {
-        is_query(bench, SET_INTEGRATOR, &["method", "timestep"])
-    }),
-    rule("set_integrator-4", "An unknown method is rejected", "result false, a status, and the method as before", |bench| {
-        rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"method": "leapfrog"}), &json!({"method": "rk4"}))
-    }),
-    rule("set_integrator-5", "A timestep of 0 or less is rejected", "result false, a status, and the timestep as before", |bench| {
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("set_integrator-1", methods),
+    ("set_integrator-2", fields_alone),
+    ("set_integrator-3", |bench| is_query(bench, SET_INTEGRATOR, &["method", "timestep"])),
+    ("set_integrator-4", |bench| rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"method": "leapfrog"}), &json!({"method": "rk4"}))),
+    ("set_integrator-5", |bench| {
         rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"timestep": 0}), &json!({"timestep": 0.001}))?;
         rejects_and_keeps(bench, SET_INTEGRATOR, &json!({"timestep": -0.001}), &json!({"timestep": 0.001}))
     }),
-    rule("set_integrator-6", "The live arm steps by euler", "its states are those of euler at 0.01 s", |bench| steps_by(bench, "euler")),
-    rule("set_integrator-7", "The live arm steps by midpoint", "its states are those of midpoint at 0.01 s", |bench| {
-        steps_by(bench, "midpoint")
-    }),
-    rule("set_integrator-8", "The live arm steps by verlet", "its states are those of verlet at 0.01 s", |bench| steps_by(bench, "verlet")),
-    rule("set_integrator-9", "The live arm steps by rk4", "its states are those of rk4 at 0.01 s", |bench| steps_by(bench, "rk4")),
-    rule("set_params-1", "Gravity is 9.81 at the start", "9.81", default_gravity),
-    rule(
-        "set_params-2",
-        "An empty request returns gravity, masses and lengths and changes nothing",
-        "one positive mass and length per link, the same values twice",
-        query_params,
-    ),
-    rule("set_params-3", "Each field is optional and applies alone", "the other fields stay", params_alone),
-    rule(
-        "set_params-4",
-        "masses or lengths of the wrong length are rejected, valid fields apply",
-        "result false, old arrays, new gravity",
-        wrong_length,
-    ),
-    rule(
-        "set_params-5",
-        "A mass or length of 0 or less is rejected, valid fields apply",
-        "result false, old arrays, new gravity",
-        not_positive,
-    ),
-    rule("set_params-6", "Negative gravity is rejected, valid fields apply", "result false, old gravity, new masses", negative_gravity),
-    rule("set_params-7", "A rejected request returns the current parameters", "gravity, masses and lengths as they are", rejected_echo),
-    rule("set_params-8", "The live arm has the new parameters", "its states are those of the new arm", live_params),
-    rule("set_params-9", "Gravity 0 is accepted and the arm stays at rest", "no motion in 0.4 s with the controller off", no_gravity),
-    rule("pause-1", "/joint_states is published with a frozen state while paused", "messages with one and the same state", frozen),
-    rule("pause-2", "Other services work while paused", "accepted calls", works_while_paused),
-    rule("pause-3", "The simulation continues from the frozen state", "states that follow from it in whole steps", continues),
-    rule("pause-4", "An empty request returns the state and changes nothing", "data true when paused, false when not", query_pause),
-    rule("pause-5", "The integral does not advance while paused", "the same effort after a pause of 1 s", integral_waits),
-    rule(
-        "reset-1",
-        "The arm returns to one fixed pose, which the answer has",
-        "the same position and velocity from different states",
-        fixed_pose,
-    ),
-    rule("reset-2", "/joint_states shows that pose", "the position of the answer", shows_pose),
-    rule("reset-3", "The setpoint is reset too", "no effort and no motion after it", resets_setpoint),
-    rule("reset-4", "The integral is reset too", "no effort after it", resets_integral),
-    rule("reset-5", "The simulation clock starts at zero", "a stamp below 1 s, or wall time in the stamps", zero_clock),
-    rule("reset-6", "A reset keeps every setting", "method, timestep, parameters, gains, pause and enable as before", keeps_settings),
+    ("set_integrator-6", |bench| steps_by(bench, "euler")),
+    ("set_integrator-7", |bench| steps_by(bench, "midpoint")),
+    ("set_integrator-8", |bench| steps_by(bench, "verlet")),
+    ("set_integrator-9", |bench| steps_by(bench, "rk4")),
+    ("set_params-1", default_gravity),
+    ("set_params-2", query_params),
+    ("set_params-3", params_alone),
+    ("set_params-4", wrong_length),
+    ("set_params-5", not_positive),
+    ("set_params-6", negative_gravity),
+    ("set_params-7", rejected_echo),
+    ("set_params-8", live_params),
+    ("set_params-9", no_gravity),
+    ("pause-1", frozen),
+    ("pause-2", works_while_paused),
+    ("pause-3", continues),
+    ("pause-4", |bench| is_switched(bench, "/arm_sim/pause")),
+    ("pause-5", integral_waits),
+    ("reset-1", fixed_pose),
+    ("reset-2", shows_pose),
+    ("reset-3", resets_setpoint),
+    ("reset-4", resets_integral),
+    ("reset-5", zero_clock),
+    ("reset-6", keeps_settings),
 ];
 
 const SET_INTEGRATOR: &str = "/arm_sim/set_integrator";
 const SET_PARAMS: &str = "/arm_sim/set_params";
 const PARAMS: [&str; 3] = ["gravity", "masses", "lengths"];
-
-/// An integral gain so small that the arm hardly moves while the error is 1 rad.
-const SMALL: f64 = 0.005;
 
 /// Passes if `{}` is accepted twice and returns the same values.
 pub(crate) fn is_query(bench: &mut Bench, service: &str, members: &[&str]) -> Got {
@@ -191,10 +163,7 @@ fn live_params(bench: &mut Bench) -> Got {
 fn no_gravity(bench: &mut Bench) -> Got {
     bench.set_gravity(0.0)?;
     let pose = bench.reset()?;
-    for joints in bench.joints_for(0.4)? {
-        near("position", &joints.position, &pose, 1e-9)?;
-    }
-    Ok("at rest".to_owned())
+    bench.stays_at(&pose, 0.4, 1e-9)
 }
 
 fn frozen(bench: &mut Bench) -> Got {
@@ -246,29 +215,26 @@ fn continues(bench: &mut Bench) -> Got {
     Err(format!("{} does not follow from {} in {limit:.0} steps", list(&after.position), list(&frozen.position)))
 }
 
-fn query_pause(bench: &mut Bench) -> Got {
-    for paused in [true, false] {
-        bench.pause(paused)?;
+/// Passes if a service of one switch returns it as it was set, also twice.
+pub(crate) fn is_switched(bench: &mut Bench, service: &str) -> Got {
+    for on in [true, false] {
+        bench.accepted(service, &json!({"data": on}))?;
         for _ in 0..2 {
-            let data = boolean(&bench.accepted("/arm_sim/pause", &json!({}))?, "data")?;
-            must(data == paused, || format!("data {data} after data {paused}"))?;
+            let data = boolean(&bench.accepted(service, &json!({}))?, "data")?;
+            must(data == on, || format!("data {data} after data {on}"))?;
         }
     }
     Ok("data as it was set".to_owned())
 }
 
 fn integral_waits(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.0, SMALL, 0.0)?;
-    bench.hold(&shifted(&pose, 1.0))?;
-    sleep(Duration::from_millis(500));
+    wound_up(bench, 500)?;
     bench.pause(true)?;
     let before = bench.fresh()?.effort;
     sleep(Duration::from_secs(1));
     bench.pause(false)?;
     let after = bench.fresh()?.effort;
-    let grew = before.iter().zip(&after).all(|(before, after)| *before > 0.0 && *after < 1.7 * before);
-    must(grew, || format!("{} before, {} after", fine(&before), fine(&after)))?;
-    Ok(format!("{} before, {} after", fine(&before), fine(&after)))
+    changes(&before, &after, |before, after| before > 0.0 && after < 1.7 * before)
 }
 
 fn fixed_pose(bench: &mut Bench) -> Got {
@@ -279,12 +245,12 @@ fn fixed_pose(bench: &mut Bench) -> Got {
         let values = bench.accepted("/arm_sim/reset", &json!({}))?;
         answers.push((numbers_of(&values, "position", bench.links)?, numbers_of(&values, "velocity", bench.links)?));
     }
-    if let [(first, rate), (second, other)] = answers.as_slice() {
-        near("position", second, first, 1e-12)?;
-        near("velocity", other, rate, 1e-12)?;
-        return Ok(list(first));
-    }
-    Err("no answers".to_owned())
+    let [(first, rate), (second, other)] = answers.as_slice() else {
+        return Err("no answers".to_owned());
+    };
+    near("position", second, first, 1e-12)?;
+    near("velocity", other, rate, 1e-12)?;
+    Ok(list(first))
 }
 
 fn shows_pose(bench: &mut Bench) -> Got {
@@ -301,23 +267,14 @@ fn resets_setpoint(bench: &mut Bench) -> Got {
     bench.command(&json!([point(&shifted(&pose, 1.0), &bench.each(0.5))]))?;
     sleep(Duration::from_millis(300));
     bench.reset()?;
-    for joints in bench.joints_for(0.2)? {
-        near("effort", &joints.effort, &bench.each(0.0), 1e-6)?;
-        near("position", &joints.position, &pose, 1e-6)?;
-    }
-    Ok("no effort".to_owned())
+    bench.stays_at(&pose, 0.2, 1e-6)
 }
 
 fn resets_integral(bench: &mut Bench) -> Got {
-    let pose = bench.float(0.0, SMALL, 0.0)?;
-    bench.hold(&shifted(&pose, 1.0))?;
-    sleep(Duration::from_millis(700));
-    let before = bench.fresh()?.effort;
-    must(before.iter().all(|effort| *effort > 0.2 * SMALL), || format!("the integral does not grow: effort {}", fine(&before)))?;
+    let before = wound_up(bench, 700)?;
     bench.reset()?;
     let after = bench.fresh()?.effort;
-    must(largest(&after) < 0.01 * SMALL, || format!("effort {} after {}", fine(&after), fine(&before)))?;
-    Ok(format!("effort {} after {}", fine(&after), fine(&before)))
+    changes(&before, &after, |_, after| after.abs() < 0.01 * SMALL)
 }
 
 fn zero_clock(bench: &mut Bench) -> Got {

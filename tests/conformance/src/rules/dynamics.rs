@@ -7,30 +7,21 @@ use serde_json::json;
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY, Joints, shifted};
 use crate::rules::control_services::uneven;
+use crate::rules::pid::held;
 use crate::values::{largest, list, minus, must, numbers_of};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("dynamics-1", "With the controller off the arm moves from the starting pose", "motion, unless the pose is an equilibrium", falls),
-    rule("dynamics-2", "At a held setpoint the effort is the gravity load", "effort = G(q) to 2 % in two poses", holds_gravity),
-    rule("dynamics-3", "The gravity load follows from masses, lengths and gravity", "effort = G(q) to 2 % for an uneven arm", holds_uneven),
-    rule("dynamics-4", "One joint's effort moves the others", "motion of every joint that has no effort", couples),
-    rule("dynamics-5", "A free arm keeps its energy by rk4 at 1 ms", "kinetic plus potential energy constant to 0.1 %", keeps_energy),
-    rule("dynamics-6", "Without gravity a free arm keeps its angular momentum about the base", "constant to 0.1 %", keeps_momentum),
-    rule(
-        "dynamics-7",
-        "Without gravity the motion of one joint changes the others' rates",
-        "each rate changes by more than 2 %",
-        rates_change,
-    ),
-    rule(
-        "dynamics-8",
-        "A timestep that is too large makes the controlled arm diverge",
-        "a rate above 1e4 rad/s or one that is not finite, within 5 s",
-        diverges,
-    ),
-    rule("dynamics-9", "A reset brings the arm back after that", "the starting pose, and accepted calls", comes_back),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("dynamics-1", falls),
+    ("dynamics-2", holds_gravity),
+    ("dynamics-3", holds_uneven),
+    ("dynamics-4", couples),
+    ("dynamics-5", keeps_energy),
+    ("dynamics-6", keeps_momentum),
+    ("dynamics-7", rates_change),
+    ("dynamics-8", diverges),
+    ("dynamics-9", comes_back),
 ];
 
 fn falls(bench: &mut Bench) -> Got {
@@ -45,10 +36,7 @@ fn falls(bench: &mut Bench) -> Got {
 
 /// Holds a pose near the starting pose; passes if the effort there is the arm's gravity load.
 fn holds(bench: &mut Bench, arm: &Arm, by: [f64; 3]) -> Got {
-    let pose = bench.reset()?;
-    let setpoint: Vec<f64> = pose.iter().zip(by).map(|(angle, by)| angle + by).collect();
-    bench.hold(&setpoint)?;
-    bench.enable(true)?;
+    held(bench, by, false)?;
     let Joints { position, effort, .. } = bench.at_rest()?;
     let load = arm.gravity_load(&position);
     let error = largest(&minus(&effort, &load)) / (largest(&load) + 1.0);
@@ -58,7 +46,6 @@ fn holds(bench: &mut Bench, arm: &Arm, by: [f64; 3]) -> Got {
 
 fn holds_gravity(bench: &mut Bench) -> Got {
     let arm = Arm::of(bench.links, GRAVITY);
-    bench.set_holding_gains(false)?;
     holds(bench, &arm, [-0.6, 0.9, -0.5])?;
     holds(bench, &arm, [0.4, 0.3, 0.6])
 }
@@ -66,7 +53,6 @@ fn holds_gravity(bench: &mut Bench) -> Got {
 fn holds_uneven(bench: &mut Bench) -> Got {
     let arm = uneven(bench.links);
     bench.set_arm(&arm)?;
-    bench.set_holding_gains(false)?;
     holds(bench, &arm, [0.4, -1.0, 0.7])
 }
 
@@ -157,11 +143,15 @@ fn diverged(bench: &mut Bench) -> Got {
     Err(format!("at most {worst:.1} rad/s in 5 s"))
 }
 
+/// The next rule needs an arm that answers at its usual pace.
+fn calm(bench: &mut Bench) -> Result<(), String> {
+    bench.enable(false)?;
+    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001})).map(drop)
+}
+
 fn diverges(bench: &mut Bench) -> Got {
     let got = diverged(bench);
-    // The next rule needs an arm that answers at its usual pace.
-    bench.enable(false)?;
-    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001}))?;
+    calm(bench)?;
     bench.reset()?;
     got
 }
@@ -169,8 +159,7 @@ fn diverges(bench: &mut Bench) -> Got {
 fn comes_back(bench: &mut Bench) -> Got {
     let pose = bench.reset()?;
     let how = diverged(bench)?;
-    bench.enable(false)?;
-    bench.accepted("/arm_sim/set_integrator", &json!({"timestep": 0.001}))?;
+    calm(bench)?;
     bench.pause(true)?;
     bench.reset()?;
     bench.forget("/joint_states");

@@ -5,38 +5,28 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::bench::Bench;
-use crate::peer::is_answer;
 use crate::values::{member, must, text};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
+use pendularm_client::is_response_to;
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("envelope-1", "A call gets one service_response with its id and the name of its service", "one, with both", one_response),
-    rule("envelope-2", "A response has values, result and status", "an object, a boolean and a text", members),
-    rule(
-        "envelope-3",
-        "A rejected call has a response of the same shape",
-        "an object, result false and a text that is not empty",
-        rejection,
-    ),
-    rule(
-        "envelope-4",
-        "A message on an advertised topic reaches a subscriber on another connection",
-        "the message as it was sent",
-        relayed,
-    ),
-    rule("envelope-5", "Every subscriber of /joint_states gets messages", "messages on both connections", both_hear),
-    rule("envelope-6", "After unsubscribe no message comes on that topic", "no message in 0.4 s", unsubscribed),
-    rule("envelope-7", "A malformed frame does not disturb other clients", "an answer on another connection", malformed),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("envelope-1", one_response),
+    ("envelope-2", members),
+    ("envelope-3", rejection),
+    ("envelope-4", relayed),
+    ("envelope-5", both_hear),
+    ("envelope-6", unsubscribed),
+    ("envelope-7", malformed),
 ];
 
 fn one_response(bench: &mut Bench) -> Got {
     let answer = bench.peer.call("/arm_sim/set_params", &json!({}))?;
     let service = text(&answer.frame, "service")?;
     must(service == "/arm_sim/set_params", || format!("service {service}"))?;
-    let id = text(&answer.frame, "id")?.to_owned();
+    let id = member(&answer.frame, "id")?.clone();
     bench.peer.call("/arm_sim/pause", &json!({}))?;
-    let second = bench.peer.find(std::time::Instant::now() + Duration::from_millis(100), |frame| is_answer(frame, &id));
+    let second = bench.peer.find(std::time::Instant::now() + Duration::from_millis(100), |frame| is_response_to(frame, &id));
     must(second.is_err(), || "a second response".to_owned())?;
     Ok(format!("one, with id {id}"))
 }

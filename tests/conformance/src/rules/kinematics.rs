@@ -7,51 +7,28 @@ use serde_json::{Value, json};
 use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::values::{list, must, near, numbers_of};
-use crate::{Got, Links, REJECTED, Rule, rule};
-
-const fn only(links: Links, rule: Rule) -> Rule {
-    Rule { links, ..rule }
-}
+use crate::{Check, Got};
 
 const SOLVE: &str = "/ik/solve";
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    only(
-        Links::Two,
-        rule("ik-1", "The solution reaches the target", "x and y by forward kinematics, for 40 targets, to 1e-6 m", round_trip),
-    ),
-    only(
-        Links::Three,
-        rule(
-            "ik-2",
-            "The solution reaches the target with its orientation",
-            "x, y and phi by forward kinematics, for 40 targets, to 1e-6",
-            round_trip,
-        ),
-    ),
-    only(Links::Three, rule("ik-3", "phi is optional for 3 links", "x and y by forward kinematics, for 10 targets", without_phi)),
-    only(Links::Two, rule("ik-4", "phi is ignored for 2 links", "x and y by forward kinematics, for any phi", ignores_phi)),
-    rule("ik-5", "A request without a numeric x or y is rejected", REJECTED, |bench| {
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("ik-1", round_trip),
+    ("ik-2", round_trip),
+    ("ik-3", without_phi),
+    ("ik-4", ignores_phi),
+    ("ik-5", |bench| {
         let wrong = [json!({"x": "1", "y": 1.0}), json!({"x": 1.0, "y": null}), json!({"x": 1.0, "y": [0.5]})];
         bench.rejects(SOLVE, &[json!({}), json!({"x": 1.0}), json!({"y": 1.0})])?;
         bench.rejects(SOLVE, &wrong)
     }),
-    rule("ik-6", "A target beyond the full extension is rejected", "result false and a status, in 8 directions", too_far),
-    only(Links::Two, rule("ik-7", "A target closer than |l1 - l2| is rejected", "result false and a status, in 8 directions", too_near)),
-    only(
-        Links::Three,
-        rule(
-            "ik-8",
-            "An orientation that puts the wrist out of reach is rejected",
-            "result false and a status; the same target is accepted with another phi",
-            wrist_out,
-        ),
-    ),
-    rule("ik-9", "The fully extended target counts as reachable", "a solution to 1e-4 m, in 24 directions", extended),
-    only(Links::Two, rule("ik-10", "The fully folded target counts as reachable", "a solution to 1e-4 m, in 24 directions", folded)),
-    rule("ik-11", "New lengths count at once", "a solution for the new lengths, a rejection of a target that is now too far", new_lengths),
-    rule("ik-12", "A solve does not move the arm", "the same joint states before and after", moves_nothing),
+    ("ik-6", too_far),
+    ("ik-7", too_near),
+    ("ik-8", wrist_out),
+    ("ik-9", extended),
+    ("ik-10", folded),
+    ("ik-11", new_lengths),
+    ("ik-12", moves_nothing),
 ];
 
 /// Numbers in [0, 1) that are the same in every run.

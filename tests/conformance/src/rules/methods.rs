@@ -3,34 +3,18 @@
 use crate::bench::Bench;
 use crate::method::{METHODS, particle};
 use crate::values::{must, near};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("method-1", "euler steps with the state and the acceleration at the start", "the states of that formula, to 1e-9", |bench| {
-        takes_steps(bench, "euler")
-    }),
-    rule("method-2", "midpoint takes the full step with the values at the middle", "the states of that formula, to 1e-9", |bench| {
-        takes_steps(bench, "midpoint")
-    }),
-    rule("method-3", "verlet averages the accelerations at both ends", "the states of that formula, to 1e-9", |bench| {
-        takes_steps(bench, "verlet")
-    }),
-    rule("method-4", "rk4 blends four stages 1:2:2:1", "the states of that formula, to 1e-9", |bench| takes_steps(bench, "rk4")),
-    rule(
-        "method-5",
-        "Stages evaluate the force at their own time",
-        "for f(t) = t from rest: v = t^2/2 to 1e-9 by midpoint, verlet and rk4",
-        stage_times,
-    ),
-    rule("method-6", "rk4 solves f(t) = t exactly", "x = t^3/6 to 1e-9", cubic),
-    rule(
-        "method-7",
-        "The error falls by the order of the method when dt is halved",
-        "by 2 for euler, 4 for midpoint and verlet, 16 for rk4",
-        orders,
-    ),
-    rule("method-8", "euler is the least accurate, rk4 the most", "errors in that order for sin(t)", ranking),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("method-1", |bench| takes_steps(bench, "euler")),
+    ("method-2", |bench| takes_steps(bench, "midpoint")),
+    ("method-3", |bench| takes_steps(bench, "verlet")),
+    ("method-4", |bench| takes_steps(bench, "rk4")),
+    ("method-5", stage_times),
+    ("method-6", cubic),
+    ("method-7", orders),
+    ("method-8", ranking),
 ];
 
 fn force(t: f64) -> f64 {

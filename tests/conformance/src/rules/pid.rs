@@ -7,61 +7,41 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use crate::bench::{Bench, apply_alone, has, point, shifted};
-use crate::rules::control_services::is_query;
+use crate::bench::{Bench, apply_alone, has, shifted};
+use crate::rules::control_services::{is_query, is_switched};
 use crate::values::{fine, largest, list, minus, must, near};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("enable-1", "PID starts disabled", "data false and zero effort before any change", starts_disabled),
-    rule("enable-2", "enable switches the controller and returns the state", "data as it was set", switches),
-    rule("enable-3", "An empty request changes nothing", "the same value twice", |bench| is_query(bench, ENABLE, &["data"])),
-    rule("enable-4", "Effort is zero while the controller is disabled", "zeros while the arm swings", no_effort),
-    rule("enable-5", "Effort acts once the controller is enabled", "effort that is not zero, and motion", effort_acts),
-    rule("enable-6", "Enabling after a disable clears the integral", "an effort near zero again", clears_integral),
-    rule("enable-7", "Disabling ends the effort at once, also while paused", "an effort while enabled, zeros after that", ends_effort),
-    rule("gains-1", "Gains are accepted and read back", "kp, ki and kd as they were set", reads_back),
-    rule("gains-2", "An empty request changes nothing", "the same gains twice", |bench| is_query(bench, SET_GAINS, &GAINS)),
-    rule("gains-3", "kp, ki and kd are optional and apply alone", "the other gains stay", gains_alone),
-    rule(
-        "gains-4",
-        "An array of the wrong length is rejected, the other fields apply",
-        "result false, the old array, the other arrays new",
-        wrong_length,
-    ),
-    rule("gains-5", "A negative gain is rejected, the other fields apply", "result false, the old array, the other arrays new", negative),
-    rule("gains-6", "A change of gains keeps the integral", "twice the effort after ki is doubled", keeps_integral),
-    rule("gains-7", "Gains of zero are accepted", "no effort with the controller on", zero_gains),
-    rule(
-        "law-1",
-        "The proportional term is kp times the position error, for each joint alone",
-        "effort = kp (setpoint - actual) with another kp for each joint",
-        proportional,
-    ),
-    rule("law-2", "The derivative term is kd times the velocity error", "effort = -kd velocity for an arm that moves", derivative),
-    rule(
-        "law-3",
-        "The derivative term does not differentiate the position error",
-        "no effort and no motion when the setpoint jumps and kp = ki = 0",
-        no_kick,
-    ),
-    rule(
-        "law-4",
-        "The integral term is ki times the sum of the position error over time",
-        "effort / ki grows by the integral of the error",
-        integral,
-    ),
-    rule("law-5", "The integral is bounded", "the same effort after 0.4 s and 1.2 s of an error of 1e8 rad", bounded),
-    rule("law-6", "Without an integral term gravity leaves an offset", "at rest with an error of G / kp, more than 0.01 rad", offset),
-    rule("law-7", "With an integral term the arm reaches the setpoint and stays", "within 0.05 rad for 0.5 s, in at most 10 s", converges),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("enable-1", starts_disabled),
+    ("enable-2", |bench| is_switched(bench, ENABLE)),
+    ("enable-3", |bench| is_query(bench, ENABLE, &["data"])),
+    ("enable-4", no_effort),
+    ("enable-5", effort_acts),
+    ("enable-6", clears_integral),
+    ("enable-7", ends_effort),
+    ("gains-1", reads_back),
+    ("gains-2", |bench| is_query(bench, SET_GAINS, &GAINS)),
+    ("gains-3", gains_alone),
+    ("gains-4", wrong_length),
+    ("gains-5", negative),
+    ("gains-6", keeps_integral),
+    ("gains-7", zero_gains),
+    ("law-1", proportional),
+    ("law-2", derivative),
+    ("law-3", no_kick),
+    ("law-4", integral),
+    ("law-5", bounded),
+    ("law-6", offset),
+    ("law-7", converges),
 ];
 
 const ENABLE: &str = "/pid_controller/enable";
 const SET_GAINS: &str = "/pid_controller/set_gains";
 const GAINS: [&str; 3] = ["kp", "ki", "kd"];
 /// An integral gain so small that the arm hardly moves while the error is 1 rad.
-const SMALL: f64 = 0.005;
+pub(crate) const SMALL: f64 = 0.005;
 
 fn starts_disabled(bench: &mut Bench) -> Got {
     let found = bench.found()?.clone();
@@ -70,15 +50,6 @@ fn starts_disabled(bench: &mut Bench) -> Got {
     let effort = found.state?.effort;
     near("effort", &effort, &bench.each(0.0), 1e-12)?;
     Ok(format!("data false, effort {}", list(&effort)))
-}
-
-fn switches(bench: &mut Bench) -> Got {
-    for on in [true, false] {
-        bench.enable(on)?;
-        let data = bench.is_enabled()?;
-        must(data == on, || format!("data {data} after data {on}"))?;
-    }
-    Ok("data as it was set".to_owned())
 }
 
 fn no_effort(bench: &mut Bench) -> Got {
@@ -102,7 +73,7 @@ fn effort_acts(bench: &mut Bench) -> Got {
 }
 
 /// With the integral term alone and an error of 1 rad for a time: the effort.
-fn wound_up(bench: &mut Bench, milliseconds: u64) -> Result<Vec<f64>, String> {
+pub(crate) fn wound_up(bench: &mut Bench, milliseconds: u64) -> Result<Vec<f64>, String> {
     let pose = bench.float(0.0, SMALL, 0.0)?;
     bench.hold(&shifted(&pose, 1.0))?;
     sleep(Duration::from_millis(milliseconds));
@@ -111,14 +82,18 @@ fn wound_up(bench: &mut Bench, milliseconds: u64) -> Result<Vec<f64>, String> {
     Ok(effort)
 }
 
+/// Passes if every joint's effort after something compares with the one before it.
+pub(crate) fn changes(before: &[f64], after: &[f64], holds: impl Fn(f64, f64) -> bool) -> Got {
+    let told = format!("effort {} before, {} after", fine(before), fine(after));
+    if before.iter().zip(after).all(|(before, after)| holds(*before, *after)) { Ok(told) } else { Err(told) }
+}
+
 fn clears_integral(bench: &mut Bench) -> Got {
     let before = wound_up(bench, 1000)?;
     bench.enable(false)?;
     bench.enable(true)?;
     let after = bench.fresh()?.effort;
-    let is_clear = before.iter().zip(&after).all(|(before, after)| after.abs() < 0.4 * before);
-    must(is_clear, || format!("effort {} before, {} after", fine(&before), fine(&after)))?;
-    Ok(format!("effort {} before, {} after", fine(&before), fine(&after)))
+    changes(&before, &after, |before, after| after.abs() < 0.4 * before)
 }
 
 fn ends_effort(bench: &mut Bench) -> Got {
@@ -186,9 +161,7 @@ fn keeps_integral(bench: &mut Bench) -> Got {
     let before = wound_up(bench, 1000)?;
     bench.accepted(SET_GAINS, &json!({"ki": bench.each(2.0 * SMALL)}))?;
     let after = bench.fresh()?.effort;
-    let is_kept = before.iter().zip(&after).all(|(before, after)| *after > 1.6 * before);
-    must(is_kept, || format!("effort {} before, {} after", fine(&before), fine(&after)))?;
-    Ok(format!("effort {} before, {} after", fine(&before), fine(&after)))
+    changes(&before, &after, |before, after| after > 1.6 * before)
 }
 
 fn zero_gains(bench: &mut Bench) -> Got {
@@ -228,13 +201,8 @@ fn derivative(bench: &mut Bench) -> Got {
 
 fn no_kick(bench: &mut Bench) -> Got {
     let pose = bench.float(0.0, 0.0, 0.5)?;
-    bench.command(&json!([point(&shifted(&pose, 1.0), &bench.each(0.0))]))?;
-    let states = bench.joints_for(0.3)?;
-    for joints in &states {
-        near("effort", &joints.effort, &bench.each(0.0), 1e-9)?;
-        near("position", &joints.position, &pose, 1e-9)?;
-    }
-    Ok("no effort and no motion".to_owned())
+    bench.hold(&shifted(&pose, 1.0))?;
+    bench.stays_at(&pose, 0.3, 1e-9)
 }
 
 fn integral(bench: &mut Bench) -> Got {
@@ -266,23 +234,21 @@ fn bounded(bench: &mut Bench) -> Got {
     let early = bench.fresh()?.effort;
     sleep(Duration::from_millis(800));
     let late = bench.fresh()?.effort;
-    let is_bounded = early.iter().zip(&late).all(|(early, late)| *early > 0.0 && (late / early - 1.0).abs() < 0.05);
-    must(is_bounded, || format!("effort {}, then {}", fine(&early), fine(&late)))?;
-    Ok(format!("effort {}, then {}", fine(&early), fine(&late)))
+    changes(&early, &late, |early, late| early > 0.0 && (late / early - 1.0).abs() < 0.05)
 }
 
-/// A setpoint near the starting pose.
-fn aim(bench: &mut Bench) -> Result<Vec<f64>, String> {
+/// Holds a setpoint near the starting pose, which it returns.
+pub(crate) fn held(bench: &mut Bench, by: [f64; 3], integral: bool) -> Result<Vec<f64>, String> {
     let pose = bench.reset()?;
-    let by = [0.5, -0.4, 0.3];
-    Ok(pose.iter().zip(by).map(|(angle, by)| angle + by).collect())
+    let setpoint: Vec<f64> = pose.iter().zip(by).map(|(angle, by)| angle + by).collect();
+    bench.set_holding_gains(integral)?;
+    bench.hold(&setpoint)?;
+    bench.enable(true)?;
+    Ok(setpoint)
 }
 
 fn offset(bench: &mut Bench) -> Got {
-    let setpoint = aim(bench)?;
-    bench.set_holding_gains(false)?;
-    bench.hold(&setpoint)?;
-    bench.enable(true)?;
+    let setpoint = held(bench, [0.5, -0.4, 0.3], false)?;
     let joints = bench.at_rest()?;
     let error = largest(&minus(&setpoint, &joints.position));
     must(error > 0.01, || format!("an offset of {error:.4} rad"))?;
@@ -290,10 +256,7 @@ fn offset(bench: &mut Bench) -> Got {
 }
 
 fn converges(bench: &mut Bench) -> Got {
-    let setpoint = aim(bench)?;
-    bench.set_holding_gains(true)?;
-    bench.hold(&setpoint)?;
-    bench.enable(true)?;
+    let setpoint = held(bench, [0.5, -0.4, 0.3], true)?;
     bench.fresh()?;
     let began = std::time::Instant::now();
     let mut inside = began;

@@ -9,34 +9,27 @@ use serde_json::json;
 
 use crate::bench::{Bench, Joints, point, shifted};
 use crate::values::{largest, list, must, near};
-use crate::{Got, Rule, rule};
+use crate::{Check, Got};
 
 /// The gain that makes a setpoint visible.
 const SMALL: f64 = 0.5;
 /// How exactly: the arm moves a little [rad, rad/s].
 const TOLERANCE: f64 = 0.03;
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("trajectory-1", "positions of a point become the setpoint", "effort = kp (positions - actual)", position),
-    rule("trajectory-2", "Only the last point counts, at once", "effort as for the last of three points", last_point),
-    rule("trajectory-3", "velocities of the point become the velocity setpoint", "effort = kd (velocities - actual)", velocity),
-    rule("trajectory-4", "velocities that are left out are zeros", "effort as for zero velocity", no_velocity),
-    rule("trajectory-5", "velocities of the wrong length are zeros", "effort as for zero velocity, and the new position", wrong_velocity),
-    rule("trajectory-6", "positions of the wrong length are ignored", "the setpoint stays", |bench| {
-        stays(bench, &json!([point(&[0.9], &[0.0])]))
-    }),
-    rule("trajectory-7", "A trajectory without points is ignored", "the setpoint stays", |bench| stays(bench, &json!([]))),
-    rule("trajectory-8", "A trajectory counts while the controller is off", "its setpoint holds once the controller is on", while_off),
-    rule("states-1", "/joint_states is published continuously", "at least 5 messages in a second", continuous),
-    rule("states-2", "name has one entry per joint, all different", "as many names as links", names),
-    rule("states-3", "position, velocity and effort are parallel to name", "arrays of finite numbers of that length", parallel),
-    rule(
-        "states-4",
-        "The header has a stamp that does not run backwards",
-        "sec and nanosec, 0 <= nanosec < 1e9, later stamps not smaller",
-        stamps,
-    ),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("trajectory-1", position),
+    ("trajectory-2", last_point),
+    ("trajectory-3", velocity),
+    ("trajectory-4", no_velocity),
+    ("trajectory-5", wrong_velocity),
+    ("trajectory-6", |bench| stays(bench, &json!([point(&[0.9], &[0.0])]))),
+    ("trajectory-7", |bench| stays(bench, &json!([]))),
+    ("trajectory-8", while_off),
+    ("states-1", continuous),
+    ("states-2", names),
+    ("states-3", parallel),
+    ("states-4", stamps),
 ];
 
 /// Passes if the effort shows these angles as the setpoint of the positions.

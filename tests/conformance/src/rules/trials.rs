@@ -8,35 +8,20 @@ use crate::arm::Arm;
 use crate::bench::{Bench, GRAVITY};
 use crate::peer::PATIENCE;
 use crate::values::{boolean, member, must, near, number, numbers_of, text};
-use crate::{Got, REJECTED, Rule, rule};
+use crate::{Check, Got};
 
-/// The rules of this part.
-pub const RULES: &[Rule] = &[
-    rule("trial-1", "skip and stop are rejected while no trial runs", REJECTED, nothing_runs),
-    rule("trial-2", "start begins a trial and its status is published", "running true, the duration asked for, targets_reached 0", starts),
-    rule("trial-3", "The status has the members of the specification", "all eight, with their types", members),
-    rule("trial-4", "The target is reachable and desired_positions reach it", "forward kinematics to 1e-6 m", reachable),
-    rule("trial-5", "skip takes a new target and does not count the old one", "result true, another target, targets_reached 0", skips),
-    rule(
-        "trial-6",
-        "stop ends the trial and clears the status",
-        "running false, error and desired_positions null, action_status idle",
-        stops,
-    ),
-    rule(
-        "trial-7",
-        "A trial ends after its duration, cleared as by stop",
-        "running false, error and desired_positions null, action_status idle",
-        ends,
-    ),
-    rule(
-        "trial-8",
-        "Targets that are reached are counted and followed by others",
-        "targets_reached grows to 2 with an epsilon of 10 m",
-        counts,
-    ),
-    rule("trial-9", "start during a trial begins a fresh one", "targets_reached 0 and a smaller elapsed", restarts),
-    rule("trial-10", "The trial drives the arm by goals", "feedback of a goal with the trial's target", uses_goals),
+/// The checks of this part.
+pub const CHECKS: &[Check] = &[
+    ("trial-1", nothing_runs),
+    ("trial-2", starts),
+    ("trial-3", members),
+    ("trial-4", reachable),
+    ("trial-5", skips),
+    ("trial-6", stops),
+    ("trial-7", ends),
+    ("trial-8", counts),
+    ("trial-9", restarts),
+    ("trial-10", uses_goals),
 ];
 
 const STATUS: &str = "/ik_trial/status";
