@@ -10,6 +10,7 @@ use crate::court::Court;
 use crate::honest::Honest;
 use crate::pipe::Fate;
 use crate::plan::Hostility;
+use crate::workload::frame;
 use pendularm_client::websocket::{append, opcode};
 
 /// A decimal that is slow to read exactly: 20 digits near the middle between two doubles.
@@ -268,16 +269,6 @@ impl Hostile {
         self.about("publish", "/t0", "\"msg\":{\"from\":1,\"number\":1}");
         self.say(&frame("advertise_service", "service", "/arm_sim/reset", ""));
     }
-}
-
-/// An operation about a name, with further members or none.
-fn frame(op: &str, member: &str, name: &str, more: &str) -> String {
-    let more = if more.is_empty() {
-        String::new()
-    } else {
-        format!(",{more}")
-    };
-    format!("{{\"op\":\"{op}\",\"{member}\":\"{name}\"{more}}}")
 }
 
 /// An array of about this many bytes, of numbers that are slow to read.

@@ -6,8 +6,11 @@ impl Workload<'_> {
     pub(super) fn provide(&mut self) {
         let service = self.court.among(&SERVICES);
         let spelling = self.spelled(service);
-        self.send(&format!(
-            "{{\"op\":\"advertise_service\",\"service\":\"{spelling}\",\"type\":\"x/Y\"}}"
+        self.send(&frame(
+            "advertise_service",
+            "service",
+            &spelling,
+            "\"type\":\"x/Y\"",
         ));
         self.me()
             .await_news(format!("advertised service {spelling}"));
@@ -28,9 +31,7 @@ impl Workload<'_> {
         if let Some(service) = mine.map(|(name, _)| name.clone()) {
             // Another client may have become the provider meanwhile.
             self.me().mistakes += 1;
-            self.send(&format!(
-                "{{\"op\":\"unadvertise_service\",\"service\":\"{service}\"}}"
-            ));
+            self.send(&frame("unadvertise_service", "service", &service, ""));
             let changed = self.court.turns.get();
             let provided = crate::model::Provided::none(changed);
             self.model.services.insert(service.clone(), provided);
@@ -49,9 +50,8 @@ impl Workload<'_> {
             (",\"timeout\":86400", DAY),
         ]);
         let id = self.id();
-        self.send(&format!(
-            "{{\"op\":\"call_service\",\"id\":{id},\"service\":\"{spelling}\"{text},\"args\":{args}}}"
-        ));
+        let more = format!("\"id\":{id}{text},\"args\":{args}");
+        self.send(&frame("call_service", "service", &spelling, &more));
         let forward = Forward {
             service: absolute(service),
             args: args.clone(),
@@ -88,9 +88,8 @@ impl Workload<'_> {
             let result = self.court.chance(0.9);
             let values = format!("{{\"v\":{}}}", self.payload(1));
             let (id, service) = (one.id, one.service);
-            let frame = format!(
-                "{{\"op\":\"service_response\",\"id\":{id},\"service\":\"{service}\",\"values\":{values},\"result\":{result}}}"
-            );
+            let more = format!("\"id\":{id},\"values\":{values},\"result\":{result}");
+            let frame = frame("service_response", "service", &service, &more);
             let due = Instant::now() + delay;
             self.me().due_answers.push((due, one.number, frame));
             if let Some(forward) = self.model.forwards.get_mut(&one.number) {
