@@ -90,7 +90,7 @@ fn steps_by(bench: &mut Bench, method: &str) -> Got {
 }
 
 fn default_gravity(bench: &mut Bench) -> Got {
-    let values = bench.found()?.params.clone()?;
+    let values = bench.found()?.setting(SET_PARAMS)?;
     let gravity = number(&values, "gravity")?;
     near("gravity", &[gravity], &[GRAVITY], 1e-9)?;
     Ok(gravity.to_string())

@@ -45,7 +45,7 @@ pub(crate) const SMALL: f64 = 0.005;
 
 fn starts_disabled(bench: &mut Bench) -> Got {
     let found = bench.found()?.clone();
-    let data = crate::values::boolean(&found.enable?, "data")?;
+    let data = crate::values::boolean(&found.setting(ENABLE)?, "data")?;
     must(!data, || "data true".to_owned())?;
     let effort = found.state?.effort;
     near("effort", &effort, &bench.each(0.0), 1e-12)?;

@@ -30,11 +30,17 @@ const SKIP: &str = "/ik_trial/skip";
 const STOP: &str = "/ik_trial/stop";
 
 /// Starts a trial whose targets are not reached.
-fn start(bench: &mut Bench) -> Result<(), String> {
+fn start(bench: &mut Bench, duration: f64) -> Result<(), String> {
     bench.watch(STATUS)?;
-    bench.accepted(START, &json!({"duration": 60.0, "epsilon": 1e-6, "success_hold": 100.0}))?;
+    bench.accepted(START, &json!({"duration": duration, "epsilon": 1e-6, "success_hold": 100.0}))?;
     bench.forget(STATUS);
     Ok(())
+}
+
+/// Starts such a trial. Returns its first status with a target.
+fn started(bench: &mut Bench) -> Result<Value, String> {
+    start(bench, 60.0)?;
+    status_that(bench, "a status with a target", has_target)
 }
 
 /// The next expected status. The error has the latest unexpected one.
@@ -62,7 +68,7 @@ fn nothing_runs(bench: &mut Bench) -> Got {
 }
 
 fn starts(bench: &mut Bench) -> Got {
-    start(bench)?;
+    start(bench, 60.0)?;
     let status = status_that(bench, "a status of the running trial", is_running)?;
     near("duration", &[number(&status, "duration")?], &[60.0], 1e-9)?;
     near("targets_reached", &[number(&status, "targets_reached")?], &[0.0], 1e-9)?;
@@ -70,8 +76,7 @@ fn starts(bench: &mut Bench) -> Got {
 }
 
 fn members(bench: &mut Bench) -> Got {
-    start(bench)?;
-    let status = status_that(bench, "a status with a target", has_target)?;
+    let status = started(bench)?;
     boolean(&status, "running")?;
     for name in ["elapsed", "duration", "targets_reached", "target/x", "target/y", "error"] {
         number(&status, name)?;
@@ -86,7 +91,7 @@ fn members(bench: &mut Bench) -> Got {
 }
 
 fn reachable(bench: &mut Bench) -> Got {
-    start(bench)?;
+    start(bench, 60.0)?;
     let arm = Arm::of(bench.links, GRAVITY);
     let mut got = String::new();
     for _ in 0..3 {
@@ -103,8 +108,7 @@ fn reachable(bench: &mut Bench) -> Got {
 }
 
 fn skips(bench: &mut Bench) -> Got {
-    start(bench)?;
-    let before = status_that(bench, "a status with a target", has_target)?;
+    let before = started(bench)?;
     bench.accepted(SKIP, &json!({}))?;
     let old = member(&before, "target")?.clone();
     let after = status_that(bench, "a status with another target", |status| has_target(status) && status.get("target") != Some(&old))?;
@@ -112,31 +116,29 @@ fn skips(bench: &mut Bench) -> Got {
     Ok(format!("{} after {old}", member(&after, "target")?))
 }
 
-fn is_cleared(status: &Value) -> Result<(), String> {
+/// The status of the ended trial, which must have no goal.
+fn cleared(bench: &mut Bench) -> Result<Value, String> {
+    let status = status_that(bench, "a status of the ended trial", |status| boolean(status, "running") == Ok(false))?;
     for name in ["error", "desired_positions"] {
-        let found = member(status, name)?;
+        let found = member(&status, name)?;
         must(found.is_null(), || format!("{name} {found}"))?;
     }
-    let action = text(status, "action_status")?;
-    must(action == "idle", || format!("action_status {action}"))
+    let action = text(&status, "action_status")?;
+    must(action == "idle", || format!("action_status {action}"))?;
+    Ok(status)
 }
 
 fn stops(bench: &mut Bench) -> Got {
-    start(bench)?;
-    status_that(bench, "a status with a target", has_target)?;
+    started(bench)?;
     bench.accepted(STOP, &json!({}))?;
-    let status = status_that(bench, "a status of the ended trial", |status| boolean(status, "running") == Ok(false))?;
-    is_cleared(&status)?;
+    let status = cleared(bench)?;
     bench.rejected(SKIP, &json!({}))?;
     Ok(status.to_string())
 }
 
 fn ends(bench: &mut Bench) -> Got {
-    bench.watch(STATUS)?;
-    bench.accepted(START, &json!({"duration": 0.5, "epsilon": 1e-6, "success_hold": 100.0}))?;
-    status_that(bench, "a status of the running trial", is_running)?;
-    let status = status_that(bench, "a status of the ended trial", |status| boolean(status, "running") == Ok(false))?;
-    is_cleared(&status)?;
+    start(bench, 0.5)?;
+    let status = cleared(bench)?;
     let elapsed = number(&status, "elapsed")?;
     must(elapsed > 0.4, || format!("ended after {elapsed} s"))?;
     bench.rejected(STOP, &json!({}))?;
@@ -161,7 +163,7 @@ fn counts(bench: &mut Bench) -> Got {
 fn restarts(bench: &mut Bench) -> Got {
     let before = number(&start_easy(bench)?, "elapsed")?;
     std::thread::sleep(Duration::from_millis(500));
-    start(bench)?;
+    start(bench, 60.0)?;
     let status = status_that(bench, "a status of the new trial", is_running)?;
     near("targets_reached", &[number(&status, "targets_reached")?], &[0.0], 1e-9)?;
     let elapsed = number(&status, "elapsed")?;
@@ -171,8 +173,7 @@ fn restarts(bench: &mut Bench) -> Got {
 
 fn uses_goals(bench: &mut Bench) -> Got {
     bench.watch("/ik_action/feedback")?;
-    start(bench)?;
-    let status = status_that(bench, "a status with a target", has_target)?;
+    let status = started(bench)?;
     let target = member(&status, "target")?.clone();
     let (x, y) = (number(&target, "x")?, number(&target, "y")?);
     let is_same = |msg: &Value| {
