@@ -14,30 +14,6 @@ fn unit(is_one: bool) -> f64 {
     f64::from(u8::from(is_one))
 }
 
-/// A companion matrix has the roots of its polynomial for eigenvalues, here those of
-/// `(z - 1)(z + 2)(z² + z + 1)(z - 0.5) = z⁵ + 1.5 z⁴ - z³ - z² - 1.5 z + 1`.
-#[test]
-fn a_companion_matrix_has_the_roots_of_its_polynomial() {
-    let coefficients = [1.0, -1.5, -1.0, -1.0, 1.5];
-    let matrix = Matrix::from_fn(5, |row, column| match column {
-        4 => -coefficients[row],
-        _ => unit(row == column + 1),
-    });
-    let half_root_3 = 0.75_f64.sqrt();
-    let expected = [
-        (-2.0, 0.0),
-        (-0.5, -half_root_3),
-        (-0.5, half_root_3),
-        (0.5, 0.0),
-        (1.0, 0.0),
-    ];
-    // Simple, well separated roots: some ten units of rounding.
-    for (found, expected) in sorted(&matrix).iter().zip(expected) {
-        let off = (found.0 - expected.0).hypot(found.1 - expected.1);
-        assert!(off < 1e-14, "{found:?}");
-    }
-}
-
 #[test]
 fn widely_scaled_states_keep_their_slow_eigenvalues() {
     // A fast pole at -1e9 and a slow one at -1e-3, states scaled apart by 1e12.

@@ -1,18 +1,7 @@
-//! The named scenes of the study: the quick ones here, the others in the report.
+//! The named scenes of the study. `report.rs` runs the quick ones.
 
-use pendularm::report::experiments::scenarios::{Scenario, all};
+use pendularm::report::experiments::scenarios::all;
 use pendularm::report::scenes::live_scenes;
-
-fn check(scenes: impl Iterator<Item = Scenario>) {
-    let mut failed = vec![];
-    for scene in scenes {
-        let (holds, observed) = scene.run();
-        if !holds {
-            failed.push(format!("{}: {observed}, not {}", scene.id, scene.expected));
-        }
-    }
-    assert!(failed.is_empty(), "{failed:#?}");
-}
 
 #[test]
 fn there_are_39_scenes_in_order() {
@@ -26,15 +15,14 @@ fn there_are_39_scenes_in_order() {
     }
 }
 
-#[test]
-fn every_quick_scene_is_as_expected() {
-    check(all().into_iter().filter(|scene| !scene.slow));
-}
-
+/// A quick report has the other ones.
 #[test]
 #[ignore = "takes some seconds; the report runs them"]
 fn every_slow_scene_is_as_expected() {
-    check(all().into_iter().filter(|scene| scene.slow));
+    for scene in all().into_iter().filter(|scene| scene.slow) {
+        let (holds, observed) = scene.run();
+        assert!(holds, "{}: {observed}, not {}", scene.id, scene.expected);
+    }
 }
 
 /// Each scene has a picture of a live arm, or a reason why there is none; a link spells all of the arm's settings.
