@@ -1,12 +1,8 @@
 //! The study's own reference motions against stored 70-digit ones.
 
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
-use pendularm::report::experiments::reference::{
-    DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference,
-};
+use pendularm::report::experiments::reference::{DoubleDouble, Law, ReferenceMotion};
 use serde_json::Value;
 
 use crate::stored::{arm, array, entries, for_links, gains, list, number, start};
@@ -96,28 +92,6 @@ fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     let ratio = distance(1.0 / 512.0) / distance(1.0 / 1024.0);
     assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
     assert!(exact.angle_error(0.5, &[f64::NAN; 2]).is_nan());
-}
-
-/// The steps of the live arm and the same steps with twice the digits differ by rounding alone: a few ulps in 128 steps.
-#[test]
-fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
-    let h = 1.0 / 256.0;
-    for method in Method::ALL {
-        for control in [false, true] {
-            let mut live = Simulation::<2>::new(Arm::default(), GAINS);
-            live.set_method(method);
-            live.set_timestep(h);
-            live.set_state(START);
-            live.enable(control);
-            live.set_setpoint(SETPOINT);
-            live.advance(128);
-            let law = if control { held(h) } else { Law::FREE };
-            let exact = exact_steps(&Arm::default(), &START, &law, method, h, 128, 1);
-            let (q, v) = exact.first().unwrap();
-            assert!(largest_difference(q, &live.state().position) < 1e-14);
-            assert!(largest_difference(v, &live.state().velocity) < 1e-13);
-        }
-    }
 }
 
 #[test]
