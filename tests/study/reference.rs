@@ -70,14 +70,6 @@ const START: State<2> = State {
     velocity: [0.5, -0.3],
 };
 
-fn held(period: f64) -> Law<2> {
-    Law::Held {
-        gains: GAINS,
-        setpoint: SETPOINT,
-        period,
-    }
-}
-
 /// The effort is of a linear spring and damper. Half the period of the hold halves the distance to the law at every
 /// instant, because a held effort is on average half a period old.
 #[test]
@@ -86,7 +78,12 @@ fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     let continuous = Law::Continuous(GAINS, SETPOINT);
     let exact = ReferenceMotion::new(&arm, &START, &continuous, 0.5);
     let distance = |period: f64| {
-        let held = ReferenceMotion::new(&arm, &START, &held(period), 0.5);
+        let law = Law::Held {
+            gains: GAINS,
+            setpoint: SETPOINT,
+            period,
+        };
+        let held = ReferenceMotion::new(&arm, &START, &law, 0.5);
         exact.angle_error(0.5, &state(&held, 0.5).position)
     };
     let ratio = distance(1.0 / 512.0) / distance(1.0 / 1024.0);
