@@ -16,17 +16,14 @@
 
 #![allow(
     clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     clippy::expect_used,
-    clippy::float_cmp,
     clippy::indexing_slicing,
     clippy::panic,
     clippy::print_stdout,
     clippy::too_many_lines,
     clippy::unwrap_used,
     unreachable_pub,
-    missing_docs,
     reason = "a simulation that panics has failed; it tells people what it does"
 )]
 
